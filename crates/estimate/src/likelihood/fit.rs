@@ -149,12 +149,17 @@ fn with_unknown_noise<'a, M: ResponseModel>(
         NoiseSource::WhiteResidual => None,
         _ => unknown.smooth(&white)?,
     };
-    let WeightedMinimum { minimum, weights, is_white, .. } = smooth.unwrap_or(white);
+    let WeightedMinimum { minimum, weights, is_white, bases } = smooth.unwrap_or(white);
     minima.ends[0].minimum = minimum.clone();
     let residual = Residual { model, data, weights: &weights, priors: &space.priors };
-    let information = Information::new(&residual, &minimum, 1.0)?;
+    let mut information = Information::new(&residual, &minimum, 1.0)?;
     let unknowns = space.start.len() + residual.transient_unknowns();
-    let spare = residual.len().saturating_sub(unknowns).max(1);
+    let mut freedom = residual.len().saturating_sub(unknowns).max(1) as f64;
+    if let Some(linearisation) = residual.linearise(&minimum.parameters).filter(|_| !is_white) {
+        let jacobian = linearisation.jacobian;
+        let of_weights = information.add_weight_uncertainty(data, &jacobian, &bases);
+        freedom = of_weights.map_or(freedom, |of_weights| of_weights.clamp(1.0, freedom));
+    }
     Ok(Fit {
         model,
         data,
@@ -163,7 +168,7 @@ fn with_unknown_noise<'a, M: ResponseModel>(
         minimum,
         minima,
         information,
-        degrees_of_freedom: spare as f64,
+        degrees_of_freedom: freedom,
         misfit_ratio: None,
         misfit_p_value: None,
         is_white: Some(is_white),

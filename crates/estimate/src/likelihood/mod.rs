@@ -5,6 +5,7 @@
 //! derivative, one bounded search, and one covariance.
 
 mod covariance;
+pub mod entries;
 mod error;
 mod estimate;
 mod fit;
@@ -18,6 +19,7 @@ mod search;
 mod settings;
 mod transient;
 mod unknown_noise;
+mod weight_uncertainty;
 mod weights;
 
 pub use error::LikelihoodError;

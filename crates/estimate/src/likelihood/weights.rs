@@ -61,10 +61,6 @@ impl Weights {
         Self { covariance, ..*self }
     }
 
-    pub(super) fn inputs_are_exact(&self) -> bool {
-        self.inputs_are_exact
-    }
-
     /// Variance of an output at a line.
     pub(super) fn variance(&self, row: usize, output: usize) -> f64 {
         self.covariance[row][(output, output)].re

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::channels::{InputColumn, SensorRow, unbalance};
-use super::{Power, Prior, Speed, Term};
+use super::{MachineError, Pattern, Power, Prior, Speed, Term};
 use crate::{Matrix, ModelError, SecondOrderSystem};
 
 /// An unknown of a machine.
@@ -54,6 +54,51 @@ pub struct Assembly {
 }
 
 impl Assembly {
+    /// Takes terms, sensors and inputs by index, for models that are not drawn element by element: entries
+    /// of M, C and K.
+    ///
+    /// # Errors
+    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist, counted from
+    /// 1.
+    pub fn from_terms(
+        dofs: Vec<String>,
+        terms: Vec<Term>,
+        parameters: Vec<MachineParameter>,
+        sensors: Vec<SensorRow>,
+        inputs: Vec<InputColumn>,
+    ) -> Result<Self, MachineError> {
+        let n = dofs.len();
+        let outside = |row: usize| ModelError::EntryOutside { row: row + 1, column: row + 1, dof: n };
+        for term in &terms {
+            let entries: Vec<usize> = match &term.pattern {
+                Pattern::Dyad { left, right } => left.iter().chain(right).map(|e| e.0).collect(),
+                Pattern::Block { dofs, .. } => dofs.clone(),
+            };
+            // The support is one beyond the degrees of freedom.
+            if let Some(at) = entries.into_iter().find(|at| *at > n) {
+                return Err(outside(at).into());
+            }
+            if let Some(at) = term.parameters.iter().find(|at| **at >= parameters.len()) {
+                return Err(outside(*at).into());
+            }
+        }
+        let read = sensors.iter().flat_map(|sensor| sensor.entries.iter().map(|entry| entry.0));
+        let loaded = inputs.iter().flat_map(|input| input.load(n, 1.0, Speed::None));
+        if let Some(at) = read.chain(loaded.map(|load| load.0)).find(|at| *at > n) {
+            return Err(outside(at).into());
+        }
+        Ok(Self {
+            dofs,
+            terms,
+            sensors,
+            inputs,
+            loads: Vec::new(),
+            parameters,
+            speed: Speed::None,
+            measured: Vec::new(),
+        })
+    }
+
     /// Returns the number of degrees of freedom.
     pub fn dof(&self) -> usize {
         self.dofs.len()

@@ -2,13 +2,10 @@
 
 use std::collections::HashMap;
 
-use nalgebra::{Complex, DMatrix};
-
 use super::assembly::OwnLoad;
 use super::{
-    Assembly, Bearing, Coefficient, Element, FreeCoefficient, Input, InputColumn, Instruments,
-    Machine, MachineError, MachineParameter, MatrixElement, Pattern, Power, SUPPORT, Sensor,
-    SensorRow, Speed, Term,
+    Assembly, Coefficient, Element, FreeCoefficient, Instruments, Machine, MachineError,
+    MachineParameter, Pattern, Power, SUPPORT, Speed, Term,
 };
 
 pub(super) fn assembly(
@@ -71,28 +68,29 @@ fn check_names(machine: &Machine, instruments: &Instruments) -> Result<(), Machi
     Ok(())
 }
 
-/// A coefficient with its unknown, if it is one.
+/// A coefficient, or the index of the unknown that it is.
 #[derive(Clone, Copy)]
-enum Factor {
+pub(super) enum Factor {
     Known(f64),
     Unknown(usize),
 }
 
-struct Builder<'a> {
-    machine: &'a Machine,
+/// What the elements seen so far make of the machine.
+pub(super) struct Builder<'a> {
+    pub(super) machine: &'a Machine,
     index: HashMap<&'a str, usize>,
     /// Motion of each degree of freedom with the support: 1 or 0.
-    direction: Vec<f64>,
-    speed: Speed,
+    pub(super) direction: Vec<f64>,
+    pub(super) speed: Speed,
     terms: Vec<Term>,
-    loads: Vec<OwnLoad>,
+    pub(super) loads: Vec<OwnLoad>,
     parameters: Vec<MachineParameter>,
     shared: HashMap<String, usize>,
     /// Elements at each degree of freedom, and whether one of them is a mass.
     touched: Vec<(Vec<String>, bool)>,
-    alpha: Factor,
-    beta: Factor,
-    loss_factor: Factor,
+    pub(super) alpha: Factor,
+    pub(super) beta: Factor,
+    pub(super) loss_factor: Factor,
 }
 
 impl<'a> Builder<'a> {
@@ -129,7 +127,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Index of a degree of freedom that something names.
-    fn dof(&self, what: &'static str, name: &str, dof: &str) -> Result<usize, MachineError> {
+    pub(super) fn dof(&self, what: &'static str, name: &str, dof: &str) -> Result<usize, MachineError> {
         self.index.get(dof).copied().ok_or_else(|| MachineError::UnknownDof {
             what,
             name: name.to_owned(),
@@ -139,7 +137,7 @@ impl<'a> Builder<'a> {
     }
 
     /// e_i − e_j of two ends, one of which may be the support, which moves in its direction only.
-    fn difference(
+    pub(super) fn difference(
         &self,
         what: &'static str,
         name: &str,
@@ -161,7 +159,7 @@ impl<'a> Builder<'a> {
         Ok(vec![(self.dof(what, name, pair.0)?, 1.0), (self.dof(what, name, pair.1)?, -1.0)])
     }
 
-    fn factor(&mut self, name: &str, coefficient: &Coefficient) -> Result<Factor, MachineError> {
+    pub(super) fn factor(&mut self, name: &str, coefficient: &Coefficient) -> Result<Factor, MachineError> {
         match coefficient {
             Coefficient::Known(value) if !value.is_finite() => {
                 Err(MachineError::NotFinite { name: name.to_owned(), value: *value })
@@ -196,7 +194,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds pattern × power × factors unless that is zero.
-    fn push(&mut self, pattern: &Pattern, power: Power, factors: &[Factor]) {
+    pub(super) fn push(&mut self, pattern: &Pattern, power: Power, factors: &[Factor]) {
         let (mut scale, mut parameters) = (1.0, Vec::new());
         for factor in factors {
             match factor {
@@ -209,7 +207,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn touch(&mut self, name: &str, entries: &[(usize, f64)], is_mass: bool) {
+    pub(super) fn touch(&mut self, name: &str, entries: &[(usize, f64)], is_mass: bool) {
         for (at, _) in entries.iter().filter(|(at, _)| *at < self.machine.dofs.len()) {
             let (elements, has_mass) = &mut self.touched[*at];
             elements.push(format!("{name:?}"));
@@ -232,169 +230,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn mass(&mut self, name: &str, at: &str, mass: &Coefficient) -> Result<(), MachineError> {
-        let at = self.dof("element", name, at)?;
-        let factor = self.factor(name, mass)?;
-        let entries = vec![(at, 1.0)];
-        self.touch(name, &entries, true);
-        let relative = vec![(at, 1.0), (self.machine.dofs.len(), -self.direction[at])];
-        let pattern = Pattern::Dyad { left: entries.clone(), right: entries.clone() };
-        self.push(&pattern, Power::Mass, &[factor]);
-        let pattern = Pattern::Dyad { left: entries, right: relative };
-        self.push(&pattern, Power::Damping, &[self.alpha, factor]);
-        Ok(())
-    }
-
-    fn link(
-        &mut self,
-        name: &str,
-        ends: [&str; 2],
-        [stiffness, damping, loss_factor]: [&Coefficient; 3],
-    ) -> Result<(), MachineError> {
-        let entries = self.difference("element", name, ends)?;
-        self.touch(name, &entries, false);
-        let used = [stiffness, damping].into_iter().filter(|value| !value.is_zero()).count();
-        if used == 0 {
-            let problem = "a link needs a stiffness `k` or a damping `c`".to_owned();
-            return Err(MachineError::Element { name: name.to_owned(), problem });
-        }
-        let named = |letter: &str| match used + usize::from(!loss_factor.is_zero()) {
-            1 => name.to_owned(),
-            _ => format!("{name}.{letter}"),
-        };
-        let k = self.factor(&named("k"), stiffness)?;
-        let c = self.factor(&named("c"), damping)?;
-        let eta = match loss_factor.is_zero() {
-            true => self.loss_factor,
-            false => self.factor(&named("eta"), loss_factor)?,
-        };
-        let pattern = Pattern::Dyad { left: entries.clone(), right: entries };
-        self.push(&pattern, Power::Stiffness, &[k]);
-        self.push(&pattern, Power::Damping, &[c]);
-        self.push(&pattern, Power::Hysteresis, &[k, eta]);
-        self.push(&pattern, Power::Damping, &[k, self.beta]);
-        Ok(())
-    }
-
-    fn bearing(&mut self, name: &str, bearing: &Bearing) -> Result<(), MachineError> {
-        let mut ends = Vec::new();
-        for direction in 0..2 {
-            let other = bearing.to.as_ref().map_or(SUPPORT, |to| to[direction].as_str());
-            ends.push(self.difference("element", name, [bearing.at[direction].as_str(), other])?);
-            self.touch(name, &ends[direction], false);
-        }
-        let matrices = [
-            ("k", Power::Stiffness, &bearing.stiffness),
-            ("c", Power::Damping, &bearing.damping),
-            ("m", Power::Mass, &bearing.mass),
-        ];
-        for (letter, power, coefficients) in matrices {
-            let places = [("xx", 0, 0), ("xy", 0, 1), ("yx", 1, 0), ("yy", 1, 1)];
-            for ((place, row, column), coefficient) in places.into_iter().zip(coefficients) {
-                let factor = self.factor(&format!("{name}.{letter}{place}"), coefficient)?;
-                let (left, right) = (ends[row].clone(), ends[column].clone());
-                self.push(&Pattern::Dyad { left, right }, power, &[factor]);
-            }
-        }
-        Ok(())
-    }
-
-    fn matrices(&mut self, name: &str, element: &MatrixElement) -> Result<(), MachineError> {
-        let dofs = element.dofs.iter().map(|dof| self.dof("element", name, dof));
-        let dofs: Vec<usize> = dofs.collect::<Result<_, _>>()?;
-        let entries: Vec<(usize, f64)> = dofs.iter().map(|at| (*at, 1.0)).collect();
-        self.touch(name, &entries, element.mass.is_some());
-        let known = Factor::Known(1.0);
-        let parts = [
-            ("mass", &element.mass, Power::Mass),
-            ("damping", &element.damping, Power::Damping),
-            ("stiffness", &element.stiffness, Power::Stiffness),
-            ("gyroscopic", &element.gyroscopic, Power::Gyroscopic),
-        ];
-        for (what, part, power) in parts {
-            let Some((matrix, coefficient)) = part else { continue };
-            self.check_matrix(name, what, matrix, dofs.len())?;
-            let factor = self.factor(&format!("{name}.{what}"), coefficient)?;
-            let relative = self.block(&dofs, matrix, true);
-            match power {
-                Power::Mass => {
-                    let absolute = self.block(&dofs, matrix, false);
-                    self.push(&absolute, power, &[factor, known]);
-                    self.push(&relative, Power::Damping, &[factor, self.alpha]);
-                }
-                Power::Stiffness => {
-                    self.push(&relative, power, &[factor]);
-                    self.push(&relative, Power::Hysteresis, &[factor, self.loss_factor]);
-                    self.push(&relative, Power::Damping, &[factor, self.beta]);
-                }
-                Power::Gyroscopic if self.speed == Speed::None => {
-                    return Err(MachineError::NoSpeed { what: "element", name: name.to_owned() });
-                }
-                Power::Gyroscopic => {
-                    let absolute = self.block(&dofs, matrix, false);
-                    self.push(&absolute, power, &[factor]);
-                }
-                _ => self.push(&relative, power, &[factor]),
-            }
-        }
-        Ok(())
-    }
-
-    fn check_matrix(
-        &self,
-        name: &str,
-        what: &str,
-        matrix: &DMatrix<f64>,
-        order: usize,
-    ) -> Result<(), MachineError> {
-        let (rows, columns) = matrix.shape();
-        if (rows, columns) != (order, order) {
-            let problem = format!(
-                "the {what} matrix is {rows}×{columns}, but `dofs` has {order} degrees of freedom"
-            );
-            return Err(MachineError::Element { name: name.to_owned(), problem });
-        }
-        match matrix.iter().find(|value| !value.is_finite()) {
-            Some(&value) => Err(MachineError::NotFinite { name: format!("{name}.{what}"), value }),
-            None => Ok(()),
-        }
-    }
-
-    /// A matrix that acts on the motion, or on that relative to the support.
-    fn block(&self, dofs: &[usize], matrix: &DMatrix<f64>, relative: bool) -> Pattern {
-        let support = matrix.row_iter().map(|row| {
-            let moved = row.iter().zip(dofs).map(|(value, at)| value * self.direction[*at]);
-            if relative { -moved.sum::<f64>() } else { 0.0 }
-        });
-        let support = support.collect();
-        Pattern::Block { dofs: dofs.to_vec(), matrix: matrix.clone(), support }
-    }
-
-    fn unbalance(
-        &mut self,
-        name: &str,
-        at: &[String; 2],
-        parts: [&Coefficient; 2],
-    ) -> Result<(), MachineError> {
-        if self.speed == Speed::None {
-            return Err(MachineError::NoSpeed { what: "element", name: name.to_owned() });
-        }
-        let at = [self.dof("element", name, &at[0])?, self.dof("element", name, &at[1])?];
-        let units = [("real", Complex::new(1.0, 0.0)), ("imaginary", Complex::new(0.0, 1.0))];
-        for ((what, unit), part) in units.into_iter().zip(parts) {
-            match self.factor(&format!("{name}.{what}"), part)? {
-                Factor::Known(0.0) => {}
-                Factor::Known(value) => {
-                    self.loads.push(OwnLoad { at, scale: unit * value, parameter: None });
-                }
-                Factor::Unknown(parameter) => {
-                    self.loads.push(OwnLoad { at, scale: unit, parameter: Some(parameter) });
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// Every degree of freedom needs an element and a mass, even one of 0.
     fn check_masses(&self, machine: &Machine) -> Result<(), MachineError> {
         for (dof, (elements, has_mass)) in machine.dofs.iter().zip(&self.touched) {
@@ -410,39 +245,5 @@ impl<'a> Builder<'a> {
             }
         }
         Ok(())
-    }
-
-    fn sensor(&self, sensor: &Sensor) -> Result<SensorRow, MachineError> {
-        let name = &sensor.name;
-        if !sensor.gain.is_finite() {
-            return Err(MachineError::NotFinite { name: name.clone(), value: sensor.gain });
-        }
-        if sensor.gain == 0.0 {
-            return Err(MachineError::NoGain { name: name.clone() });
-        }
-        let mut entries = match &sensor.relative_to {
-            Some(other) => self.difference("sensor", name, [&sensor.at, other])?,
-            None => vec![(self.dof("sensor", name, &sensor.at)?, 1.0)],
-        };
-        entries.iter_mut().for_each(|(_, weight)| *weight *= sensor.gain);
-        Ok(SensorRow { name: name.clone(), entries, quantity: sensor.quantity })
-    }
-
-    fn input(&self, input: &Input) -> Result<InputColumn, MachineError> {
-        let what = "input";
-        Ok(match input {
-            Input::Force { name, at, against } => InputColumn::Force(match against {
-                Some(other) => self.difference(what, name, [at, other])?,
-                None => vec![(self.dof(what, name, at)?, 1.0)],
-            }),
-            Input::Support { quantity, .. } => InputColumn::Support(*quantity),
-            Input::Unbalance { name, at } => {
-                if self.speed == Speed::None {
-                    return Err(MachineError::NoSpeed { what, name: name.clone() });
-                }
-                let [x, y] = at;
-                InputColumn::Unbalance([self.dof(what, name, x)?, self.dof(what, name, y)?])
-            }
-        })
     }
 }

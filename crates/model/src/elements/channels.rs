@@ -2,7 +2,8 @@
 
 use nalgebra::Complex;
 
-use super::Speed;
+use super::build::Builder;
+use super::{Input, MachineError, Sensor, Speed};
 use crate::ResponseQuantity;
 
 /// What a sensor reads: a sum of motions; index n is the support.
@@ -49,4 +50,40 @@ pub(super) fn unbalance(
 ) -> [(usize, Complex<f64>); 2] {
     let turn = speed.at(omega);
     [(x, Complex::from(turn * turn)), (y, Complex::new(0.0, -turn * turn.abs()))]
+}
+
+impl Builder<'_> {
+    pub(super) fn sensor(&self, sensor: &Sensor) -> Result<SensorRow, MachineError> {
+        let name = &sensor.name;
+        if !sensor.gain.is_finite() {
+            return Err(MachineError::NotFinite { name: name.clone(), value: sensor.gain });
+        }
+        if sensor.gain == 0.0 {
+            return Err(MachineError::NoGain { name: name.clone() });
+        }
+        let mut entries = match &sensor.relative_to {
+            Some(other) => self.difference("sensor", name, [&sensor.at, other])?,
+            None => vec![(self.dof("sensor", name, &sensor.at)?, 1.0)],
+        };
+        entries.iter_mut().for_each(|(_, weight)| *weight *= sensor.gain);
+        Ok(SensorRow { name: name.clone(), entries, quantity: sensor.quantity })
+    }
+
+    pub(super) fn input(&self, input: &Input) -> Result<InputColumn, MachineError> {
+        let what = "input";
+        Ok(match input {
+            Input::Force { name, at, against } => InputColumn::Force(match against {
+                Some(other) => self.difference(what, name, [at, other])?,
+                None => vec![(self.dof(what, name, at)?, 1.0)],
+            }),
+            Input::Support { quantity, .. } => InputColumn::Support(*quantity),
+            Input::Unbalance { name, at } => {
+                if self.speed == Speed::None {
+                    return Err(MachineError::NoSpeed { what, name: name.clone() });
+                }
+                let [x, y] = at;
+                InputColumn::Unbalance([self.dof(what, name, x)?, self.dof(what, name, y)?])
+            }
+        })
+    }
 }

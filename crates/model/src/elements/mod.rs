@@ -21,9 +21,33 @@
 //! assert_eq!(assembly.parameters()[0].name, "k2");
 //! # Ok::<(), mechid_model::elements::MachineError>(())
 //! ```
+//!
+//! With the feature `serde` a machine and its instruments are read from and written to JSON. A coefficient is
+//! a number, an unknown (`start`, `min`, `max`, `prior`), or the name of one of the `parameters`:
+//!
+//! ```json
+//! {
+//!   "dofs": ["x", "y"],
+//!   "elements": [
+//!     {"name": "m", "kind": "mass", "at": "x", "m": "mass"},
+//!     {"name": "my", "kind": "mass", "at": "y", "m": "mass"},
+//!     {"name": "stop", "kind": "link", "at": "x", "k": 2e4, "c": {"start": 5, "min": 0}},
+//!     {"name": "coupling", "kind": "link", "between": ["x", "y"], "k": 1e4, "eta": 0.02},
+//!     {"name": "A", "kind": "bearing", "at": ["x", "y"], "kxx": {"start": 1e7}, "kyy": 1e7},
+//!     {"name": "plate", "kind": "matrices", "dofs": ["x", "y"],
+//!      "stiffness": {"size": 2, "entries": [[0, 0, 1e5], [1, 1, 1e5]]}}
+//!   ],
+//!   "parameters": {"mass": {"prior": {"mean": 12, "standard_deviation": 0.5}}},
+//!   "damping": {"alpha": 0.1, "beta": 1e-5}
+//! }
+//! ```
+//!
+//! Rows and columns of sparse matrices are counted from 0. Other kinds are `unbalance` (`at` two degrees of
+//! freedom, `real`, `imaginary`); links at one place end at the support.
 
 mod assembly;
 mod build;
+mod build_elements;
 mod channels;
 mod coefficient;
 mod element;
@@ -32,6 +56,8 @@ mod instruments;
 mod machine;
 #[cfg(feature = "serde")]
 mod serde_form;
+#[cfg(feature = "serde")]
+mod serde_write;
 mod term;
 
 pub use assembly::{Assembly, MachineParameter};

@@ -13,21 +13,21 @@ use super::{
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MachineForm {
-    dofs: Vec<String>,
-    elements: Vec<ElementForm>,
+    pub(super) dofs: Vec<String>,
+    pub(super) elements: Vec<ElementForm>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    parameters: BTreeMap<String, FreeCoefficient>,
+    pub(super) parameters: BTreeMap<String, FreeCoefficient>,
     #[serde(default, skip_serializing_if = "ProportionalDamping::is_zero")]
-    damping: ProportionalDamping,
+    pub(super) damping: ProportionalDamping,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    support_direction: Option<Vec<String>>,
+    pub(super) support_direction: Option<Vec<String>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    measured: Vec<String>,
+    pub(super) measured: Vec<String>,
 }
 
 #[derive(Debug, Serialize, Deserialize, Clone, Copy, PartialEq)]
 #[serde(rename_all = "snake_case")]
-enum Kind {
+pub(super) enum Kind {
     Mass,
     Link,
     Bearing,
@@ -38,7 +38,7 @@ enum Kind {
 /// One degree of freedom or several.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
-enum Places {
+pub(super) enum Places {
     One(String),
     Several(Vec<String>),
 }
@@ -46,7 +46,7 @@ enum Places {
 /// Rows of a matrix, or its non-zero entries [row, column, value], counted from 0.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
-enum MatrixForm {
+pub(super) enum MatrixForm {
     Dense(Vec<Vec<f64>>),
     Sparse { size: usize, entries: Vec<(usize, usize, f64)> },
 }
@@ -54,70 +54,70 @@ enum MatrixForm {
 /// Any element; what does not belong to its kind is absent.
 #[derive(Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
-struct ElementForm {
-    name: String,
+pub(super) struct ElementForm {
+    pub(super) name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
-    kind: Option<Kind>,
+    pub(super) kind: Option<Kind>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    at: Option<Places>,
+    pub(super) at: Option<Places>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    between: Option<[String; 2]>,
+    pub(super) between: Option<[String; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    to: Option<[String; 2]>,
+    pub(super) to: Option<[String; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    dofs: Option<Vec<String>>,
+    pub(super) dofs: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    m: Option<Coefficient>,
+    pub(super) m: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    k: Option<Coefficient>,
+    pub(super) k: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    c: Option<Coefficient>,
+    pub(super) c: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    eta: Option<Coefficient>,
+    pub(super) eta: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    kxx: Option<Coefficient>,
+    pub(super) kxx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    kxy: Option<Coefficient>,
+    pub(super) kxy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    kyx: Option<Coefficient>,
+    pub(super) kyx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    kyy: Option<Coefficient>,
+    pub(super) kyy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    cxx: Option<Coefficient>,
+    pub(super) cxx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    cxy: Option<Coefficient>,
+    pub(super) cxy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    cyx: Option<Coefficient>,
+    pub(super) cyx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    cyy: Option<Coefficient>,
+    pub(super) cyy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    mxx: Option<Coefficient>,
+    pub(super) mxx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    mxy: Option<Coefficient>,
+    pub(super) mxy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    myx: Option<Coefficient>,
+    pub(super) myx: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    myy: Option<Coefficient>,
+    pub(super) myy: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    real: Option<Coefficient>,
+    pub(super) real: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    imaginary: Option<Coefficient>,
+    pub(super) imaginary: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    mass_factor: Option<Coefficient>,
+    pub(super) mass_factor: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    damping_factor: Option<Coefficient>,
+    pub(super) damping_factor: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    stiffness_factor: Option<Coefficient>,
+    pub(super) stiffness_factor: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    gyroscopic_factor: Option<Coefficient>,
+    pub(super) gyroscopic_factor: Option<Coefficient>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    mass: Option<MatrixForm>,
+    pub(super) mass: Option<MatrixForm>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    damping: Option<MatrixForm>,
+    pub(super) damping: Option<MatrixForm>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    stiffness: Option<MatrixForm>,
+    pub(super) stiffness: Option<MatrixForm>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    gyroscopic: Option<MatrixForm>,
+    pub(super) gyroscopic: Option<MatrixForm>,
 }
 
 impl ElementForm {
@@ -344,75 +344,5 @@ impl TryFrom<MachineForm> for Machine {
             support_direction: form.support_direction,
             measured: form.measured,
         })
-    }
-}
-
-impl From<Machine> for MachineForm {
-    fn from(machine: Machine) -> Self {
-        Self {
-            elements: machine.elements.into_iter().map(ElementForm::from).collect(),
-            dofs: machine.dofs,
-            parameters: machine.parameters.into_iter().collect(),
-            damping: machine.damping,
-            support_direction: machine.support_direction,
-            measured: machine.measured,
-        }
-    }
-}
-
-/// A coefficient that is not a known zero.
-fn given(coefficient: Coefficient) -> Option<Coefficient> {
-    (!coefficient.is_zero()).then_some(coefficient)
-}
-
-fn written(part: Option<(DMatrix<f64>, Coefficient)>) -> (Option<MatrixForm>, Option<Coefficient>) {
-    let Some((matrix, factor)) = part else { return (None, None) };
-    let rows = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
-    let factor = (factor != Coefficient::Known(1.0)).then_some(factor);
-    (Some(MatrixForm::Dense(rows)), factor)
-}
-
-impl From<(String, Element)> for ElementForm {
-    fn from((name, element): (String, Element)) -> Self {
-        let form = Self { name, ..Self::default() };
-        match element {
-            Element::Mass { at, mass } => {
-                Self { kind: Some(Kind::Mass), at: Some(Places::One(at)), m: Some(mass), ..form }
-            }
-            Element::Link { between, stiffness, damping, loss_factor } => Self {
-                kind: Some(Kind::Link),
-                between: Some(between),
-                k: given(stiffness),
-                c: given(damping),
-                eta: given(loss_factor),
-                ..form
-            },
-            Element::Unbalance { at, real, imaginary } => Self {
-                kind: Some(Kind::Unbalance),
-                at: Some(Places::Several(at.to_vec())),
-                real: Some(real),
-                imaginary: Some(imaginary),
-                ..form
-            },
-            Element::Bearing(bearing) => {
-                let Bearing { at, to, stiffness, damping, mass } = *bearing;
-                let [kxx, kxy, kyx, kyy] = stiffness.map(given);
-                let [cxx, cxy, cyx, cyy] = damping.map(given);
-                let [mxx, mxy, myx, myy] = mass.map(given);
-                let (kind, at) = (Some(Kind::Bearing), Some(Places::Several(at.to_vec())));
-                let form = Self { kind, at, to, kxx, kxy, kyx, kyy, ..form };
-                Self { cxx, cxy, cyx, cyy, mxx, mxy, myx, myy, ..form }
-            }
-            Element::Matrices(matrices) => {
-                let MatrixElement { dofs, mass, damping, stiffness, gyroscopic } = *matrices;
-                let (mass, mass_factor) = written(mass);
-                let (damping, damping_factor) = written(damping);
-                let (stiffness, stiffness_factor) = written(stiffness);
-                let (gyroscopic, gyroscopic_factor) = written(gyroscopic);
-                let (kind, dofs) = (Some(Kind::Matrices), Some(dofs));
-                let form = Self { kind, dofs, mass, damping, stiffness, gyroscopic, ..form };
-                Self { mass_factor, damping_factor, stiffness_factor, gyroscopic_factor, ..form }
-            }
-        }
     }
 }

@@ -82,7 +82,7 @@ impl MachineEstimate {
         values: &[f64],
     ) -> Result<DMatrix<f64>, LikelihoodError> {
         let mut information =
-            gram(machine, instruments, data, data.inputs(), &self.variance, values)?;
+            self.gram(machine, instruments, data, data.inputs(), &self.variance, values)?;
         for (at, parameter) in self.likelihood.parameters.iter().enumerate() {
             if let Some(prior) = parameter.prior {
                 information[(at, at)] += (scale(values[at]) / prior.standard_deviation).powi(2);
@@ -103,7 +103,7 @@ impl MachineEstimate {
             Candidate::Sensor(sensor) => {
                 let with = Instruments { sensors: vec![sensor.clone()], ..instruments.clone() };
                 let variance = self.sensor_variance(instruments, sensor);
-                let more = gram(machine, &with, data, data.inputs(), &variance, values)?;
+                let more = self.gram(machine, &with, data, data.inputs(), &variance, values)?;
                 Ok((sensor.name.clone(), more))
             }
             Candidate::Force(input) => {
@@ -118,7 +118,7 @@ impl MachineEstimate {
                     Complex::from((power / forces.len().max(1) as f64).sqrt())
                 };
                 let inputs = DMatrix::from_fn(data.len(), 1, |row, _| size(row));
-                let more = gram(machine, &with, data, &inputs, &self.variance, values)?;
+                let more = self.gram(machine, &with, data, &inputs, &self.variance, values)?;
                 Ok((input.name().to_owned(), more))
             }
         }
@@ -143,40 +143,42 @@ impl MachineEstimate {
             sum / like.len() as f64
         })
     }
+
+    /// JᵀJ of a test, in units of the values.
+    fn gram(
+        &self,
+        machine: &Machine,
+        instruments: &Instruments,
+        data: &LineData,
+        inputs: &DMatrix<Complex<f64>>,
+        variance: &DMatrix<f64>,
+        values: &[f64],
+    ) -> Result<DMatrix<f64>, LikelihoodError> {
+        let assembly = machine.assembly(instruments)?;
+        let model = MachineModel::new(&assembly, data.omega(), self.part.as_ref(), false)?;
+        let (count, outputs) = (values.len(), assembly.sensors().len());
+        let mut gram = DMatrix::zeros(count, count);
+        let mut sensitivity = DMatrix::zeros(outputs, count);
+        for row in 0..data.len() {
+            let failed = LikelihoodError::NoResponse { at: "the estimate" };
+            let line = model.at(values, row).ok_or(failed)?;
+            let input: DVector<Complex<f64>> = inputs.row(row).transpose();
+            line.sensitivity(values, &input, &DVector::zeros(0), &mut sensitivity);
+            for (output, mut of_output) in sensitivity.row_iter_mut().enumerate() {
+                let weight = (2.0 / variance[(row, output)]).sqrt();
+                for (z, value) in of_output.iter_mut().zip(values) {
+                    *z *= weight * scale(*value);
+                }
+            }
+            gram += (sensitivity.adjoint() * &sensitivity).map(|z| z.re);
+        }
+        Ok(gram)
+    }
 }
 
 /// Unit in which a parameter is counted.
 fn scale(value: f64) -> f64 {
     if value == 0.0 { 1.0 } else { value.abs() }
-}
-
-fn gram(
-    machine: &Machine,
-    instruments: &Instruments,
-    data: &LineData,
-    inputs: &DMatrix<Complex<f64>>,
-    variance: &DMatrix<f64>,
-    values: &[f64],
-) -> Result<DMatrix<f64>, LikelihoodError> {
-    let assembly = machine.assembly(instruments)?;
-    let model = MachineModel::new(&assembly, data.omega(), None, false)?;
-    let (count, outputs) = (values.len(), assembly.sensors().len());
-    let mut gram = DMatrix::zeros(count, count);
-    let mut sensitivity = DMatrix::zeros(outputs, count);
-    for row in 0..data.len() {
-        let failed = LikelihoodError::NoResponse { at: "the estimate" };
-        let line = model.at(values, row).ok_or(failed)?;
-        let input: DVector<Complex<f64>> = inputs.row(row).transpose();
-        line.sensitivity(values, &input, &DVector::zeros(0), &mut sensitivity);
-        for (output, mut of_output) in sensitivity.row_iter_mut().enumerate() {
-            let weight = (2.0 / variance[(row, output)]).sqrt();
-            for (z, value) in of_output.iter_mut().zip(values) {
-                *z *= weight * scale(*value);
-            }
-        }
-        gram += (sensitivity.adjoint() * &sensitivity).map(|z| z.re);
-    }
-    Ok(gram)
 }
 
 /// Sum of the logarithms of the eigenvalues that are determined, and their number.

@@ -31,6 +31,8 @@ pub struct MachineEstimate {
     pub assembly: Assembly,
     /// Variance of the noise of each output, lines × p.
     pub(super) variance: DMatrix<f64>,
+    /// Part whose receptance was measured.
+    pub(super) part: Option<MeasuredPart>,
 }
 
 /// Identifies the unknown coefficients of a machine from line data whose outputs are the readings of its
@@ -134,7 +136,7 @@ fn identify(
     let variance = DMatrix::from_fn(data.len(), data.outputs().ncols(), |row, output| {
         fit.weights.variance(row, output)
     });
-    Ok(MachineEstimate { likelihood, assembly, variance })
+    Ok(MachineEstimate { likelihood, assembly, variance, part })
 }
 
 fn parameter_space(assembly: &Assembly) -> ParameterSpace {

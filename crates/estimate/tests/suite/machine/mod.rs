@@ -3,6 +3,7 @@
 mod agreement;
 mod chain;
 mod generator;
+mod judge;
 mod open;
 mod rotor;
 mod structures;

@@ -1,0 +1,69 @@
+//! Uncertainty of an estimate that follows from that of the smooth noise spectra by which it is weighted.
+
+use mechid_spectra::LineData;
+use nalgebra::{DMatrix, DVector};
+
+use super::covariance::Information;
+
+impl Information {
+    /// Adds to the covariance what the errors of noise spectra make of the estimate, and returns the degrees
+    /// of freedom of the variance of the parameter that has the fewest. `jacobian` is the derivative of the
+    /// residual, and `bases` the functions that the log powers of each record were fitted with.
+    ///
+    /// With log powers B β of unit information, orthonormal sensitivities Q and P_i = Σ b_li Q_lᵀQ_l, the
+    /// estimate scatters more by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of the Fisher information is
+    /// too small by as much. `None`, and nothing added, where some parameter is not determined.
+    ///
+    /// # Source
+    /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),
+    /// Biometrics Bulletin 2, 110–114.
+    pub(super) fn add_weight_uncertainty(
+        &mut self,
+        data: &LineData,
+        jacobian: &DMatrix<f64>,
+        bases: &[DMatrix<f64>],
+    ) -> Option<f64> {
+        let (count, outputs) = (self.free.len(), data.outputs().ncols());
+        (self.rank == count && count > 0).then_some(())?;
+        let mut columns = jacobian.select_columns(&self.free);
+        for (mut column, scale) in columns.column_iter_mut().zip(self.scale.iter()) {
+            column.unscale_mut(*scale);
+        }
+        let factors = columns.qr();
+        let (q, r) = (factors.q(), factors.r());
+        let mut root = DMatrix::identity(count, count);
+        r.solve_upper_triangular_mut(&mut root).then_some(())?;
+        root.row_iter_mut().zip(self.scale.iter()).for_each(|(mut row, by)| row.unscale_mut(*by));
+        let mut excess = DMatrix::<f64>::zeros(count, count);
+        let mut spread = DVector::<f64>::zeros(count);
+        for ((rows, _), basis) in data.records().iter().zip(bases) {
+            for output in 0..outputs {
+                let at: Vec<usize> = rows
+                    .clone()
+                    .flat_map(|line| [0, 1].map(|part| 2 * (outputs * line + output) + part))
+                    .collect();
+                let sensitivity = q.select_rows(&at);
+                for term in basis.column_iter() {
+                    let mut weighted = sensitivity.clone();
+                    for (at, mut row) in weighted.row_iter_mut().enumerate() {
+                        row *= term[at / 2];
+                    }
+                    let p = sensitivity.tr_mul(&weighted);
+                    excess += weighted.tr_mul(&weighted) - &p * &p;
+                    for (spread, c) in spread.iter_mut().zip(root.row_iter()) {
+                        *spread += (c * &p).dot(&c).powi(2);
+                    }
+                }
+            }
+        }
+        let more = &root * excess * root.transpose() * 2.0;
+        for (i, row) in self.free.iter().enumerate() {
+            for (j, column) in self.free.iter().enumerate() {
+                self.covariance[(*row, *column)] += more[(i, j)];
+            }
+        }
+        let each = root.row_iter().zip(spread.iter());
+        let freedom = each.map(|(c, spread)| 2.0 * c.norm_squared().powi(2) / spread);
+        Some(freedom.fold(f64::INFINITY, f64::min))
+    }
+}

@@ -1,0 +1,51 @@
+//! Coverage and scatter over many seeds.
+
+use mechid_estimate::likelihood::LikelihoodEstimate;
+use rayon::prelude::*;
+
+/// What intervals and standard errors of many experiments are worth.
+#[derive(Debug)]
+pub struct Judged {
+    /// Share of the intervals that contain the truth, over all parameters.
+    pub held: f64,
+    /// The same of the worst parameter.
+    pub worst: f64,
+    /// Root mean square error over root mean square standard error, over all parameters.
+    pub scatter: f64,
+    /// The same of the worst parameter.
+    pub worst_scatter: f64,
+    /// Number of experiments whose search failed.
+    pub failed: usize,
+}
+
+/// Judges the estimates of `experiment` for seeds 0 … against the truth by name.
+pub fn judge(
+    truth: &[(String, f64)],
+    seeds: u64,
+    experiment: impl Fn(u64) -> Option<LikelihoodEstimate> + Sync + Send,
+) -> Judged {
+    let estimates: Vec<_> = (0..seeds).into_par_iter().map(experiment).collect();
+    let failed = estimates.iter().filter(|estimate| estimate.is_none()).count();
+    let estimates: Vec<LikelihoodEstimate> = estimates.into_iter().flatten().collect();
+    let runs = estimates.len() as f64;
+    let (mut held, mut scatter): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    for (name, truth) in truth {
+        let (mut inside, mut errors, mut variances) = (0.0, 0.0_f64, 0.0_f64);
+        for estimate in &estimates {
+            let p = estimate.parameter(name).unwrap();
+            inside += f64::from(u8::from((p.interval[0]..=p.interval[1]).contains(truth)));
+            errors += (p.value - truth).powi(2);
+            variances += p.standard_error.map_or(0.0, |error| error * error);
+        }
+        held.push(inside / runs);
+        scatter.push((errors / variances).sqrt());
+    }
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    Judged {
+        held: mean(&held),
+        worst: held.iter().copied().fold(1.0, f64::min),
+        scatter: mean(&scatter.iter().map(|s| s * s).collect::<Vec<_>>()).sqrt(),
+        worst_scatter: scatter.iter().copied().fold(0.0, f64::max),
+        failed,
+    }
+}
