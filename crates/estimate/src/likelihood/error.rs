@@ -20,6 +20,16 @@ pub enum LikelihoodError {
         /// Number found.
         got: usize,
     },
+    /// A choice is out of range.
+    #[error("`{name}` must be {requirement}, got {}", message::number(*value))]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Requirement that it does not meet.
+        requirement: &'static str,
+        /// Value given.
+        value: f64,
+    },
     /// Nothing is unknown.
     #[error("every coefficient is known: there is nothing to identify")]
     NoParameter,

@@ -126,6 +126,8 @@ pub struct FoundMinimum {
     pub sum_of_squares: f64,
     /// Number of searches that ended here.
     pub searches: usize,
+    /// Steps of the best of them.
+    pub steps: usize,
 }
 
 /// Common part of the estimate of any model.
@@ -144,6 +146,9 @@ pub struct LikelihoodEstimate {
     pub misfit_ratio: Option<f64>,
     /// Probability of a larger misfit if model and noise are right; `None` where it is unknown.
     pub misfit_p_value: Option<f64>,
+    /// Factor by which standard errors and intervals are larger than the noise alone makes them, because model
+    /// and data disagree beyond it; 1 where they do not.
+    pub error_scale: f64,
     /// Whether the noise of all outputs was found white; `None` where it is stated.
     pub white_noise: Option<bool>,
     /// Root mean square of the residual over that of the output, per output.
@@ -192,10 +197,12 @@ impl LikelihoodEstimate {
             parameters: end.minimum.parameters.clone(),
             sum_of_squares: end.minimum.cost,
             searches: end.searches,
+            steps: end.minimum.steps,
         });
         Self {
             parameters: (0..names.len()).map(parameter).collect(),
-            covariance: fit.information.covariance.clone(),
+            covariance: &fit.information.covariance * fit.error_scale().powi(2),
+            error_scale: fit.error_scale(),
             log_likelihood: fit.log_likelihood().unwrap_or(f64::NAN),
             misfit_ratio: fit.misfit_ratio,
             misfit_p_value: fit.misfit_p_value,
@@ -218,7 +225,8 @@ fn estimated<M: ResponseModel>(
 ) -> ParameterEstimate {
     let value = fit.minimum.parameters[at];
     let at_bound = fit.minimum.at_bound[at];
-    let standard_error = fit.information.standard_error(at).filter(|_| !at_bound);
+    let of_noise = fit.information.standard_error(at).filter(|_| !at_bound);
+    let standard_error = of_noise.map(|error| error * fit.error_scale());
     let (interval, interval_kind) = interval(fit, at, standard_error, confidence);
     ParameterEstimate {
         name: names[at].clone(),
@@ -227,7 +235,7 @@ fn estimated<M: ResponseModel>(
         interval,
         interval_kind,
         at_bound,
-        prior: prior(fit, at, standard_error),
+        prior: prior(fit, at, of_noise),
     }
 }
 
@@ -240,7 +248,7 @@ fn interval<M: ResponseModel>(
     let value = fit.minimum.parameters[at];
     let (min, max) = (fit.space.bounds.min[at], fit.space.bounds.max[at]);
     if fit.minimum.at_bound[at] {
-        let rise = fit.quantile(confidence).powi(2);
+        let rise = (fit.error_scale() * fit.quantile(confidence)).powi(2);
         let first = (fit.space.start[at] - value).abs().max(1e-6 * value.abs());
         let end = |direction| profile::end(fit, at, direction, 0.01 * first, rise);
         let interval = if value <= min { [value, end(1.0)] } else { [end(-1.0), value] };
@@ -252,7 +260,8 @@ fn interval<M: ResponseModel>(
     if error <= WEAK * value.abs() && wald[0] >= min && wald[1] <= max {
         return (wald, IntervalKind::Wald);
     }
-    let end = |direction| profile::end(fit, at, direction, quantile * error, quantile.powi(2));
+    let rise = (fit.error_scale() * quantile).powi(2);
+    let end = |direction| profile::end(fit, at, direction, quantile * error, rise);
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::covariance::Information;
-use super::limits::{CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, PLAUSIBLE};
+use super::limits::{CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE};
 use super::multi_start::{self, Minima, starts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
@@ -51,6 +51,7 @@ pub(super) fn fit<'a, M: ResponseModel>(
     space: &'a ParameterSpace,
     settings: &Settings,
 ) -> Result<Fit<'a, M>, LikelihoodError> {
+    settings.check()?;
     check(model, data, space)?;
     let noise = match settings.noise {
         NoiseSource::Automatic => data.noise(),
@@ -217,7 +218,21 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Quantile of the deviation of an estimate in units of its standard error.
+    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the misfit is
+    /// too large for the noise, otherwise 1.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227.
+    pub(super) fn error_scale(&self) -> f64 {
+        let is_misfit = self.misfit_p_value.is_some_and(|p_value| p_value < MISFIT_SIGNIFICANCE);
+        match self.misfit_ratio.filter(|_| is_misfit) {
+            Some(ratio) => ratio.sqrt().max(1.0),
+            None => 1.0,
+        }
+    }
+
+    /// Quantile of the deviation of an estimate in units of its standard error without
+    /// [`Fit::error_scale`].
     pub(super) fn quantile(&self, probability: f64) -> f64 {
         let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))

@@ -59,3 +59,7 @@ pub(super) const CONFIRMED: usize = 2;
 
 /// The same where the noise is unknown, so that no misfit says whether a minimum is a right one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
+
+/// Level of significance of the misfit of known noise below which standard errors and intervals are those of
+/// the misfit: a right model gets wider intervals than it needs in one of a thousand fits.
+pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;

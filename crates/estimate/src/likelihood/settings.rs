@@ -1,5 +1,7 @@
 //! Choices of a fit.
 
+use super::LikelihoodError;
+
 /// Where the noise of the outputs is known from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -35,5 +37,21 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self { noise: NoiseSource::Automatic, starts: 12, spread: 2.0, seed: 0, confidence: 0.95 }
+    }
+}
+
+impl Settings {
+    /// Checks the numbers.
+    pub(super) fn check(&self) -> Result<(), LikelihoodError> {
+        let refuse = |name, requirement, value| {
+            Err(LikelihoodError::Setting { name, requirement, value })
+        };
+        if !(self.confidence > 0.0 && self.confidence < 1.0) {
+            return refuse("confidence", "between 0 and 1", self.confidence);
+        }
+        if !(self.spread >= 1.0 && self.spread.is_finite()) {
+            return refuse("spread", "a factor of at least 1", self.spread);
+        }
+        Ok(())
     }
 }

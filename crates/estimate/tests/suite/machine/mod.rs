@@ -2,6 +2,7 @@
 
 mod agreement;
 mod chain;
+mod entries;
 mod generator;
 mod judge;
 mod open;

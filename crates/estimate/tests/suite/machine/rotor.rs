@@ -198,7 +198,9 @@ fn sixteen_coefficients_from_four_probes() {
 fn a_rotor_that_is_too_soft_by_a_percent_shows_in_the_misfit() {
     let data = shaken(&Rotor::new(13, 1.0), 120, 1);
     let estimate = fit(&data, &Rotor::new(13, 0.99)).unwrap().likelihood;
-    assert!(estimate.misfit_p_value.unwrap() < 1e-6, "{:?}", estimate.misfit_ratio);
+    let ratio = estimate.misfit_ratio.unwrap();
+    assert!(estimate.misfit_p_value.unwrap() < 1e-6 && ratio > 1.5, "{ratio}");
+    assert_eq!(estimate.error_scale, ratio.sqrt());
 }
 
 /// Trial unbalance at eight speeds beside an unknown residual one.
