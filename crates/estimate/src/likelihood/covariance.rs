@@ -1,6 +1,6 @@
 //! Information of data and priors, the covariance of the parameters, and what is not determined.
 
-use mechid_model::linear_algebra::svd;
+use mechid_numerics::linear_algebra::svd;
 use nalgebra::{DMatrix, DVector};
 
 use super::LikelihoodError;

@@ -115,17 +115,18 @@ fn assembly(
     let n = unknowns.dof();
     let mut entries = Entries { unknowns, near, index: BTreeMap::new(), parameters: Vec::new() };
     let mut terms = Vec::new();
-    let mut add = |row: usize, column: usize, power: Power, entry: &Entry, factor: Option<usize>| {
-        let (scale, own) = match entry {
-            Entry::Known(value) => (*value, None),
-            Entry::Unknown(at) => (1.0, Some(*at)),
+    let mut add =
+        |row: usize, column: usize, power: Power, entry: &Entry, factor: Option<usize>| {
+            let (scale, own) = match entry {
+                Entry::Known(value) => (*value, None),
+                Entry::Unknown(at) => (1.0, Some(*at)),
+            };
+            if scale != 0.0 {
+                let pattern = Pattern::Dyad { left: vec![(row, 1.0)], right: vec![(column, 1.0)] };
+                let parameters = factor.into_iter().chain(own).collect();
+                terms.push(Term { pattern, power, scale, parameters });
+            }
         };
-        if scale != 0.0 {
-            let pattern = Pattern::Dyad { left: vec![(row, 1.0)], right: vec![(column, 1.0)] };
-            let parameters = factor.into_iter().chain(own).collect();
-            terms.push(Term { pattern, power, scale, parameters });
-        }
-    };
     let proportional = unknowns.has_proportional_damping();
     let factors = proportional.then(|| nearest_damping(near)).map(|[alpha, beta]| {
         [entries.push("alpha".into(), alpha), entries.push("beta".into(), beta)]

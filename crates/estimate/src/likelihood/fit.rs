@@ -5,7 +5,9 @@ use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::covariance::Information;
-use super::limits::{CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE};
+use super::limits::{
+    CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
+};
 use super::multi_start::{self, Minima, starts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
@@ -184,13 +186,8 @@ fn searched<M: ResponseModel>(
 ) -> Result<Minima, LikelihoodError> {
     let relative = residual.weights.with_relative(residual.data, FIRST_RELATIVE_NOISE);
     let rough = Residual { weights: &relative, ..*residual };
-    let starts = starts(
-        &space.start,
-        &space.bounds,
-        settings.starts.max(1),
-        settings.spread,
-        settings.seed,
-    );
+    let starts =
+        starts(&space.start, &space.bounds, settings.starts.max(1), settings.spread, settings.seed);
     multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)
 }
 

@@ -43,9 +43,8 @@ impl Default for Settings {
 impl Settings {
     /// Checks the numbers.
     pub(super) fn check(&self) -> Result<(), LikelihoodError> {
-        let refuse = |name, requirement, value| {
-            Err(LikelihoodError::Setting { name, requirement, value })
-        };
+        let refuse =
+            |name, requirement, value| Err(LikelihoodError::Setting { name, requirement, value });
         if !(self.confidence > 0.0 && self.confidence < 1.0) {
             return refuse("confidence", "between 0 and 1", self.confidence);
         }

@@ -68,7 +68,8 @@ impl Assembly {
         inputs: Vec<InputColumn>,
     ) -> Result<Self, MachineError> {
         let n = dofs.len();
-        let outside = |row: usize| ModelError::EntryOutside { row: row + 1, column: row + 1, dof: n };
+        let outside =
+            |row: usize| ModelError::EntryOutside { row: row + 1, column: row + 1, dof: n };
         for term in &terms {
             let entries: Vec<usize> = match &term.pattern {
                 Pattern::Dyad { left, right } => left.iter().chain(right).map(|e| e.0).collect(),

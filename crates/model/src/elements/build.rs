@@ -127,7 +127,12 @@ impl<'a> Builder<'a> {
     }
 
     /// Index of a degree of freedom that something names.
-    pub(super) fn dof(&self, what: &'static str, name: &str, dof: &str) -> Result<usize, MachineError> {
+    pub(super) fn dof(
+        &self,
+        what: &'static str,
+        name: &str,
+        dof: &str,
+    ) -> Result<usize, MachineError> {
         self.index.get(dof).copied().ok_or_else(|| MachineError::UnknownDof {
             what,
             name: name.to_owned(),
@@ -159,7 +164,11 @@ impl<'a> Builder<'a> {
         Ok(vec![(self.dof(what, name, pair.0)?, 1.0), (self.dof(what, name, pair.1)?, -1.0)])
     }
 
-    pub(super) fn factor(&mut self, name: &str, coefficient: &Coefficient) -> Result<Factor, MachineError> {
+    pub(super) fn factor(
+        &mut self,
+        name: &str,
+        coefficient: &Coefficient,
+    ) -> Result<Factor, MachineError> {
         match coefficient {
             Coefficient::Known(value) if !value.is_finite() => {
                 Err(MachineError::NotFinite { name: name.to_owned(), value: *value })

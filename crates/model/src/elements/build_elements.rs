@@ -4,12 +4,15 @@ use nalgebra::{Complex, DMatrix};
 
 use super::assembly::OwnLoad;
 use super::build::{Builder, Factor};
-use super::{
-    Bearing, Coefficient, MachineError, MatrixElement, Pattern, Power, SUPPORT, Speed,
-};
+use super::{Bearing, Coefficient, MachineError, MatrixElement, Pattern, Power, SUPPORT, Speed};
 
 impl Builder<'_> {
-    pub(super) fn mass(&mut self, name: &str, at: &str, mass: &Coefficient) -> Result<(), MachineError> {
+    pub(super) fn mass(
+        &mut self,
+        name: &str,
+        at: &str,
+        mass: &Coefficient,
+    ) -> Result<(), MachineError> {
         let at = self.dof("element", name, at)?;
         let factor = self.factor(name, mass)?;
         let entries = vec![(at, 1.0)];
@@ -76,7 +79,11 @@ impl Builder<'_> {
         Ok(())
     }
 
-    pub(super) fn matrices(&mut self, name: &str, element: &MatrixElement) -> Result<(), MachineError> {
+    pub(super) fn matrices(
+        &mut self,
+        name: &str,
+        element: &MatrixElement,
+    ) -> Result<(), MachineError> {
         let dofs = element.dofs.iter().map(|dof| self.dof("element", name, dof));
         let dofs: Vec<usize> = dofs.collect::<Result<_, _>>()?;
         let entries: Vec<(usize, f64)> = dofs.iter().map(|at| (*at, 1.0)).collect();

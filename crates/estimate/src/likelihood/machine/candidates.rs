@@ -183,7 +183,7 @@ fn scale(value: f64) -> f64 {
 
 /// Sum of the logarithms of the eigenvalues that are determined, and their number.
 fn spectrum(gram: &DMatrix<f64>) -> (f64, usize) {
-    let Ok(eigen) = mechid_model::linear_algebra::hermitian_eigen(gram.clone()) else {
+    let Ok(eigen) = mechid_numerics::linear_algebra::hermitian_eigen(gram.clone()) else {
         return (f64::NAN, 0);
     };
     let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
@@ -195,7 +195,7 @@ fn spectrum(gram: &DMatrix<f64>) -> (f64, usize) {
 /// Relative standard errors of the parameters; none where a direction that is open takes part.
 fn standard_errors(gram: &DMatrix<f64>) -> Vec<Option<f64>> {
     let count = gram.nrows();
-    let Ok(eigen) = mechid_model::linear_algebra::hermitian_eigen(gram.clone()) else {
+    let Ok(eigen) = mechid_numerics::linear_algebra::hermitian_eigen(gram.clone()) else {
         return vec![None; count];
     };
     let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);

@@ -6,10 +6,10 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::output_error;
 use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
-use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_model::elements::{
     Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine, Sensor,
 };
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::RandomTest;
 use mechid_signal::{NoiseLevel, lines, noise};
 use mechid_spectra::{LineData, LineNoise, Transient};

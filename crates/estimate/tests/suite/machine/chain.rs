@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
-use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 
@@ -157,7 +157,11 @@ pub fn three_masses_truth() -> Vec<(String, f64)> {
     let [m, k, c] = [[2.0, 1.5, 1.2], [3e4, 2e4, 2.5e4], [6.0, 4.0, 3.0]];
     let of = |at: usize| {
         let place = at + 1;
-        [(format!("m{place}"), m[at]), (format!("s{place}.k"), k[at]), (format!("s{place}.c"), c[at])]
+        [
+            (format!("m{place}"), m[at]),
+            (format!("s{place}.k"), k[at]),
+            (format!("s{place}.c"), c[at]),
+        ]
     };
     (0..3).flat_map(of).collect()
 }

@@ -41,11 +41,8 @@ fn identified(unknowns: &Unknowns, seed: u64) -> LikelihoodEstimate {
         all[(row, 2 * at)] * quantity.per_displacement(omega[row])
     });
     let data = measured(&omega, phases, outputs, 0.005, seed + 70);
-    let near = SecondOrderSystem::new(
-        exact.mass() * 1.1,
-        exact.damping() * 1.5,
-        exact.stiffness() * 0.95,
-    );
+    let near =
+        SecondOrderSystem::new(exact.mass() * 1.1, exact.damping() * 1.5, exact.stiffness() * 0.95);
     let channels = Channels { sensors: vec![(0, quantity), (2, quantity)], forces: vec![0] };
     let settings = Settings { spread: 1.1, ..Settings::default() };
     identify_entries(&data, unknowns, &near.unwrap(), &channels, &settings).unwrap()

@@ -61,7 +61,9 @@ impl Rotor {
                 }
             }
         }
-        for (node, weight, polar) in [(nodes / 4, 12.0, 0.05), (nodes / 2, 20.0, 0.1), (3 * nodes / 4, 9.0, 0.03)] {
+        for (node, weight, polar) in
+            [(nodes / 4, 12.0, 0.05), (nodes / 2, 20.0, 0.1), (3 * nodes / 4, 9.0, 0.03)]
+        {
             for plane in 0..2 {
                 mass[(4 * node + 2 * plane, 4 * node + 2 * plane)] += weight;
                 mass[(4 * node + 2 * plane + 1, 4 * node + 2 * plane + 1)] += 0.5 * polar;
@@ -82,7 +84,12 @@ impl Rotor {
     }
 
     /// Response (all degrees of freedom) at ω and Ω to a load.
-    fn response(&self, omega: f64, speed: f64, load: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
+    fn response(
+        &self,
+        omega: f64,
+        speed: f64,
+        load: &DVector<Complex<f64>>,
+    ) -> DVector<Complex<f64>> {
         let mut dynamic = self.stiffness.zip_zip_map(&self.mass, &self.gyroscopic, |k, m, g| {
             // 0.2 ms of stiffness-proportional damping of the shaft would be too much; take 2 µs.
             Complex::new(k - omega * omega * m, omega * (speed * g + 2e-6 * k))
@@ -186,9 +193,8 @@ pub fn fit(data: &LineData, rotor: &Rotor) -> Result<MachineEstimate, Likelihood
 #[test]
 fn sixteen_coefficients_from_four_probes() {
     let rotor = Rotor::new(13, 1.0);
-    let judged = judge(&truth(), 6, |seed| {
-        Some(fit(&shaken(&rotor, 120, seed), &rotor).ok()?.likelihood)
-    });
+    let judged =
+        judge(&truth(), 6, |seed| Some(fit(&shaken(&rotor, 120, seed), &rotor).ok()?.likelihood));
     // Coefficients of one experiment err together: 96 intervals say less than so many.
     assert!(judged.failed == 0 && judged.held >= 0.85, "{judged:?}");
     assert!((0.75..1.25).contains(&judged.scatter), "{judged:?}");

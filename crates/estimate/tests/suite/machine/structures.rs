@@ -33,11 +33,7 @@ fn force_to_displacement(sensors: &[&str], force: &str) -> Instruments {
     }
 }
 
-fn identified(
-    data: &LineData,
-    machine: &Machine,
-    instruments: &Instruments,
-) -> LikelihoodEstimate {
+fn identified(data: &LineData, machine: &Machine, instruments: &Instruments) -> LikelihoodEstimate {
     identify_machine(data, machine, instruments, &Settings::default()).unwrap().likelihood
 }
 
@@ -115,10 +111,9 @@ fn a_bound_is_active_and_its_interval_one_sided() {
 /// 40 seeds of a damper that is weak against the noise: its interval comes from the profile.
 #[test]
 fn profile_intervals_of_weak_parameters_hold() {
-    let machine = Machine::new(["x"]).with("m", Element::mass("x", 2.0)).with(
-        "foot",
-        Element::spring_damper(["x", "support"], free(1.8e4), free(1.0)),
-    );
+    let machine = Machine::new(["x"])
+        .with("m", Element::mass("x", 2.0))
+        .with("foot", Element::spring_damper(["x", "support"], free(1.8e4), free(1.0)));
     let instruments = force_to_displacement(&["x"], "x");
     let mut held = 0;
     let mut profiles = 0;
@@ -127,7 +122,8 @@ fn profile_intervals_of_weak_parameters_hold() {
         let force = random_phases(omega.len(), 1, seed);
         let [m, c, k] = [dmatrix![2.0], dmatrix![5.0], dmatrix![2e4]];
         // Far below the resonance the damper hardly shows.
-        let data = measured(&omega, force.clone(), responses([&m, &c, &k], &omega, &force), 0.06, seed);
+        let data =
+            measured(&omega, force.clone(), responses([&m, &c, &k], &omega, &force), 0.06, seed);
         let estimate = identified(&data, &machine, &instruments);
         let damper = estimate.parameter("foot.c").unwrap();
         profiles += usize::from(damper.interval_kind != IntervalKind::Wald);
@@ -253,10 +249,8 @@ fn a_joint_between_two_measured_parts() {
     let [m, c, k] = whole(true);
     let outputs = responses([&m, &c, &k], &omega, &forces).select_columns(&[0, 7]);
     let data = measured(&omega, force, outputs, 0.002, 8);
-    let mut machine = Machine::new(["a1", "a4", "b1", "b4"]).with(
-        "joint",
-        Element::spring_damper(["a4", "b1"], free(2e4), free(5.0)),
-    );
+    let mut machine = Machine::new(["a1", "a4", "b1", "b4"])
+        .with("joint", Element::spring_damper(["a4", "b1"], free(2e4), free(5.0)));
     machine.measured = machine.dofs.clone();
     let part = MeasuredReceptance { receptance, variance: Some(variance) };
     let instruments = force_to_displacement(&["a1", "b4"], "a1");
@@ -275,17 +269,22 @@ fn a_joint_between_two_measured_parts() {
 #[test]
 fn bad_descriptions_are_refused_by_name() {
     let data = oscillator(12.0, 1);
-    let refused = |machine: Machine, instruments: Instruments| {
-        match identify_machine(&data, &machine, &instruments, &Settings::default()) {
-            Err(LikelihoodError::Machine(error)) => error,
-            other => panic!("{other:?}"),
-        }
+    let refused = |machine: Machine, instruments: Instruments| match identify_machine(
+        &data,
+        &machine,
+        &instruments,
+        &Settings::default(),
+    ) {
+        Err(LikelihoodError::Machine(error)) => error,
+        other => panic!("{other:?}"),
     };
     let with_mass = || Machine::new(["x"]).with("m", Element::mass("x", 2.0));
     let read = || force_to_displacement(&["x"], "x");
     let foot = |k: FreeCoefficient| Element::spring(["x", "support"], k);
     let error = refused(with_mass().with("k9", Element::spring(["x", "z"], free(1.0))), read());
-    assert!(matches!(error, MachineError::UnknownDof { ref name, ref dof, .. } if name == "k9" && dof == "z"));
+    assert!(
+        matches!(error, MachineError::UnknownDof { ref name, ref dof, .. } if name == "k9" && dof == "z")
+    );
     let contradictory = free(2.0).at_least(3.0).at_most(1.0);
     let error = refused(with_mass().with("k1", foot(contradictory)), read());
     assert!(matches!(error, MachineError::Bounds { ref name, .. } if name == "k1"));
@@ -295,10 +294,8 @@ fn bad_descriptions_are_refused_by_name() {
     assert!(matches!(error, MachineError::NoStart { .. }));
     let error = refused(Machine::new(["x"]).with("k1", foot(free(2.0))), read());
     assert!(error.to_string().contains("\"x\" has no mass (it belongs to \"k1\")"), "{error}");
-    let error = refused(
-        with_mass().with("k1", foot(free(2.0))),
-        force_to_displacement(&["nowhere"], "x"),
-    );
+    let error =
+        refused(with_mass().with("k1", foot(free(2.0))), force_to_displacement(&["nowhere"], "x"));
     assert!(matches!(error, MachineError::UnknownDof { what: "sensor", .. }));
     let error = refused(with_mass().with("k1", foot(free(f64::NAN))), read());
     assert!(matches!(error, MachineError::NotFinite { .. }));
@@ -311,10 +308,20 @@ fn bad_descriptions_are_refused_by_name() {
     let result = identify_machine(&data, &known, &read(), &Settings::default());
     assert_eq!(result.unwrap_err(), LikelihoodError::NoParameter);
     let two = force_to_displacement(&["x"], "x");
-    let two = Instruments { sensors: [two.sensors.clone(), vec![
-        Sensor { name: "again".into(), ..Sensor::new("x", Displacement) },
-    ]].concat(), ..two };
-    let result = identify_machine(&data, &with_mass().with("k1", foot(free(2e4))), &two, &Settings::default());
+    let two = Instruments {
+        sensors: [
+            two.sensors.clone(),
+            vec![Sensor { name: "again".into(), ..Sensor::new("x", Displacement) }],
+        ]
+        .concat(),
+        ..two
+    };
+    let result = identify_machine(
+        &data,
+        &with_mass().with("k1", foot(free(2e4))),
+        &two,
+        &Settings::default(),
+    );
     assert!(matches!(result, Err(LikelihoodError::Size { expected: 2, got: 1, .. })));
 }
 
@@ -342,9 +349,8 @@ fn noisy_forces_are_allowed_for() {
         let clean = measured(&omega, exact.clone(), outputs, 0.01, 50 + seed);
         let variance_y = clean.noise().unwrap().covariance()[0][(0, 0)];
         let inputs = &exact + complex_noise(omega.len(), 1, 80 + seed) * Complex::from(0.03);
-        let covariance = DMatrix::from_diagonal(
-            &vec![variance_y, Complex::from(0.03 * 0.03)].into(),
-        );
+        let covariance =
+            DMatrix::from_diagonal(&vec![variance_y, Complex::from(0.03 * 0.03)].into());
         let noise = LineNoise::new(vec![covariance; omega.len()]).unwrap();
         let data = LineData::new(omega.clone(), inputs, clean.outputs().clone(), Transient::None);
         let data = data.unwrap().with_noise(noise).unwrap();
@@ -359,8 +365,7 @@ fn noisy_forces_are_allowed_for() {
 /// Open records, cut from a far longer period; taken as periods they mislead by far more than the intervals.
 #[test]
 fn open_records_of_one_sensor() {
-    let settings =
-        Settings { noise: NoiseSource::WhiteResidual, starts: 1, ..Settings::default() };
+    let settings = Settings { noise: NoiseSource::WhiteResidual, starts: 1, ..Settings::default() };
     let instruments = super::open::instruments(&["x2"]);
     let squares = |data: &LineData| -> f64 {
         let estimate = identify_machine(data, &super::open::machine(), &instruments, &settings);
@@ -369,8 +374,7 @@ fn open_records_of_one_sensor() {
         super::open::TRUTH.map(of).iter().sum::<f64>() / 4.0
     };
     let rig = super::open::rig();
-    let data: Vec<LineData> =
-        (0..12).map(|seed| super::open::data(&rig, seed, &[1])).collect();
+    let data: Vec<LineData> = (0..12).map(|seed| super::open::data(&rig, seed, &[1])).collect();
     let mean = data.iter().map(squares).sum::<f64>() / data.len() as f64;
     // 48 squares of unit mean, of which those of one record err together.
     assert!((0.4..1.9).contains(&mean), "{mean}");
