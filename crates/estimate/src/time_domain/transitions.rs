@@ -164,6 +164,10 @@ impl Transitions {
     /// # Errors
     /// What [`Transitions::fit`] refuses.
     pub fn condition(&self, discretisation: Discretisation) -> Result<(f64, usize), EstimateError> {
+    pub fn condition(
+        &self,
+        discretisation: Discretisation,
+    ) -> Result<(f64, usize), EstimateError> {
         let solution = super::fit::regression(self, discretisation)?.solution;
         Ok((solution.condition, solution.undetermined.len()))
     }
