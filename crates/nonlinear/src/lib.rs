@@ -24,7 +24,7 @@ mod equations;
 mod estimate;
 mod experiments;
 mod grid;
-mod levenberg_marquardt;
+mod limits;
 mod output_error;
 mod predict;
 mod restoring;

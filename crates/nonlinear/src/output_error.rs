@@ -4,6 +4,7 @@ use mechid_estimate::EstimateParts;
 use mechid_estimate::NAMED_PARAMETERS;
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
+use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_numerics::{NumericsError, Uncertain, check_size};
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 use super::covariance::{BlockScores, FEWEST, InTime, block_count};
 use super::equation_error::slowest_decay;
 use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
-use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::limits::SEARCH_STEPS;
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
 
@@ -79,7 +80,7 @@ pub fn output_error(
     }
     let mut problem = Problem::new(records, measured, start, &system)?;
     let theta = problem.start(&system)?;
-    let mut residual = DVector::zeros(problem.residuals());
+    let mut residual = DVector::zeros(problem.len());
     if !problem.residual(&theta, &mut residual) {
         let len = problem.records.iter().map(|record| record.response.len()).max().unwrap_or(0);
         return Err(EstimateError::Diverged { len });
@@ -88,14 +89,14 @@ pub fn output_error(
     let mut theta = theta;
     // The size of what is left of several channels is known after the first search.
     for round in 0..2 {
-        let minimum = minimise(&mut problem, theta)
+        let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS)
             .ok_or(EstimateError::NotConverged { searches: 1, steps })
             .and_then(|minimum| match minimum.converged {
                 true => Ok(minimum),
                 false => Err(EstimateError::NotConverged { searches: 1, steps: minimum.steps }),
             })?;
         steps += minimum.steps;
-        theta = minimum.theta;
+        theta = minimum.parameters;
         problem.residual(&theta, &mut residual);
         if n == 1 || round == 1 {
             break;
@@ -317,14 +318,14 @@ impl<'a> Problem<'a> {
                 unexplained,
                 ranges: start.ranges().to_vec(),
                 terms: system.terms().clone(),
-                equations: self.residuals(),
+                equations: self.len(),
             },
         })
     }
 
     /// (JᵀJ)⁻¹ of all parameters, where the residual was last evaluated.
     fn inverse(&self, parameters: usize) -> Result<DMatrix<f64>, EstimateError> {
-        let mut jacobian = DMatrix::zeros(self.residuals(), parameters);
+        let mut jacobian = DMatrix::zeros(self.len(), parameters);
         self.jacobian(&mut jacobian);
         let mut factor = TriangularFactor::new(parameters);
         if !factor.push(&[jacobian.as_view()]) {
@@ -377,14 +378,14 @@ impl<'a> Problem<'a> {
             .flat_map(|dof| self.records.iter().enumerate().map(move |(at, r)| (dof, at, r)))
             .map(|(dof, at, record)| (self.gap(at, record, dof) / self.levels[dof]).norm_squared())
             .sum();
-        let freedom = self.residuals().saturating_sub(theta.len());
+        let freedom = self.len().saturating_sub(theta.len());
         let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
         (inverse * variance, StandardErrors::White, freedom)
     }
 }
 
-impl SumOfSquares for Problem<'_> {
-    fn residuals(&self) -> usize {
+impl Residuals for Problem<'_> {
+    fn len(&self) -> usize {
         self.dof() * self.records.iter().map(|record| record.response.len()).sum::<usize>()
     }
 

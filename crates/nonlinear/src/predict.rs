@@ -3,10 +3,11 @@
 use mechid_estimate::EstimateError;
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity, exact_periodic};
 use mechid_numerics::check_size;
+use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
-use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::limits::SEARCH_STEPS;
 use super::simulate::{Course, Direction, FineForce, Tangent};
 
 /// Newton steps towards a periodic response, at most.
@@ -122,8 +123,9 @@ pub fn fitted_start(
     let theta = DVector::from_iterator(2 * n, state);
     let mut problem =
         Start { system, directions: &directions, fine: &fine, measured, course: None };
-    let minimum = minimise(&mut problem, theta).filter(|minimum| minimum.converged);
-    initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.theta)
+    let minimum =
+        minimise_residuals(&mut problem, theta, SEARCH_STEPS).filter(|minimum| minimum.converged);
+    initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.parameters)
 }
 
 /// Measured less predicted response as a function of the start.
@@ -149,8 +151,8 @@ impl Start<'_> {
     }
 }
 
-impl SumOfSquares for Start<'_> {
-    fn residuals(&self) -> usize {
+impl Residuals for Start<'_> {
+    fn len(&self) -> usize {
         self.channels().map(|(_, samples, _)| samples.len()).sum()
     }
 

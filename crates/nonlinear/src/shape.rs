@@ -2,12 +2,13 @@
 
 use mechid_estimate::EstimateError;
 use mechid_model::Terms;
+use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::ChannelPhase;
 use super::equations::Equations;
 use super::experiments::Columns;
-use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::limits::SEARCH_STEPS;
 
 /// Constants to search for, besides the parameters that enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -161,10 +162,10 @@ pub(super) fn fit_shape(
 ) -> Result<Shape, EstimateError> {
     let start = DVector::from_iterator(shape.count(), shape.values());
     let mut projected = Projected { equations, shape: &shape, weights, at: None };
-    let minimum = minimise(&mut projected, start)
+    let minimum = minimise_residuals(&mut projected, start, SEARCH_STEPS)
         .ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
     let steps = minimum.steps;
-    if let Some(fitted) = shape.with(minimum.theta.as_slice()).filter(|_| minimum.converged) {
+    if let Some(fitted) = shape.with(minimum.parameters.as_slice()).filter(|_| minimum.converged) {
         return Ok(fitted);
     }
     let unseen = unseen(&mut projected, &shape);
@@ -179,8 +180,7 @@ pub(super) fn fit_shape(
 /// Names of the constants with a standard error, at the start, beyond the scale on which they change
 /// anything: as of the phase of the channels where no term is there to show it.
 fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
-    let (rows, theta) =
-        (projected.residuals(), DVector::from_iterator(start.count(), start.values()));
+    let (rows, theta) = (projected.len(), DVector::from_iterator(start.count(), start.values()));
     let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, theta.len()));
     if !projected.residual(&theta, &mut residual) {
         return Vec::new();
@@ -223,8 +223,8 @@ impl Projected<'_> {
     }
 }
 
-impl SumOfSquares for Projected<'_> {
-    fn residuals(&self) -> usize {
+impl Residuals for Projected<'_> {
+    fn len(&self) -> usize {
         2 * self.equations.data.count() * self.weights.len()
     }
 

@@ -3,15 +3,9 @@
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::error::{NumericsError, check_finite, check_size};
+use crate::limits::{RANK_TOLERANCE, SHARE_TOLERANCE};
 use crate::linear_algebra::svd;
 use crate::triangular::TriangularFactor;
-
-/// Relative singular value below which a direction counts as not determined by the data:
-/// a hundred times the rounding of a regressor matrix whose columns have unit length.
-const RANK_TOLERANCE: f64 = 100.0 * f64::EPSILON;
-
-/// Share of a parameter in an undetermined direction from which it counts as undetermined.
-const SHARE_TOLERANCE: f64 = 1e-6;
 
 /// Overdetermined linear equations A θ ≈ B gathered block by block; memory does not grow with rows.
 ///

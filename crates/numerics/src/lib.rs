@@ -2,6 +2,7 @@
 //!
 //! | Method | Module |
 //! |---|---|
+//! | nonlinear least squares: Gauss–Newton with Levenberg–Marquardt damping | [`gauss_newton`] |
 //! | least squares from row blocks, with covariance and undetermined directions | [`least_squares`] |
 //! | the triangular factor of any number of rows | [`triangular`] |
 //! | the Cholesky factor of a large matrix | [`cholesky`] |
@@ -13,7 +14,9 @@
 
 pub mod cholesky;
 mod error;
+pub mod gauss_newton;
 pub mod least_squares;
+mod limits;
 pub mod linear_algebra;
 pub mod logarithm;
 pub mod nelder_mead;

@@ -8,17 +8,7 @@
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
 use crate::NumericsError;
-
-/// Iterations per row or column after which a decomposition is given up; two or three are usual.
-const ITERATIONS: usize = 200;
-
-/// Largest 1-norm of a matrix whose exponential is computed: the 27th power of it, with which
-/// nalgebra bounds the truncation error, must be finite.
-const EXPONENTIAL_NORM: f64 = 1e11;
-
-/// Entries below this part of the largest count as 0 where rounding relative to the largest is all
-/// that is asked for: their squares would underflow.
-const NEGLIGIBLE: f64 = 1e-140;
+use crate::limits::{EXPONENTIAL_NORM, ITERATIONS, NEGLIGIBLE};
 
 /// Returns the singular value decomposition A = U Σ Vᴴ of a rows × columns matrix, singular values
 /// falling, in the unit of A, with both sets of singular vectors.

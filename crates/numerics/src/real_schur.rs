@@ -6,13 +6,8 @@
 use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
 use crate::NumericsError;
+use crate::limits::{PATIENCE, SWEEPS};
 use crate::linear_algebra::{check_finite, check_square};
-
-/// Sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is dropped too.
-const PATIENCE: usize = 20;
-
-/// Sweeps without a deflation after which the iteration is given up.
-const LIMIT: usize = 100;
 
 /// A = Q T Qᵀ, all size × size, Q orthogonal and T quasi-upper-triangular.
 ///
@@ -69,7 +64,7 @@ impl RealSchur {
                 continue;
             }
             sweeps += 1;
-            if sweeps > LIMIT {
+            if sweeps > SWEEPS {
                 return Err(NumericsError::NotConverged { rows: size, columns: size });
             }
             sweep(&mut t, &mut q, start, last, sweeps);

@@ -6,6 +6,8 @@ use nalgebra::{DMatrix, DMatrixView};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::limits::SMALLEST_NORM;
+
 /// Rows reduced at a time: a block of a dozen columns stays in the first-level cache.
 const BLOCK_ROWS: usize = 256;
 
@@ -32,9 +34,6 @@ pub struct TriangularFactor {
     /// Columns with a value whose square is 0 and with none that is larger.
     vanished: Vec<bool>,
 }
-
-/// Columns of a smaller norm have lost digits where squares fell below the least normal number.
-const LEAST_NORM: f64 = 1e-140;
 
 impl TriangularFactor {
     /// Returns the factor of no rows yet, of so many columns.
@@ -126,11 +125,9 @@ impl TriangularFactor {
     pub fn too_small(&self) -> Option<(usize, f64)> {
         // The largest entry: the squares of what is too small vanish.
         let sizes = self.r.column_iter().map(|column| column.amax()).enumerate();
-        sizes.into_iter().find(
-            |(at, size)| {
-                if *size == 0.0 { self.vanished[*at] } else { *size < LEAST_NORM }
-            },
-        )
+        sizes.into_iter().find(|(at, size)| {
+            if *size == 0.0 { self.vanished[*at] } else { *size < SMALLEST_NORM }
+        })
     }
 
     /// Counts the rows seen so far as `rows` from now on.

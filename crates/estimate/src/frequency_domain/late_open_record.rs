@@ -1,5 +1,6 @@
 //! Open records with the force some time later.
 
+use mechid_numerics::gauss_newton::minimise;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
 
@@ -8,7 +9,6 @@ use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{plausible, spare};
 use super::residual_noise::white_noise_at;
-use super::search::minimise;
 use super::starts::Starts;
 use crate::Unknowns;
 use crate::relations::Relations;
@@ -57,7 +57,7 @@ impl<'a> LateOpenRecord<'a> {
         let starts = Starts::new(&late, self.unknowns, &self.noise);
         let spare = self.spare() as f64;
         let found = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
-        self.theta = found.minimum.theta;
+        self.theta = found.minimum.parameters;
         Some(())
     }
 
@@ -66,7 +66,7 @@ impl<'a> LateOpenRecord<'a> {
         let late = self.data.with_later_force(delay);
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
         let found = minimise(&mut misfit, self.theta.clone(), STEPS)?;
-        self.theta = found.theta;
+        self.theta = found.parameters;
         Some(found.cost)
     }
 }

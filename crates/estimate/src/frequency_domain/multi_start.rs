@@ -1,8 +1,9 @@
 //! The least of the minima that searches from several starts lead to.
 
+use mechid_numerics::gauss_newton::{Minimum, minimise};
 use nalgebra::DVector;
 
-use super::search::{Minimum, SumOfSquares, minimise};
+use super::search::Restartable;
 use super::starts::Starts;
 use crate::EstimateError;
 
@@ -67,7 +68,7 @@ pub(super) struct GlobalMinimum {
 /// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights, more unequal than those of a
 /// bootstrap, lead out of minima that it does not.
 pub(super) fn search(
-    problem: &mut impl SumOfSquares,
+    problem: &mut impl Restartable,
     starts: &Starts<'_>,
     plausible: Plausible,
 ) -> Result<GlobalMinimum, EstimateError> {
@@ -90,13 +91,13 @@ pub(super) fn search(
     }
     let failed = EstimateError::NotConverged { searches: ends.searches, steps: STEPS };
     let best = ends.distinct.into_iter().find(|end| end.minimum.converged).ok_or(failed)?;
-    problem.try_at(&best.minimum.theta);
+    problem.try_at(&best.minimum.parameters);
     problem.accept();
     Ok(GlobalMinimum { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
 }
 
 /// Searches again from the best ends so far, moved by resampled data.
-fn restart(problem: &mut impl SumOfSquares, ends: &mut Ends) {
+fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     let mut without_gain = 0;
     for seed in 0..MAX_RESTARTS {
         let Some(from) = ends.turn(seed as usize) else { return };
@@ -104,7 +105,7 @@ fn restart(problem: &mut impl SumOfSquares, ends: &mut Ends) {
         problem.resample(Some(seed));
         let moved = minimise(problem, from, STEPS_RESAMPLED);
         problem.resample(None);
-        let gained = ends.push(moved.and_then(|m| minimise(problem, m.theta, STEPS_MORE)));
+        let gained = ends.push(moved.and_then(|m| minimise(problem, m.parameters, STEPS_MORE)));
         without_gain = if gained { 0 } else { without_gain + 1 };
         let enough = if ends.many() { RESTARTS_AMONG_MANY } else { RESTARTS };
         if without_gain >= enough {
@@ -120,7 +121,7 @@ fn restart(problem: &mut impl SumOfSquares, ends: &mut Ends) {
 /// # Source
 /// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.
 fn linear_rounds(
-    problem: &mut impl SumOfSquares,
+    problem: &mut impl Restartable,
     start: DVector<f64>,
     plausible: &Plausible,
 ) -> Option<DVector<f64>> {
@@ -203,14 +204,14 @@ impl Ends {
     /// The best end where it is no minimum.
     fn open(&self) -> Option<DVector<f64>> {
         let best = &self.distinct.first()?.minimum;
-        (!best.converged).then(|| best.theta.clone())
+        (!best.converged).then(|| best.parameters.clone())
     }
 
     /// One of the best ends.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
         let count = if self.many() { RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;
-        Some(end.minimum.theta.clone())
+        Some(end.minimum.parameters.clone())
     }
 }
 
@@ -219,9 +220,9 @@ impl GlobalMinimum {
     ///
     /// # Errors
     /// [`EstimateError::NotConverged`].
-    pub(super) fn followed(self, problem: &mut impl SumOfSquares) -> Result<Self, EstimateError> {
+    pub(super) fn followed(self, problem: &mut impl Restartable) -> Result<Self, EstimateError> {
         let Self { minimum: before, searches, agreeing } = self;
-        let minimum = minimise(problem, before.theta, STEPS).filter(|m| m.converged);
+        let minimum = minimise(problem, before.parameters, STEPS).filter(|m| m.converged);
         let mut minimum = minimum.ok_or(EstimateError::NotConverged { searches, steps: STEPS })?;
         minimum.steps += before.steps;
         Ok(Self { minimum, searches, agreeing })
@@ -230,10 +231,7 @@ impl GlobalMinimum {
 
 /// The best of each family: first that of the first family, then the others in the order of their sums
 /// of squares, those like another one last.
-fn in_order(
-    problem: &mut impl SumOfSquares,
-    families: Vec<Vec<DVector<f64>>>,
-) -> Vec<DVector<f64>> {
+fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {
         let costs =

@@ -333,14 +333,6 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
 }
 
 impl Coordinates {
-    /// The unknowns themselves.
-    #[cfg(test)]
-    pub(super) fn plain(unknowns: usize) -> Self {
-        let triangle = Rc::new(DMatrix::identity(unknowns, unknowns));
-        let block = Block { row: 0, places: (0..unknowns).collect(), basis: None, triangle };
-        Self { blocks: vec![block], scale: DVector::from_element(unknowns, 1.0), related: None }
-    }
-
     /// Passes from entries to the independent unknowns behind them; returns their Gram matrix, of unit
     /// diagonal. `None` if rounding leaves unknowns without an influence.
     fn relate(&mut self, tangent: &DMatrix<f64>, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {

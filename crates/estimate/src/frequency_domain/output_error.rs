@@ -2,6 +2,7 @@
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::check_size;
+use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_spectra::transient;
 use mechid_spectra::{FrequencyData, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -13,7 +14,6 @@ use super::output_error_fit::{
     OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
 };
 use super::residual_noise::with_residual_noise;
-use super::search::SumOfSquares;
 use super::starts::Starts;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -116,7 +116,7 @@ fn with_known_noise(
     let scale = Scale {
         level: 1.0,
         inflation,
-        weights: uncertain_weights(data, unknowns, &best.minimum.theta, noise),
+        weights: uncertain_weights(data, unknowns, &best.minimum.parameters, noise),
         pulses: None,
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: best.minimum.cost / expected,

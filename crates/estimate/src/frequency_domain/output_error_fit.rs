@@ -1,6 +1,7 @@
 //! The result of maximum likelihood, made of the minimum that its search found.
 
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_numerics::{NumericsError, check_size};
 use mechid_spectra::SpectraError;
 use mechid_spectra::transient;
@@ -11,7 +12,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, Plausible};
-use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
 use crate::estimate::EstimateParts;
 use crate::relations::Relations;
@@ -165,9 +165,9 @@ pub(super) fn finish(
     best: &GlobalMinimum,
     scale: Scale,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let equations = misfit.normal_equations().ok_or(NumericsError::Overflow)?;
+    let equations = misfit.linearise().ok_or(NumericsError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(NumericsError::Overflow)?;
-    let (independent, tau) = parts(data, &best.minimum.theta);
+    let (independent, tau) = parts(data, &best.minimum.parameters);
     let count = independent.len();
     let of_ends = covariance.view((count, count), (tau.len(), tau.len()));
     let ends = EndLoads::of(data, tau, of_ends * scale.level);

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::NumericsError;
+use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_spectra::SpectraError;
 use mechid_spectra::noise::level::motion_level;
 use mechid_spectra::sinusoids;
@@ -19,7 +20,6 @@ use super::output_error_fit::{
     uncertain_weights,
 };
 use super::pulse_covariance;
-use super::search::SumOfSquares;
 use super::starts::Starts;
 use crate::{EstimateError, Unknowns};
 
@@ -74,7 +74,7 @@ pub(super) fn with_residual_noise(
     let is_white = coloured.is_none();
     let Weighted { fit, noise } = coloured.unwrap_or(white);
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
-    misfit.try_at(&fit.minimum.theta).ok_or(NumericsError::Overflow)?;
+    misfit.try_at(&fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
     misfit.accept();
     let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let free = spare(data, unknowns).saturating_sub(of_sinusoids);
@@ -86,8 +86,8 @@ pub(super) fn with_residual_noise(
     let scale = Scale {
         level,
         inflation,
-        weights: uncertain_weights(data, unknowns, &fit.minimum.theta, &noise),
-        pulses: pulse_covariance::excess(data, unknowns, &fit.minimum.theta, &noise),
+        weights: uncertain_weights(data, unknowns, &fit.minimum.parameters, &noise),
+        pulses: pulse_covariance::excess(data, unknowns, &fit.minimum.parameters, &noise),
         degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,
@@ -114,11 +114,11 @@ impl<'a> BesideSinusoids<'a> {
         for round in 0..SINUSOID_ROUNDS {
             let residual = {
                 let mut misfit = Misfit::new(data, unknowns, &self.white.noise)?;
-                misfit.try_at(&self.white.fit.minimum.theta).ok_or(NumericsError::Overflow)?;
+                misfit.try_at(&self.white.fit.minimum.parameters).ok_or(NumericsError::Overflow)?;
                 misfit.accept();
                 misfit.errors()
             };
-            let (independent, _) = parts(data, &self.white.fit.minimum.theta);
+            let (independent, _) = parts(data, &self.white.fit.minimum.parameters);
             let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
             let system = SecondOrderSystem::new(m, c, k).ok();
             let found = sinusoids::find(data, &residual, system.as_ref(), &self.sinusoids);
@@ -214,7 +214,7 @@ fn spectrum_of_residual(
     before: &Weighted,
     pooling: Pooling,
 ) -> Result<NoiseSpectrum, EstimateError> {
-    let (n, theta) = (data.dof(), &before.fit.minimum.theta);
+    let (n, theta) = (data.dof(), &before.fit.minimum.parameters);
     let mut misfit = Misfit::new(data, unknowns, &before.noise)?;
     misfit.try_at(theta).ok_or(NumericsError::Overflow)?;
     misfit.accept();
@@ -250,7 +250,7 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
     if 2 * n * rows * unknowns.free().len() > SENSITIVITIES {
         return None;
     }
-    let (independent, tau) = parts(data, &fit.fit.minimum.theta);
+    let (independent, tau) = parts(data, &fit.fit.minimum.parameters);
     let (data, entries) = (data.without_transient(tau), entries(unknowns, independent));
     let covariance = |row: usize| fit.noise.covariance(row).clone();
     let mut sensitivity = Whitened::of(&data, unknowns, &entries, covariance)?.sensitivity;

@@ -5,13 +5,14 @@ mod row;
 mod tests;
 
 use mechid_numerics::cholesky::Cholesky;
+use mechid_numerics::gauss_newton::SumOfSquares;
 use mechid_signal::{Sampling, noise};
 use mechid_spectra::transient::{self, TransientLoad, powers};
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
-use super::search::SumOfSquares;
+use super::normal_equations::{Factors, Layout, NormalEquations};
+use super::search::Restartable;
 use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
 use row::Row;
@@ -215,6 +216,8 @@ impl<'a> Misfit<'a> {
 }
 
 impl SumOfSquares for Misfit<'_> {
+    type Linearisation = NormalEquations;
+
     fn try_at(&mut self, theta: &DVector<f64>) -> Option<f64> {
         self.tried_at.clone_from(theta);
         self.evaluate(theta)
@@ -225,30 +228,7 @@ impl SumOfSquares for Misfit<'_> {
         std::mem::swap(&mut self.rows, &mut self.tried);
     }
 
-    /// Takes a step with the measured displacement in place of X̂ the equations of a step lead to the least
-    /// |W (D X − F)|² for fixed W, which is linear in the parameters.
-    fn linear_step(&mut self) -> Option<DVector<f64>> {
-        let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
-        let NormalEquations { gram, gradient, coordinates } =
-            self.layout.normal_equations(&mut factors, self.tangent().as_ref())?;
-        Some(coordinates.unknowns(&-Cholesky::new(&gram, 0.0)?.solve(&gradient)))
-    }
-
-    fn resample(&mut self, seed: Option<u64>) {
-        self.shares.fill(1.0);
-        let drawn = seed.and_then(|seed| {
-            let rows = Sampling::new(1.0, self.shares.len()).ok()?;
-            noise::white(rows, 2, 1.0, seed).ok()
-        });
-        // |z|²/2 of a complex normal number is exponential; half its square has the mean 1.
-        for (share, pair) in
-            self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
-        {
-            *share = 0.125 * pair.norm_squared().powi(2);
-        }
-    }
-
-    fn normal_equations(&mut self) -> Option<NormalEquations> {
+    fn linearise(&mut self) -> Option<NormalEquations> {
         let mut factors = self.factors(|at, column| self.rows[at].likely_displacement()[column]);
         let equations = self.layout.normal_equations(&mut factors, self.tangent().as_ref());
         self.regressors = factors.regressors;
@@ -257,7 +237,11 @@ impl SumOfSquares for Misfit<'_> {
 
     /// r″ = −2 W dD G dD X̂ along dD, the change of the dynamic stiffness; that of the spread, with
     /// a noisy force, is left out, and that of proportional damping, whose entries are products.
-    fn curvature(&self, coordinates: &Coordinates, step: &DVector<f64>) -> DVector<f64> {
+    fn curvature(
+        &self,
+        linearisation: &NormalEquations,
+        step: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
         let step = match self.tangent() {
             None => step.clone(),
             Some(tangent) => tangent * step,
@@ -277,7 +261,32 @@ impl SumOfSquares for Misfit<'_> {
             let white = row.white_receptance() * second * Complex::from(-2.0);
             self.write_weighted(at, &white, &mut residuals);
         }
-        coordinates.project(&self.regressors, &residuals)
+        Some(linearisation.coordinates.project(&self.regressors, &residuals))
+    }
+}
+
+impl Restartable for Misfit<'_> {
+    /// Returns the step to the minimum of |W (D X − F)|² for fixed W: the Gauss–Newton equations with the measured
+    /// X in place of X̂.
+    fn linear_step(&mut self) -> Option<DVector<f64>> {
+        let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
+        let NormalEquations { gram, gradient, coordinates } =
+            self.layout.normal_equations(&mut factors, self.tangent().as_ref())?;
+        Some(coordinates.unknowns(&-Cholesky::new(&gram, 0.0)?.solve(&gradient)))
+    }
+
+    fn resample(&mut self, seed: Option<u64>) {
+        self.shares.fill(1.0);
+        let drawn = seed.and_then(|seed| {
+            let rows = Sampling::new(1.0, self.shares.len()).ok()?;
+            noise::white(rows, 2, 1.0, seed).ok()
+        });
+        // |z|²/2 of a complex normal number is exponential; half its square has the mean 1.
+        for (share, pair) in
+            self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
+        {
+            *share = 0.125 * pair.norm_squared().powi(2);
+        }
     }
 }
 

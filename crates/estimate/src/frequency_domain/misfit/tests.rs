@@ -4,6 +4,7 @@ use mechid_model::{Matrix, ResponseQuantity};
 use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::dmatrix;
 
+use super::super::normal_equations::Coordinates;
 use super::*;
 
 /// Two degrees of freedom, nothing symmetric, at ten frequencies, off the truth.
@@ -80,7 +81,7 @@ fn the_gradient_is_that_of_the_sum_of_squares() {
         for noise in [noise(), noise().with_exact_force()] {
             let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
             cost(&mut misfit, &theta);
-            let equations = misfit.normal_equations().unwrap();
+            let equations = misfit.linearise().unwrap();
             let to = transformation(&equations.coordinates, theta.len());
             let gradient = to.tr_mul(&equations.gradient) * 2.0;
             for at in 0..theta.len() {
@@ -115,7 +116,7 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
             .collect();
         let mut jacobian = DMatrix::from_columns(&columns);
         cost(&mut misfit, &theta);
-        let equations = misfit.normal_equations().unwrap();
+        let equations = misfit.linearise().unwrap();
         let to = transformation(&equations.coordinates, theta.len());
         let gram = to.tr_mul(&(&equations.gram * &to));
         let expected = jacobian.tr_mul(&jacobian);
@@ -159,8 +160,8 @@ fn the_curvature_is_the_second_derivative_along_a_step() {
         };
         let expected = DVector::from_fn(theta.len(), |at, _| slope(&mut misfit, at));
         cost(&mut misfit, &theta);
-        let equations = misfit.normal_equations().unwrap();
-        let curvature = misfit.curvature(&equations.coordinates, &step);
+        let equations = misfit.linearise().unwrap();
+        let curvature = misfit.curvature(&equations, &step).unwrap();
         let to = transformation(&equations.coordinates, theta.len());
         let error = (to.tr_mul(&curvature) - &expected).norm() / expected.norm();
         // Second differences: rounding 1e-16/1e-8.
@@ -191,7 +192,7 @@ fn errors_in_variables_contain_output_error() {
         let mut both = Misfit::new(&data, &unknowns, &next_to_none).unwrap();
         let (left, right) = (cost(&mut output, &theta), cost(&mut both, &theta));
         assert!((left / right - 1.0).abs() < 1e-12);
-        let [left, right] = [output, both].map(|mut m| m.normal_equations().unwrap());
+        let [left, right] = [output, both].map(|mut m| m.linearise().unwrap());
         assert!((&left.gram - right.gram).norm() < 1e-12 * left.gram.norm());
         assert!((&left.gradient - right.gradient).norm() < 1e-12 * left.gradient.norm());
     }

@@ -1,0 +1,323 @@
+//! Nonlinear least squares: Gauss–Newton steps along the curve of the residuals, damped where they do not
+//! descend.
+//!
+//! A problem gives its sum of squares at some parameters, and a linearisation of its residuals there in
+//! coordinates of its own choice. Two linearisations are here: [`GramMatrix`] (normal equations, for many
+//! residuals and well-scaled coordinates) and [`Triangle`] (QR of the Jacobian, for badly conditioned ones).
+//! [`minimise_residuals`] is for problems that have all residuals and their Jacobian at once.
+
+mod gram_matrix;
+mod residuals;
+mod triangle;
+
+use nalgebra::DVector;
+
+use crate::limits::{
+    COST_TOLERANCE, FIRST_DAMPING, LARGEST_CORRECTION, LARGEST_DAMPING, SMALLEST_DAMPING,
+    STEP_TOLERANCE,
+};
+pub use gram_matrix::GramMatrix;
+pub use residuals::{Residuals, minimise_residuals};
+pub use triangle::{DampedTriangle, Triangle};
+
+/// Residuals r linearised about some parameters, r + J v, in coordinates v of a change of the parameters.
+///
+/// The coordinates are such that the columns of J have unit length: damping then acts alike on all.
+pub trait Linearisation {
+    /// Factor of JᵀJ + λI.
+    type Factor;
+
+    /// Returns Jᵀr.
+    fn gradient(&self) -> &DVector<f64>;
+
+    /// Returns the factor of JᵀJ + `damping`·I, `None` if that is singular to rounding.
+    fn factor(&self, damping: f64) -> Option<Self::Factor>;
+
+    /// Returns (JᵀJ + λI)⁻¹ `right`.
+    fn solve(&self, factor: &Self::Factor, right: &DVector<f64>) -> DVector<f64>;
+
+    /// Returns the step (JᵀJ + λI)⁻¹ Jᵀr.
+    fn step(&self, factor: &Self::Factor) -> DVector<f64> {
+        self.solve(factor, self.gradient())
+    }
+
+    /// Returns by how much the sum of squares of r + J v is below that of r.
+    fn decrease(&self, v: &DVector<f64>) -> f64;
+
+    /// Returns the coordinates of parameters.
+    fn coordinates(&self, parameters: &DVector<f64>) -> DVector<f64>;
+
+    /// Returns the parameters at coordinates.
+    fn parameters(&self, coordinates: &DVector<f64>) -> DVector<f64>;
+}
+
+/// Sum of squares to be minimised over its parameters.
+pub trait SumOfSquares {
+    /// Its linearisation.
+    type Linearisation: Linearisation;
+
+    /// Returns the sum at `parameters`, `None` where it does not exist.
+    fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64>;
+
+    /// Makes the parameters last tried those that everything else refers to.
+    fn accept(&mut self);
+
+    /// Returns the linearisation, `None` where rounding or overflow leave none.
+    fn linearise(&mut self) -> Option<Self::Linearisation>;
+
+    /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the parameters;
+    /// `None` if it is not known, and steps are straight.
+    fn curvature(
+        &self,
+        _linearisation: &Self::Linearisation,
+        _change: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        None
+    }
+}
+
+/// End of a search.
+#[derive(Debug, Clone)]
+pub struct Minimum {
+    /// Parameters reached.
+    pub parameters: DVector<f64>,
+    /// Sum of squares there.
+    pub cost: f64,
+    /// Number of steps taken.
+    pub steps: usize,
+    /// Flag of a minimum, to within rounding; otherwise the steps ran out.
+    pub converged: bool,
+}
+
+/// Searches the local minimum from `parameters` in at most `max_steps`; `problem` is left there.
+///
+/// A step v and its correction a for the curvature of the residuals solve
+///
+/// ```text
+/// (JᵀJ + λI) v = −Jᵀr,      (JᵀJ + λI) a = −½ Jᵀr″(v)
+/// ```
+///
+/// and the step v + a is tried if a is small against v. The correction follows the curved valleys of parameters
+/// that the data determine badly, where straight steps have to be tiny.
+///
+/// # Source
+/// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for the damping;
+/// Transtrum & Sethna (2012), arXiv:1201.5885, for the correction.
+///
+/// ```
+/// use mechid_numerics::gauss_newton::{SumOfSquares, Triangle, minimise};
+/// use nalgebra::{DVector, dmatrix, dvector};
+///
+/// /// The circle that the points (1, 0), (0, 2) and (−3, 0) lie nearest to, of unknown radius about the origin.
+/// struct Circle(f64, f64);
+///
+/// impl SumOfSquares for Circle {
+///     type Linearisation = Triangle;
+///
+///     fn try_at(&mut self, at: &DVector<f64>) -> Option<f64> {
+///         self.1 = at[0];
+///         Some([1.0, 2.0, 3.0].iter().map(|r| (at[0] - r) * (at[0] - r)).sum())
+///     }
+///
+///     fn accept(&mut self) {
+///         self.0 = self.1;
+///     }
+///
+///     fn linearise(&mut self) -> Option<Triangle> {
+///         let residual = dvector![self.0 - 1.0, self.0 - 2.0, self.0 - 3.0];
+///         Some(Triangle::new(&dmatrix![1.0; 1.0; 1.0], &residual))
+///     }
+/// }
+///
+/// let minimum = minimise(&mut Circle(0.0, 0.0), dvector![10.0], 20).unwrap();
+/// assert!(minimum.converged && (minimum.parameters[0] - 2.0).abs() < 1e-12);
+/// ```
+pub fn minimise<P: SumOfSquares>(
+    problem: &mut P,
+    mut parameters: DVector<f64>,
+    max_steps: usize,
+) -> Option<Minimum> {
+    let mut cost = problem.try_at(&parameters)?;
+    problem.accept();
+    let mut damping = 0.0;
+    for steps in 0..max_steps {
+        log::trace!("step {}, sum of squares {cost:.4e}", steps + 1);
+        let linearisation = problem.linearise()?;
+        let undamped = linearisation.factor(0.0);
+        // Where JᵀJ is singular to rounding only damped steps can tell.
+        if let Some(factor) = &undamped {
+            if is_minimum(&linearisation, factor, &parameters, cost) {
+                return Some(Minimum { parameters, cost, steps, converged: true });
+            }
+        } else {
+            damping = f64::max(damping, FIRST_DAMPING);
+        }
+        let mut growth = 2.0;
+        loop {
+            let damped = (damping > 0.0).then(|| linearisation.factor(damping));
+            let factor = damped.as_ref().map_or(undamped.as_ref(), Option::as_ref);
+            let step = factor.and_then(|factor| Step::new(problem, &linearisation, factor));
+            let lower = step.and_then(|step| {
+                let trial = &parameters + &step.change;
+                let lower = problem.try_at(&trial).filter(|lower| *lower < cost)?;
+                Some((trial, lower, (cost - lower) / step.promise))
+            });
+            if let Some((trial, lower, gain)) = lower {
+                problem.accept();
+                (parameters, cost) = (trial, lower);
+                damping *= f64::max(0.1, 1.0 - (2.0 * gain - 1.0).powi(3));
+                damping = if damping < SMALLEST_DAMPING { 0.0 } else { damping };
+                break;
+            }
+            damping = f64::max(growth * damping, FIRST_DAMPING);
+            growth *= 2.0;
+            if damping > LARGEST_DAMPING {
+                // No descent in any direction: a minimum to within rounding, if the data determine one.
+                return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
+            }
+        }
+    }
+    Some(Minimum { parameters, cost, steps: max_steps, converged: false })
+}
+
+/// Returns whether the undamped step promises next to nothing, or is next to nothing.
+fn is_minimum<L: Linearisation>(
+    linearisation: &L,
+    factor: &L::Factor,
+    parameters: &DVector<f64>,
+    cost: f64,
+) -> bool {
+    let newton = linearisation.step(factor);
+    newton.norm() <= STEP_TOLERANCE * linearisation.coordinates(parameters).norm()
+        || linearisation.gradient().dot(&newton) <= COST_TOLERANCE * cost
+}
+
+/// Change of the parameters and the decrease of the sum of squares that it promises.
+struct Step {
+    change: DVector<f64>,
+    promise: f64,
+}
+
+impl Step {
+    /// Returns the step with its correction, `None` if the correction is too large or the step does not descend.
+    fn new<P: SumOfSquares>(
+        problem: &P,
+        linearisation: &P::Linearisation,
+        factor: &<P::Linearisation as Linearisation>::Factor,
+    ) -> Option<Self> {
+        let step = -linearisation.step(factor);
+        let change = linearisation.parameters(&step);
+        let promise = linearisation.decrease(&step);
+        if promise.is_nan() || promise <= 0.0 {
+            return None;
+        }
+        let Some(curvature) = problem.curvature(linearisation, &change) else {
+            return Some(Self { change, promise });
+        };
+        let correction = linearisation.solve(factor, &curvature) * -0.5;
+        let follows = correction.norm() <= LARGEST_CORRECTION * step.norm();
+        let change = change + linearisation.parameters(&correction);
+        follows.then_some(Self { change, promise })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{dmatrix, dvector};
+
+    use super::*;
+
+    /// Rosenbrock's valley, 10(y − x²) and 1 − x, linearised by `L`.
+    struct Valley<L> {
+        at: [f64; 2],
+        tried: [f64; 2],
+        is_curved: bool,
+        linearise: fn([f64; 2]) -> L,
+    }
+
+    impl<L: Linearisation> SumOfSquares for Valley<L> {
+        type Linearisation = L;
+
+        fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64> {
+            let [x, y] = [parameters[0], parameters[1]];
+            self.tried = [x, y];
+            Some((10.0 * (y - x * x)).powi(2) + (1.0 - x).powi(2))
+        }
+
+        fn accept(&mut self) {
+            self.at = self.tried;
+        }
+
+        fn linearise(&mut self) -> Option<L> {
+            Some((self.linearise)(self.at))
+        }
+
+        fn curvature(&self, linearisation: &L, change: &DVector<f64>) -> Option<DVector<f64>> {
+            let second = -20.0 * change[0] * change[0];
+            let in_parameters = dvector![-20.0 * self.at[0] * second, 10.0 * second];
+            // Coordinates are multiples of the parameters: Jᵀ in coordinates is Jᵀ over the same multiples.
+            let scale = linearisation.coordinates(&dvector![1.0, 1.0]);
+            self.is_curved.then(|| in_parameters.component_div(&scale))
+        }
+    }
+
+    fn linearised([x, y]: [f64; 2]) -> (nalgebra::DMatrix<f64>, DVector<f64>) {
+        (dmatrix![-20.0 * x, 10.0; -1.0, 0.0], dvector![10.0 * (y - x * x), 1.0 - x])
+    }
+
+    fn follow<L: Linearisation>(linearise: fn([f64; 2]) -> L) {
+        for is_curved in [false, true] {
+            let mut valley = Valley { at: [0.0; 2], tried: [0.0; 2], is_curved, linearise };
+            let minimum = minimise(&mut valley, dvector![-1.2, 1.0], 40).unwrap();
+            assert!(minimum.converged, "{minimum:?}");
+            assert!((minimum.parameters - dvector![1.0, 1.0]).norm() < 1e-10);
+            assert_eq!(valley.at, valley.tried);
+        }
+    }
+
+    #[test]
+    fn the_valley_is_followed_to_its_end() {
+        follow(|at| {
+            let (jacobian, residual) = linearised(at);
+            Triangle::new(&jacobian, &residual)
+        });
+        follow(|at| {
+            let (jacobian, residual) = linearised(at);
+            GramMatrix::new(&jacobian.tr_mul(&jacobian), &jacobian.tr_mul(&residual))
+        });
+    }
+
+    /// exp(−θ t) through exact data: the end is the truth whatever the start.
+    #[test]
+    fn steps_that_are_too_long_are_damped() {
+        struct Decay(f64, f64);
+        impl Decay {
+            fn residual(rate: f64, t: f64) -> f64 {
+                (-rate * t).exp() - (-2.0 * t).exp()
+            }
+        }
+        impl SumOfSquares for Decay {
+            type Linearisation = Triangle;
+            fn try_at(&mut self, at: &DVector<f64>) -> Option<f64> {
+                self.1 = at[0];
+                let cost = (1..9).map(|t| Self::residual(at[0], 0.2 * f64::from(t)).powi(2)).sum();
+                Some(cost).filter(|cost: &f64| cost.is_finite())
+            }
+            fn accept(&mut self) {
+                self.0 = self.1;
+            }
+            fn linearise(&mut self) -> Option<Triangle> {
+                let time = |row: usize| 0.2 * (row + 1) as f64;
+                let jacobian = nalgebra::DMatrix::from_fn(8, 1, |row, _| {
+                    -time(row) * (-self.0 * time(row)).exp()
+                });
+                let residual = DVector::from_fn(8, |row, _| Self::residual(self.0, time(row)));
+                Some(Triangle::new(&jacobian, &residual))
+            }
+        }
+        for start in [0.0, 5.0, 12.0] {
+            let minimum = minimise(&mut Decay(start, start), dvector![start], 60).unwrap();
+            assert!(minimum.converged && (minimum.parameters[0] - 2.0).abs() < 1e-9, "{minimum:?}");
+        }
+    }
+}

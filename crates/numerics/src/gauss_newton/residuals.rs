@@ -1,0 +1,104 @@
+//! Sums of squares given by residuals and their Jacobian.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Minimum, SumOfSquares, Triangle, minimise};
+
+/// Residuals with their derivatives.
+pub trait Residuals {
+    /// Returns the number of residuals.
+    fn len(&self) -> usize;
+
+    /// Returns whether there is no residual.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Writes the residuals at `parameters`; returns `false` where they do not exist.
+    fn residual(&mut self, parameters: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
+
+    /// Writes their derivatives, residuals × parameters, where they were last evaluated.
+    fn jacobian(&self, jacobian: &mut DMatrix<f64>);
+}
+
+/// Searches the local minimum of the sum of squared residuals from `parameters` in at most `max_steps`, each
+/// linearisation by QR decomposition; `None` where the residuals do not exist at the start.
+///
+/// # Source
+/// As [`minimise`].
+pub fn minimise_residuals(
+    residuals: &mut impl Residuals,
+    parameters: DVector<f64>,
+    max_steps: usize,
+) -> Option<Minimum> {
+    let rows = residuals.len();
+    let mut buffered = Buffered {
+        residuals,
+        accepted: DVector::zeros(rows),
+        tried: DVector::zeros(rows),
+        jacobian: DMatrix::zeros(rows, parameters.len()),
+    };
+    minimise(&mut buffered, parameters, max_steps)
+}
+
+/// Residuals at the parameters last accepted and last tried.
+struct Buffered<'a, R> {
+    residuals: &'a mut R,
+    accepted: DVector<f64>,
+    tried: DVector<f64>,
+    jacobian: DMatrix<f64>,
+}
+
+impl<R: Residuals> SumOfSquares for Buffered<'_, R> {
+    type Linearisation = Triangle;
+
+    fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64> {
+        let exists = self.residuals.residual(parameters, &mut self.tried);
+        Some(self.tried.norm_squared()).filter(|cost| exists && cost.is_finite())
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.accepted, &mut self.tried);
+    }
+
+    /// Follows an accepted trial, so that what was last evaluated is what was accepted.
+    fn linearise(&mut self) -> Option<Triangle> {
+        self.residuals.jacobian(&mut self.jacobian);
+        Some(Triangle::new(&self.jacobian, &self.accepted))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley, 10(y − x²) and 1 − x.
+    struct Valley {
+        x: f64,
+    }
+
+    impl Residuals for Valley {
+        fn len(&self) -> usize {
+            2
+        }
+
+        fn residual(&mut self, parameters: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+            self.x = parameters[0];
+            residual[0] = 10.0 * (parameters[1] - parameters[0] * parameters[0]);
+            residual[1] = 1.0 - parameters[0];
+            true
+        }
+
+        fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
+            jacobian.copy_from_slice(&[-20.0 * self.x, -1.0, 10.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn the_valley_is_followed_to_its_end() {
+        let start = DVector::from_vec(vec![-1.2, 1.0]);
+        let minimum = minimise_residuals(&mut Valley { x: 0.0 }, start, 40).unwrap();
+        assert!(minimum.converged);
+        assert!((minimum.parameters - DVector::from_vec(vec![1.0, 1.0])).norm() < 1e-10);
+    }
+}

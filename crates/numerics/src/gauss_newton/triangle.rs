@@ -1,0 +1,103 @@
+//! Linearisation by QR decomposition.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Linearisation;
+use crate::triangular::TriangularFactor;
+
+/// The triangle \[R q\] of \[J r\], the columns of J scaled to unit length: one QR decomposition, which every
+/// damping uses again.
+///
+/// # Source
+/// Nocedal & Wright, *Numerical Optimization*, section 10.3; scaling after Moré (1978).
+#[derive(Debug, Clone)]
+pub struct Triangle {
+    r: DMatrix<f64>,
+    q: DVector<f64>,
+    gradient: DVector<f64>,
+    /// Lengths of the columns of the Jacobian.
+    scale: DVector<f64>,
+}
+
+/// Triangle R of JᵀJ + λI = RᵀR, and the step R⁻¹q.
+#[derive(Debug, Clone)]
+pub struct DampedTriangle {
+    r: DMatrix<f64>,
+    step: DVector<f64>,
+}
+
+impl Triangle {
+    /// Takes the Jacobian (residuals × parameters) and the residual; where one of them is not finite the
+    /// linearisation has no step.
+    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Self {
+        let columns = jacobian.ncols();
+        let mut factor = TriangularFactor::new(columns + 1);
+        let is_finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
+        let mut upper = if is_finite { factor.r().clone() } else { factor.r().map(|_| f64::NAN) };
+        let mut scale = DVector::from_element(columns, 1.0);
+        for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
+            // A rotation keeps lengths: those of R are those of J.
+            if column.norm() > 0.0 {
+                *length = column.norm();
+                column /= *length;
+            }
+        }
+        let r = upper.view((0, 0), (columns, columns)).into_owned();
+        let q = upper.view((0, columns), (columns, 1)).column(0).into_owned();
+        Self { gradient: r.tr_mul(&q), r, q, scale }
+    }
+
+    /// Returns the triangle of \[R q; √λ I 0\].
+    fn damped(&self, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
+        let columns = self.r.ncols();
+        let mut stacked = DMatrix::zeros(2 * columns, columns + 1);
+        stacked.view_mut((0, 0), (columns, columns)).copy_from(&self.r);
+        stacked.view_mut((0, columns), (columns, 1)).copy_from(&self.q);
+        for j in 0..columns {
+            stacked[(columns + j, j)] = damping.sqrt();
+        }
+        let upper = stacked.qr().unpack_r();
+        let right = upper.view((0, columns), (columns, 1)).column(0).into_owned();
+        (upper.view((0, 0), (columns, columns)).into_owned(), right)
+    }
+}
+
+impl Linearisation for Triangle {
+    type Factor = DampedTriangle;
+
+    fn gradient(&self) -> &DVector<f64> {
+        &self.gradient
+    }
+
+    fn factor(&self, damping: f64) -> Option<DampedTriangle> {
+        let (r, right) =
+            if damping > 0.0 { self.damped(damping) } else { (self.r.clone(), self.q.clone()) };
+        let step = r.solve_upper_triangular(&right)?;
+        step.iter().all(|value| value.is_finite()).then_some(DampedTriangle { r, step })
+    }
+
+    fn solve(&self, factor: &DampedTriangle, right: &DVector<f64>) -> DVector<f64> {
+        let mut solution = right.clone();
+        // The factor exists: its diagonal has no zero.
+        let solved = factor.r.tr_solve_upper_triangular_mut(&mut solution)
+            && factor.r.solve_upper_triangular_mut(&mut solution);
+        debug_assert!(solved, "a factor has a regular triangle");
+        solution
+    }
+
+    fn step(&self, factor: &DampedTriangle) -> DVector<f64> {
+        factor.step.clone()
+    }
+
+    fn decrease(&self, v: &DVector<f64>) -> f64 {
+        -(2.0 * self.gradient.dot(v) + (&self.r * v).norm_squared())
+    }
+
+    fn coordinates(&self, parameters: &DVector<f64>) -> DVector<f64> {
+        parameters.component_mul(&self.scale)
+    }
+
+    fn parameters(&self, coordinates: &DVector<f64>) -> DVector<f64> {
+        coordinates.component_div(&self.scale)
+    }
+}
