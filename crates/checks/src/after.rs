@@ -8,8 +8,11 @@ use mechid_signal::correlation::{
     whiteness_beyond,
 };
 
-use super::finding::{CorrelationTest, Finding, NoiseSpan, Residual};
-use super::thresholds::{ROUNDING, SIGNIFICANCE};
+use super::cross_correlation::CrossCorrelation;
+use super::finding::Finding;
+use super::limits::{ROUNDING, SIGNIFICANCE};
+use super::p_value::CorrelationTest;
+use super::whiteness::{NoiseSpan, Residual, Whiteness};
 
 /// Tests every channel of a residual for whiteness and for correlation with the forces that act (N).
 ///
@@ -49,14 +52,18 @@ pub fn after_fit(
         });
         let (residual, test) =
             (Residual::Samples { residual: channel }, CorrelationTest::new(&white, rounding));
-        findings.push(Finding::Whiteness { residual, test, span });
+        findings.push(Finding::Whiteness(Whiteness { residual, test, span }));
         let colour = colour(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
         let acts =
             |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
         for input in (0..force.channels()).filter(acts) {
             let cross = cross_correlation_of_coloured(e, force.channel(input), lags, &colour)?;
             let test = CorrelationTest::new(&cross, rounding);
-            findings.push(Finding::CrossCorrelation { residual: channel, force: input, test });
+            findings.push(Finding::CrossCorrelation(CrossCorrelation {
+                residual: channel,
+                force: input,
+                test,
+            }));
         }
     }
     Ok(findings)

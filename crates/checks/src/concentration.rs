@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::finding::Concentration;
-use super::thresholds::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED};
+use super::limits::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED};
+use super::misfit::Concentration;
 
 /// Lines beside each one named, of which at most one is.
 const LINES_PER_DISTURBED: usize = 8;

@@ -1,5 +1,7 @@
 //! Delay between force and response.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::frequency_domain::{LateForce, LateOpenRecord, OutputErrorFit, output_error};
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -9,9 +11,9 @@ use mechid_spectra::FrequencyData;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::finding::Finding;
+use super::finding::{Check, Finding, Names};
+use super::limits::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
 use super::spectral_residual::SpectralResidual;
-use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
 use super::weighted_fit::after_spectral_fit;
 use super::{MAX_SAMPLES, Subject, Verdict};
 
@@ -133,7 +135,7 @@ pub fn delay_of_open_records(
     let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let remaining = delayed / undelayed;
     let is_most = is_explained || remaining <= DELAY_REMAINING;
-    let told = || Finding::Delay { samples, seconds: samples * dt, remaining };
+    let told = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
     (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(told)
 }
 
@@ -285,7 +287,8 @@ fn finding(
     rows: usize,
     unknowns: &Unknowns,
 ) -> Option<Finding> {
-    let freedom = rows.checked_sub(super::before::unknowns_of_an_equation(unknowns) + 1)? as f64;
+    let freedom =
+        rows.checked_sub(super::excited_lines::unknowns_of_an_equation(unknowns) + 1)? as f64;
     let explained = samples != 0.0 && delayed <= DELAY_REMAINING * undelayed;
     if undelayed <= ROUNDING * ROUNDING || !explained || freedom == 0.0 {
         return None;
@@ -294,5 +297,47 @@ fn finding(
     if distribution.sf((undelayed - delayed) * freedom / delayed) > SIGNIFICANCE {
         return None;
     }
-    Some(Finding::Delay { samples, seconds: samples * dt, remaining: delayed / undelayed })
+    Some(Finding::Delay(Delay { samples, seconds: samples * dt, remaining: delayed / undelayed }))
+}
+
+/// Force and response are shifted in time.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Delay {
+    /// Delay of the response, in samples (pure number).
+    pub samples: f64,
+    /// Delay of the response, in s.
+    pub seconds: f64,
+    /// Fraction of the residual's power that is left when the delay is removed.
+    pub remaining: f64,
+}
+
+impl Check for Delay {
+    fn subject(&self) -> Subject {
+        Subject::Delay
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.samples
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { samples, seconds, remaining } = *self;
+        let (direction, size) = if samples > 0.0 { ("late", samples) } else { ("early", -samples) };
+        let seconds = seconds.abs();
+        let size = if size.fract() == 0.0 { format!("{size}") } else { format!("{size:.2}") };
+        let percent = 100.0 * remaining;
+        let percent =
+            if percent < 0.01 { "less than 0.01".into() } else { format!("{percent:.2}") };
+        write!(
+            f,
+            "the response is {size} samples ({seconds:.3e} s) {direction}: without that delay {percent} % \
+             of the residual power remains. Possible causes: a filter, a scanning converter, a trigger; \
+             shift one of the channels"
+        )
+    }
 }

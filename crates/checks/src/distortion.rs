@@ -1,13 +1,17 @@
 //! Nonlinearity in whole periods.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::ResponseQuantity;
 use mechid_nonlinear::{Level, distortion};
 use mechid_signal::Record;
 use mechid_spectra::Lines;
 
-use super::finding::{Finding, PValue};
-use super::thresholds::DISTORTION_EXPLAINED;
+use super::finding::{Check, Finding, Names};
+use super::limits::DISTORTION_EXPLAINED;
+use super::p_value::PValue;
+use super::{Subject, Verdict};
 
 /// Looks for the nonlinear term that explains most of what a linear model leaves of whole periods of force (N) and
 /// response of one or several experiments on the lines of a band ([`Finding::Distortion`]); `None` unless it explains
@@ -28,11 +32,67 @@ pub fn distortion_of_periods(
     let [even_db, odd_db] = [found.even, found.odd]
         .map(|level: Option<Level>| level.map(|level| level.db).filter(|db| db.is_finite()));
     let kind = found.kind().filter(|kind| kind.explained >= DISTORTION_EXPLAINED);
-    Ok(kind.map(|kind| Finding::Distortion {
-        term: kind.to_string(),
-        explained: kind.explained,
-        even_db,
-        odd_db,
-        p_value: PValue::of(kind.p_value),
+    Ok(kind.map(|kind| {
+        Finding::Distortion(Distortion {
+            term: kind.to_string(),
+            explained: kind.explained,
+            even_db,
+            odd_db,
+            p_value: PValue::of(kind.p_value),
+        })
     }))
+}
+
+/// Nonlinear term that explains most of what a linear model leaves of whole periods.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Distortion {
+    /// The term, in words.
+    pub term: String,
+    /// Part of the power that a linear model leaves, a ratio.
+    pub explained: f64,
+    /// Level of the response on even lines without force, where odd ones alone are driven, against that on the
+    /// driven ones, in dB; `None` where others are driven or there is no more than noise.
+    pub even_db: Option<f64>,
+    /// The same of odd lines without force, in dB.
+    pub odd_db: Option<f64>,
+    /// Probability that noise alone makes one of the terms explain as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+impl Check for Distortion {
+    fn subject(&self) -> Subject {
+        Subject::Linearity
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { term, explained, even_db, odd_db, p_value } = self;
+        write!(
+            f,
+            "{term} explains {:.1} % of the power that a linear model leaves ({p_value})",
+            100.0 * explained
+        )?;
+        for (name, level) in [("even", even_db), ("odd", odd_db)] {
+            if let Some(level) = level {
+                write!(f, "; {name} distortion {level:.0} dB against the response")?;
+            }
+        }
+        f.write_str(
+            ": the machine is nonlinear at this level of the force, to which its parameters belong; fit \
+             the term, too (`nonlinear`), or test at a lower level",
+        )
+    }
 }

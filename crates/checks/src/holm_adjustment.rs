@@ -1,6 +1,8 @@
 //! Error rates of all tests on a fit.
 
-use super::finding::{Finding, PValue, Reference};
+use super::bias::{Bias, Reference};
+use super::finding::Finding;
+use super::p_value::PValue;
 
 /// Adjusts the p-values of all tests made on one fit for their number; the comparison of the parameters with
 /// those of maximum likelihood, and the test for growth, apart from the tests of data and residual.
@@ -13,15 +15,13 @@ use super::finding::{Finding, PValue, Reference};
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
 pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) {
     let of_parameters = |finding: &&mut Finding| {
-        matches!(finding, Finding::Bias { reference: Reference::MaximumLikelihood, .. })
+        matches!(finding, Finding::Bias(Bias { reference: Reference::MaximumLikelihood, .. }))
     };
     let (bias, others): (Vec<&mut Finding>, Vec<&mut Finding>) =
         findings.into_iter().partition(of_parameters);
     // It is made of an estimate that grows only, and for all its modes at once.
-    let others = others
-        .into_iter()
-        .filter(|f| !matches!(f, Finding::Instability { .. }))
-        .collect::<Vec<_>>();
+    let others =
+        others.into_iter().filter(|f| !matches!(f, Finding::Instability(_))).collect::<Vec<_>>();
     for group in [bias, others] {
         adjust_together(group.into_iter().filter_map(Finding::p_value_mut).collect());
     }
@@ -41,11 +41,12 @@ mod tests {
     use mechid_model::{Matrix, Parameter};
 
     use super::*;
-    use crate::finding::NoiseSource;
+    use crate::misfit::{Misfit, NoiseSource};
+    use crate::seam::Seam;
 
     fn misfit(raw: f64) -> Finding {
         let (p_value, source) = (PValue::of(raw), NoiseSource::Periods);
-        Finding::Misfit { ratio: 1.0, p_value, source, concentration: None }
+        Finding::Misfit(Misfit { ratio: 1.0, p_value, source, concentration: None })
     }
 
     /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.
@@ -61,7 +62,7 @@ mod tests {
 
     #[test]
     fn findings_that_are_no_tests_do_not_count_and_no_p_value_exceeds_one() {
-        let seam = Finding::Seam { ratio: 30.0 };
+        let seam = Finding::Seam(Seam { ratio: 30.0 });
         let mut findings = [misfit(0.7), seam.clone(), misfit(0.009)];
         adjust_p_values(&mut findings);
         assert_eq!(findings[0].p_value(), Some(PValue { raw: 0.7, adjusted: 0.7 }));
@@ -74,14 +75,14 @@ mod tests {
 
     #[test]
     fn a_bias_is_no_matter_of_the_residual() {
-        let bias = Finding::Bias {
+        let bias = Finding::Bias(Bias {
             p_value: PValue::of(0.02),
             parameter: Parameter::new(Matrix::Mass, 0, 0, 1).unwrap(),
             estimate: 1.0,
             unbiased: 1.1,
             standard_error: 0.03,
             reference: Reference::MaximumLikelihood,
-        };
+        });
         let mut findings = [misfit(0.01), bias, misfit(0.5)];
         adjust_p_values(&mut findings);
         let adjusted = findings.map(|finding| finding.p_value().unwrap().adjusted);

@@ -1,10 +1,15 @@
 //! Free responses that grow.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::IdentifiedMode;
 use mechid_model::EIGENVALUE_ROUNDING;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::finding::{Finding, PValue};
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
 
 /// Tells whether a mode of the estimate grows; `None` if all decay, but for rounding and the modes of a
 /// rigid body.
@@ -37,11 +42,69 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     };
     let growing = modes.iter().enumerate().filter(|(_, mode)| grows(mode));
     let (index, mode) = growing.min_by(|(_, a), (_, b)| p_value(a).total_cmp(&p_value(b)))?;
-    Some(Finding::Instability {
+    Some(Finding::Instability(Instability {
         mode: index,
         frequency_hz: mode.damped_frequency_hz.value,
         growth_rate: mode.growth_rate.value,
         standard_error: mode.growth_rate.standard_error,
         p_value: PValue::of(p_value(mode)),
-    })
+    }))
+}
+
+/// A free response of the identified system grows.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Instability {
+    /// The mode, by rising natural frequency.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub mode: usize,
+    /// Damped frequency of the mode, in Hz; 0 for a growth without oscillation.
+    pub frequency_hz: f64,
+    /// Real part of its eigenvalue, in 1/s.
+    pub growth_rate: f64,
+    /// Standard error of the growth rate, in 1/s.
+    pub standard_error: f64,
+    /// Probability that noise alone makes the estimate of a system that does not grow do so as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+impl Check for Instability {
+    fn subject(&self) -> Subject {
+        Subject::Instability
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { mode, frequency_hz, growth_rate, standard_error, p_value } = self;
+        let number = mode + 1;
+        let growth = [*growth_rate, *standard_error].map(three_digits).join(" ± ");
+        let frequency = three_digits(*frequency_hz);
+        if self.verdict() == Verdict::Good {
+            return write!(
+                f,
+                "mode {number} ({frequency} Hz) of the estimate grows at {growth} 1/s, no more \
+                 than the noise explains ({p_value}); its free response cannot be predicted"
+            );
+        }
+        let doubling = three_digits(std::f64::consts::LN_2 / growth_rate);
+        write!(
+            f,
+            "mode {number} ({frequency} Hz) is unstable ({p_value}): its free response grows \
+             at {growth} 1/s and doubles every {doubling} s. Possible causes: a machine that \
+             feeds its own vibration (oil film, control), a channel of the wrong sign or with \
+             a delay"
+        )
+    }
 }

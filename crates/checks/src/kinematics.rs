@@ -1,12 +1,16 @@
 //! Consistency of displacement, velocity and acceleration.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
 use mechid_numerics::check_size;
 use mechid_signal::Record;
 
-use super::finding::Finding;
-use super::thresholds::KINEMATIC_GAIN;
+use super::digits::six_digits;
+use super::finding::{Check, Finding, Names};
+use super::limits::KINEMATIC_GAIN;
+use super::{Subject, Verdict};
 
 /// Distance of a gain from 1, in its standard errors, that noise does not reach.
 const STANDARD_ERRORS: f64 = 4.0;
@@ -51,11 +55,8 @@ pub fn kinematics(
         for dof in 0..low.channels() {
             let [low, high] = [low, high].map(|record| record.channel(dof));
             let gain = gain(low, high, responses[0].1.sampling().dt(), twice);
-            findings.extend(gain.filter(Gain::is_wrong).map(|gain| Finding::Kinematics {
-                dof,
-                quantity,
-                derivative,
-                gain: gain.value,
+            findings.extend(gain.filter(Gain::is_wrong).map(|gain| {
+                Finding::Kinematics(Kinematics { dof, quantity, derivative, gain: gain.value })
             }));
         }
     }
@@ -102,5 +103,44 @@ impl Gain {
     fn is_wrong(&self) -> bool {
         let near = (1.0 / KINEMATIC_GAIN..=KINEMATIC_GAIN).contains(&self.value);
         !near && (self.value - 1.0).abs() > STANDARD_ERRORS * self.standard_error
+    }
+}
+
+/// Two measured response quantities of one degree of freedom are not derivatives of each other.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Kinematics {
+    /// Degree of freedom.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub dof: usize,
+    /// The lower derivative.
+    pub quantity: ResponseQuantity,
+    /// The higher derivative.
+    pub derivative: ResponseQuantity,
+    /// Change of `quantity` over the change that `derivative` predicts; 1 if they agree (pure number).
+    pub gain: f64,
+}
+
+impl Check for Kinematics {
+    fn subject(&self) -> Subject {
+        Subject::Kinematics
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.gain
+    }
+
+    fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} changes {} times as much as {} predicts: their units, columns or signs are inconsistent",
+            names.response(self.quantity, self.dof),
+            six_digits(self.gain),
+            names.response(self.derivative, self.dof)
+        )
     }
 }

@@ -1,12 +1,15 @@
 //! Resonances against the lines of the segments that were averaged.
 
 use std::f64::consts::TAU;
+use std::fmt::{self, Formatter};
 
 use mechid_estimate::IdentifiedMode;
 use mechid_spectra::frf::Frf;
 
-use super::finding::Finding;
-use super::thresholds::RESONANCE_LINES;
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::limits::RESONANCE_LINES;
+use super::{Subject, Verdict};
 
 /// Checks that the narrowest resonance in the band of frequency responses, averaged over segments under a window, is
 /// lines enough wide for what the window blunts to be told from it ([`Finding::Leakage`]); `settled` says whether
@@ -31,12 +34,72 @@ pub fn leakage(frf: &Frf, modes: &[IdentifiedMode], settled: bool) -> Option<Fin
     narrowest.map(|(at, mode)| {
         let lines = width(mode);
         let needed = samples * RESONANCE_LINES / lines.max(1e-6);
-        Finding::Leakage {
+        Finding::Leakage(Leakage {
             mode: at,
             frequency_hz: mode.natural_frequency_hz.value,
             lines,
             samples_needed: needed.max(samples).ceil() as usize,
             settled,
-        }
+        })
     })
+}
+
+/// Width of the narrowest resonance, in lines of the segments that were averaged.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Leakage {
+    /// The mode, by rising natural frequency.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub mode: usize,
+    /// Natural frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Half-power bandwidth 2ζf over the distance of the lines (pure number).
+    pub lines: f64,
+    /// Number of samples of a segment that would have as many lines in it as are needed.
+    pub samples_needed: usize,
+    /// True if what the window blunts could be told from the resonance.
+    pub settled: bool,
+}
+
+impl Check for Leakage {
+    fn subject(&self) -> Subject {
+        Subject::Leakage
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.settled && self.lines >= RESONANCE_LINES {
+            Verdict::Good
+        } else {
+            Verdict::Doubtful
+        }
+    }
+
+    fn value(&self) -> f64 {
+        self.lines
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { mode, frequency_hz, lines, samples_needed, settled } = self;
+        write!(
+            f,
+            "the resonance of mode {} ({frequency_hz:.4} Hz) is {} lines of a segment wide",
+            mode + 1,
+            three_digits(*lines)
+        )?;
+        match (self.verdict(), settled) {
+            (Verdict::Good, _) => Ok(()),
+            (_, true) => write!(
+                f,
+                ": its damping follows from leakage, and the intervals are not reliable; use segments of \
+                 {samples_needed} samples or more, or fit the record with the loads of its ends (without \
+                 `from_frf`)"
+            ),
+            (_, false) => write!(
+                f,
+                ", and what the window blunts could not be told from it: the intervals are not reliable; \
+                 use segments of {samples_needed} samples or more, or fit the record with the loads of \
+                 its ends (without `from_frf`)"
+            ),
+        }
+    }
 }

@@ -2,56 +2,102 @@
 //!
 //! Every check returns [`Finding`]s: values with named numbers, a [`Verdict`], a [`Subject`] and, from
 //! a statistical test, a p-value. Their [`Display`](std::fmt::Display) is one sentence. The limits
-//! that decide a verdict are in [`thresholds`].
+//! that decide a verdict are in [`limits`].
 
 mod after;
 mod before;
+mod bias;
+mod clipping;
+mod coherence;
 mod concentration;
+mod conditioning;
+mod constant_channel;
+mod cross_correlation;
 mod delay;
+mod digits;
 mod distortion;
+mod excited_lines;
 mod finding;
+mod gain;
+mod highest_mode;
 mod holm_adjustment;
 mod instability;
 mod kinematics;
 mod leakage;
+pub mod limits;
 mod linearity;
 mod mass;
+mod misfit;
+mod no_logarithm;
+mod p_value;
 mod period;
+mod period_scatter;
+mod persistent_excitation;
 mod power;
-mod range;
+mod quantisation;
 mod regressors;
 mod response_residual;
-mod sentences;
+mod seam;
+mod serialised;
 mod spectral;
 mod spectral_residual;
+mod spike;
 mod symmetry;
-pub mod thresholds;
-mod verdict;
+mod unequal_periods;
+mod unmeasured_force;
 mod weighted_fit;
+mod whiteness;
+
+use std::fmt;
 
 pub use after::after_fit;
-pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
+pub use before::{before_equation_of_motion, before_fit};
+pub use bias::{Bias, Reference};
+pub use clipping::{Clipping, clipped_channels};
+pub use coherence::{Coherence, coherence};
+pub use conditioning::Conditioning;
+pub use constant_channel::{ConstantChannel, constant_channels};
+pub use cross_correlation::CrossCorrelation;
+pub use delay::Delay;
 pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines, delay_of_open_records};
+pub use distortion::Distortion;
 pub use distortion::distortion_of_periods;
-pub use finding::{
-    Channel, Concentration, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue,
-    PeriodFault, Power, Quantity, Reference, Residual,
-};
+pub use excited_lines::ExcitedLines;
+pub use finding::{Channel, Finding, Quantity};
+pub use gain::{Gain, gain_symmetry};
+pub use highest_mode::{HighestMode, ModeLimit, fitted_band, fitted_step};
 pub use holm_adjustment::adjust_p_values;
+pub use instability::Instability;
 pub use instability::instability;
+pub use kinematics::Kinematics;
 pub use kinematics::kinematics;
+pub use leakage::Leakage;
 pub use leakage::leakage;
+pub use linearity::{Linearity, Power};
 pub use linearity::{linearity, linearity_of_open_record};
+pub use mass::NegativeMass;
 pub use mass::negative_mass;
+pub use misfit::{Concentration, Misfit, NoiseSource};
+pub use no_logarithm::NoLogarithm;
+pub use p_value::{CorrelationTest, PValue};
 pub use period::claimed_period;
+pub use period::{PeriodFault, WrongPeriod};
+pub use period_scatter::PeriodScatter;
+pub use persistent_excitation::PersistentExcitation;
+pub use power::PowerFlow;
 pub use power::power;
-pub use range::{clipped_channels, constant_channels, quantised_channels, spiked_channels};
+pub use quantisation::{Quantisation, quantised_channels};
 pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
-pub use spectral::{before_spectral_fit, coherence, fitted_band, fitted_step, steady_periods};
+pub use seam::{Seam, periodicity, periodicity_across};
+pub use spectral::{before_spectral_fit, steady_periods};
 pub use spectral_residual::SpectralResidual;
-pub use symmetry::{gain_symmetry, mass_symmetry};
+pub use spike::{Spike, spiked_channels};
+pub use symmetry::{MassSymmetry, mass_symmetry};
+pub use unequal_periods::UnequalPeriods;
+pub use unmeasured_force::UnmeasuredForce;
 pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
+pub use whiteness::{NoiseSpan, Residual, Whiteness};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.
 const MAX_SAMPLES: usize = 1 << 15;
@@ -66,6 +112,27 @@ pub enum Verdict {
     Doubtful,
     /// The fit will fail or mislead.
     Bad,
+}
+
+impl Verdict {
+    /// Returns the verdict on a value that is good below `doubtful`, and bad from `bad` on.
+    fn graded(value: f64, doubtful: f64, bad: f64) -> Self {
+        match value {
+            v if v < doubtful => Self::Good,
+            v if v < bad => Self::Doubtful,
+            _ => Self::Bad,
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Verdict::Good => "good",
+            Verdict::Doubtful => "doubtful",
+            Verdict::Bad => "bad",
+        })
+    }
 }
 
 /// Subject of a check.
@@ -109,4 +176,29 @@ pub enum Subject {
     Whiteness,
     /// Correlation of the residual with the force.
     CrossCorrelation,
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Subject::Excitation => "excitation",
+            Subject::Conditioning => "conditioning",
+            Subject::Range => "range",
+            Subject::Kinematics => "kinematics",
+            Subject::Power => "power",
+            Subject::Periodicity => "periodicity",
+            Subject::Step => "step",
+            Subject::Coherence => "coherence",
+            Subject::Leakage => "leakage",
+            Subject::Delay => "delay",
+            Subject::Bias => "bias",
+            Subject::Instability => "instability",
+            Subject::Mass => "mass",
+            Subject::Symmetry => "symmetry",
+            Subject::Misfit => "misfit",
+            Subject::Linearity => "linearity",
+            Subject::Whiteness => "whiteness",
+            Subject::CrossCorrelation => "cross-correlation",
+        })
+    }
 }

@@ -1,5 +1,7 @@
 //! Correlation of a residual with powers of displacement and velocity.
 
+use std::fmt::{self, Display, Formatter};
+
 use mechid_estimate::frequency_domain::Whitened;
 use mechid_estimate::{Estimate, EstimateError, predict_periodic};
 use mechid_model::{Response, ResponseQuantity};
@@ -10,7 +12,9 @@ use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::finding::{Finding, PValue, Power};
+use super::finding::{Check, Finding, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
 
 /// Powers of a motion that are tested.
 const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Power::VelocitySign];
@@ -181,7 +185,7 @@ impl Tested {
         // Bonferroni: the least of so many.
         let (p_value, power, dof) = least;
         let p_value = PValue::of(((n * POWERS.len()) as f64 * p_value).min(1.0));
-        Ok(Finding::Linearity { power, dof, p_value })
+        Ok(Finding::Linearity(Linearity { power, dof, p_value }))
     }
 }
 
@@ -297,4 +301,78 @@ fn around(values: &[f64]) -> Vec<f64> {
     let window = |at: usize| at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(count);
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
     (0..count).map(|at| mean(&values[window(at)])).collect()
+}
+
+/// Correlation of a residual with the square or the cube of a displacement as a force.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Linearity {
+    /// The power that correlates most.
+    pub power: Power,
+    /// Degree of freedom of the motion.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub dof: usize,
+    /// Probability that the noise of a linear machine correlates as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+/// Power of a motion that a force is looked for in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Power {
+    /// x².
+    Square,
+    /// x³.
+    Cube,
+    /// ẋ³.
+    VelocityCube,
+    /// Sign of ẋ: dry friction.
+    VelocitySign,
+}
+
+impl Check for Linearity {
+    fn subject(&self) -> Subject {
+        Subject::Linearity
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let (power, p_value) = (self.power, self.p_value);
+        if self.verdict() == Verdict::Good {
+            return write!(
+                f,
+                "the residual is uncorrelated with the square and the cube of the displacement and with the cube \
+                 and the sign of the velocity as forces ({p_value})"
+            );
+        }
+        let displacement = names.response(ResponseQuantity::Displacement, self.dof);
+        write!(
+            f,
+            "the residual is correlated with the {power} {displacement} as a force ({p_value}): \
+             the machine is nonlinear at this level of the force, to which its parameters belong"
+        )
+    }
+}
+
+impl Display for Power {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Power::Square => "square of",
+            Power::Cube => "cube of",
+            Power::VelocityCube => "cube of the velocity of",
+            Power::VelocitySign => "sign (dry friction) of the velocity of",
+        })
+    }
 }

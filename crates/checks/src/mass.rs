@@ -1,10 +1,15 @@
 //! Sign of the masses.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::Estimate;
 use mechid_model::Matrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::finding::{Finding, PValue};
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
 
 /// Tells of a mass on the diagonal of M that is negative ([`Finding::NegativeMass`]), the one that noise explains
 /// least; `None` if there is none. The p-value is the probability that one of so many masses of zero is estimated as
@@ -38,5 +43,58 @@ pub fn negative_mass(estimate: &Estimate) -> Option<Finding> {
         _ => 0.0,
     };
     let p_value = PValue::of((alone * masses.len() as f64).min(1.0));
-    Some(Finding::NegativeMass { row, mass, standard_error, p_value })
+    Some(Finding::NegativeMass(NegativeMass { row, mass, standard_error, p_value }))
+}
+
+/// Mass that is negative.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct NegativeMass {
+    /// Degree of freedom.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub row: usize,
+    /// Entry of the diagonal of M, in kg.
+    pub mass: f64,
+    /// Standard error of it, in kg.
+    pub standard_error: f64,
+    /// Probability that noise alone makes any such mass of zero as negative.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+impl Check for NegativeMass {
+    fn subject(&self) -> Subject {
+        Subject::Mass
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { row, mass, standard_error, p_value } = self;
+        let (i, errors) = (row + 1, three_digits(mass.abs() / standard_error));
+        let mass = three_digits(*mass);
+        if self.verdict() == Verdict::Good {
+            return write!(
+                f,
+                "m{i}{i} is {mass} kg, negative by no more than noise makes it: {errors} standard errors \
+                 ({p_value})"
+            );
+        }
+        write!(
+            f,
+            "m{i}{i} is {mass} kg, {errors} standard errors below zero ({p_value}): no machine has a \
+             negative mass. Possible causes: a force or a response of the wrong sign, channels in the \
+             wrong order, a quantity taken for another one (acceleration for displacement)"
+        )
+    }
 }

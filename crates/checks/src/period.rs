@@ -1,9 +1,12 @@
 //! Claimed period against the force.
 
+use std::fmt::{self, Formatter};
+
 use mechid_signal::Record;
 use mechid_signal::measures::aperiodic_autocorrelation;
 
-use super::finding::{Finding, PeriodFault};
+use super::finding::{Check, Finding, Names};
+use super::{Subject, Verdict};
 
 /// Mismatch, over the RMS of the force, beyond which it does not repeat.
 const WORST: f64 = 0.1;
@@ -39,7 +42,7 @@ pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     let fault = neighbour(&channels, period)
         .or_else(|| interruption(&channels, period))
         .or_else(|| another(&channels, period))?;
-    Some(Finding::WrongPeriod { claimed: period, fault })
+    Some(Finding::WrongPeriod(WrongPeriod { claimed: period, fault }))
 }
 
 /// A channel less its mean, with an RMS of 1; `None` if it does not vary.
@@ -176,4 +179,114 @@ fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
         if overlap > 0.5 * usual(lag) { difference / overlap } else { 1.0 }
     };
     all.into_iter().enumerate().map(ratio).collect()
+}
+
+/// The force does not repeat after the claimed period.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct WrongPeriod {
+    /// Period claimed, in samples.
+    pub claimed: usize,
+    /// Contradiction by the force.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub fault: PeriodFault,
+}
+
+/// Contradiction of a claimed period by the force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "fault", rename_all = "snake_case")
+)]
+pub enum PeriodFault {
+    /// The force returns to itself better after one or two samples more or less.
+    Neighbour {
+        /// Number of samples after which it repeats best.
+        period: usize,
+        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
+        mismatch: f64,
+        /// The same after the claimed period (pure number).
+        claimed_mismatch: f64,
+    },
+    /// The force returns after the claimed period except in one place: samples are missing or too many.
+    Interruption {
+        /// The sample that does not follow, counted from 0 in the window.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+        sample: usize,
+        /// RMS difference elsewhere, over the RMS of the force (pure number).
+        mismatch: f64,
+    },
+    /// The force repeats after a number of samples of which the claimed one is no multiple.
+    Other {
+        /// Number of samples after which it repeats.
+        period: usize,
+        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
+        mismatch: f64,
+        /// Number of samples of the force.
+        samples: usize,
+    },
+}
+
+impl Check for WrongPeriod {
+    fn subject(&self) -> Subject {
+        Subject::Periodicity
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        let samples = match self.fault {
+            PeriodFault::Neighbour { period, .. } | PeriodFault::Other { period, .. } => period,
+            PeriodFault::Interruption { .. } => self.claimed,
+        };
+        samples as f64
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        self.fault.sentence(self.claimed, f)
+    }
+}
+
+impl PeriodFault {
+    fn sentence(&self, claimed: usize, f: &mut Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        match *self {
+            PeriodFault::Neighbour { period, mismatch, claimed_mismatch } => write!(
+                f,
+                "the period is {period} samples: from one to the next the force differs by {} of its \
+                 RMS, after {claimed} samples by {}",
+                percent(mismatch),
+                percent(claimed_mismatch)
+            ),
+            PeriodFault::Interruption { sample, mismatch } => write!(
+                f,
+                "the force repeats every {claimed} samples, to {} of its RMS, but not across sample {} \
+                 of the window, as if samples were missing there or too many: keep to one side of it",
+                percent(mismatch),
+                sample + 1
+            ),
+            PeriodFault::Other { period, mismatch, samples } => {
+                let mismatch = percent(mismatch);
+                match samples.checked_sub(period) {
+                    Some(compared) if compared < period => write!(
+                        f,
+                        "the first {compared} of {samples} samples of the force repeat {period} samples \
+                         later, to {mismatch} of its RMS"
+                    )?,
+                    _ => write!(
+                        f,
+                        "the force repeats every {period} samples, to {mismatch} of its RMS"
+                    )?,
+                }
+                write!(
+                    f,
+                    ", and {claimed} samples are no whole number of such periods: the lines used are \
+                     not those of the force"
+                )
+            }
+        }
+    }
 }

@@ -1,12 +1,15 @@
 //! Direction of the power between force and machine.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
 use mechid_numerics::check_size;
 use mechid_signal::{Record, Spectrum};
 
-use super::finding::Finding;
-use super::thresholds::POWER_TAKEN_OUT;
+use super::finding::{Check, Finding, Names};
+use super::limits::POWER_TAKEN_OUT;
+use super::{Subject, Verdict};
 
 /// Number of lines, those with the most power, of which [`STRONGEST_FRACTION`] must take power out.
 const STRONGEST_LINES: usize = 32;
@@ -59,5 +62,37 @@ pub fn power(
     lines.truncate(STRONGEST_LINES);
     let out = lines.iter().filter(|power| **power < 0.0).count() as f64;
     let driven = fraction >= -POWER_TAKEN_OUT || out < STRONGEST_FRACTION * lines.len() as f64;
-    Ok((!driven).then_some(Finding::PowerFlow { fraction }))
+    Ok((!driven).then_some(Finding::PowerFlow(PowerFlow { fraction })))
+}
+
+/// The forces take power out of the machine.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PowerFlow {
+    /// Mean power into the machine over the apparent power, negative (pure number).
+    pub fraction: f64,
+}
+
+impl Check for PowerFlow {
+    fn subject(&self) -> Subject {
+        Subject::Power
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.fraction
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the forces take power out of the machine ({:.1} % of the apparent power): force and \
+             response are interchanged, one of them has the wrong sign or a delay, or something \
+             else drives the machine",
+            -100.0 * self.fraction
+        )
+    }
 }

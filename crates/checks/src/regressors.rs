@@ -10,8 +10,10 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::MAX_SAMPLES;
-use super::finding::{Finding, PValue, Reference};
-use super::thresholds::{LAGS, ROUNDING, SIGNIFICANCE};
+use super::bias::{Bias, Reference};
+use super::finding::Finding;
+use super::limits::{LAGS, ROUNDING, SIGNIFICANCE};
+use super::p_value::PValue;
 
 /// Minimum number of samples per unknown.
 const SAMPLES_PER_UNKNOWN: usize = 4;
@@ -61,13 +63,15 @@ pub fn noise_on_response(
     let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
     // A long record shows a smaller bias than that, but the interval still holds.
     let relevant = significant.filter(|change| change.standard_errors() > 1.0);
-    Ok(relevant.map(|change| Finding::Bias {
-        p_value: PValue::of(p_value(&change)),
-        parameter: change.parameter,
-        estimate: change.estimate,
-        unbiased: change.instrumental,
-        standard_error: change.standard_error,
-        reference: Reference::NeighbouringSamples,
+    Ok(relevant.map(|change| {
+        Finding::Bias(Bias {
+            p_value: PValue::of(p_value(&change)),
+            parameter: change.parameter,
+            estimate: change.estimate,
+            unbiased: change.instrumental,
+            standard_error: change.standard_error,
+            reference: Reference::NeighbouringSamples,
+        })
     }))
 }
 

@@ -6,7 +6,10 @@ use mechid_signal::correlation::{Correlation, correlated, share_above_of};
 use mechid_spectra::frf::Frf;
 use nalgebra::{Complex, DMatrix};
 
-use super::finding::{CorrelationTest, Finding, NoiseSource, PValue, Residual};
+use super::finding::Finding;
+use super::misfit::{Misfit, NoiseSource};
+use super::p_value::{CorrelationTest, PValue};
+use super::whiteness::{Residual, Whiteness};
 
 /// 1 − coherence, below which it is rounding.
 const ROUNDING: f64 = 1e-10;
@@ -59,7 +62,7 @@ pub fn after_response_fit(
             let (response, force) = (at % n, force_dof[at / n]);
             let residual = Residual::FrequencyResponse { response, force, distance };
             let test = CorrelationTest::new(&correlation, false);
-            findings.push(Finding::Whiteness { residual, test, span: None });
+            findings.push(Finding::Whiteness(Whiteness { residual, test, span: None }));
         }
     }
     Ok(findings)
@@ -74,7 +77,7 @@ struct Expected {
 impl Expected {
     fn misfit(&self, power: f64, source: NoiseSource) -> Finding {
         let p_value = PValue::of(share_above_of(power, self.mean, 0.5 * self.variance));
-        Finding::Misfit { ratio: power / self.mean, p_value, source, concentration: None }
+        Finding::Misfit(Misfit { ratio: power / self.mean, p_value, source, concentration: None })
     }
 }
 

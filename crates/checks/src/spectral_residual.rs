@@ -8,8 +8,12 @@ use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::concentration::Part;
-use super::finding::{Concentration, CorrelationTest, Finding, NoiseSource, PValue, Residual};
-use super::thresholds::LAGS;
+use super::cross_correlation::CrossCorrelation;
+use super::finding::Finding;
+use super::limits::LAGS;
+use super::misfit::{Concentration, Misfit, NoiseSource};
+use super::p_value::{CorrelationTest, PValue};
+use super::whiteness::{Residual, Whiteness};
 
 /// Maximum distance of lines, counted in lines of the fit, at which residuals are correlated.
 const DISTANCES: usize = 12;
@@ -123,16 +127,18 @@ impl SpectralResidual {
         }
         if let Some((ratio, p_value)) = self.force_decides {
             let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
-            findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
+            findings.push(Finding::Misfit(Misfit { ratio, p_value, source, concentration: None }));
         }
         let dof = self.data.dof();
         let of_forces: Vec<Vec<Option<Correlation>>> =
             (0..dof).into_par_iter().map(|force| self.with_force(force)).collect();
         let whiteness = |residual: usize| {
-            self.line_to_line(residual).map(|correlation| Finding::Whiteness {
-                residual: Residual::Lines { residual },
-                test: CorrelationTest::new(&correlation, self.rounding),
-                span: None,
+            self.line_to_line(residual).map(|correlation| {
+                Finding::Whiteness(Whiteness {
+                    residual: Residual::Lines { residual },
+                    test: CorrelationTest::new(&correlation, self.rounding),
+                    span: None,
+                })
             })
         };
         let whiteness: Vec<Option<Finding>> = (0..dof).into_par_iter().map(whiteness).collect();
@@ -140,7 +146,7 @@ impl SpectralResidual {
             findings.extend(whiteness);
             findings.extend(of_forces.iter().enumerate().filter_map(|(force, of_channels)| {
                 let test = CorrelationTest::new(of_channels[residual].as_ref()?, self.rounding);
-                Some(Finding::CrossCorrelation { residual, force, test })
+                Some(Finding::CrossCorrelation(CrossCorrelation { residual, force, test }))
             }));
         }
         findings
@@ -214,7 +220,7 @@ impl SpectralResidual {
         let is_excess = p_value.is_significant() && power > mean;
         let concentration = self.concentration.clone().filter(|_| is_excess);
         let source = NoiseSource::Periods;
-        Some(Finding::Misfit { ratio: power / mean, p_value, source, concentration })
+        Some(Finding::Misfit(Misfit { ratio: power / mean, p_value, source, concentration }))
     }
 
     /// Places of the lines by rising frequency.

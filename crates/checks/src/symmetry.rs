@@ -1,11 +1,16 @@
 //! Symmetry of the mass matrix, and of damping and stiffness but for gains.
 
+use std::fmt::{self, Formatter};
+
 use mechid_estimate::Estimate;
-use mechid_model::{Matrix, Parameter};
+use mechid_model::Matrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::finding::{Finding, PValue};
-use super::thresholds::{ASYMMETRY, GAIN_AGREES, GAIN_NEAR, GAIN_SHOWS};
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::limits::ASYMMETRY;
+use super::p_value::PValue;
+use super::{Subject, Verdict};
 
 /// Tells how far the estimated mass matrix is from a symmetric one; `None` where no two masses could differ.
 ///
@@ -51,14 +56,14 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
             _ => 0.0,
         };
         if worst.as_ref().is_none_or(|(least, _)| alone < *least) {
-            let finding = Finding::MassSymmetry {
+            let finding = Finding::MassSymmetry(MassSymmetry {
                 row: i,
                 column: j,
                 above: mass[(i, j)],
                 below: mass[(j, i)],
                 standard_error,
                 p_value: PValue::of(alone),
-            };
+            });
             worst = Some((alone, finding));
         }
     }
@@ -69,53 +74,62 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
     Some(finding)
 }
 
-/// Tells of a pair of degrees of freedom between which damping and stiffness are symmetric but for one factor, the same
-/// in both; `None` where there is none. Of several it is the one that is known best.
-///
-/// A response or a force that is read g times too large multiplies a column or a row of C and K alike, and makes
-/// c_ij/c_ji = k_ij/k_ji = g of symmetric matrices, while a diagonal M stays symmetric. Bearings and gyroscopic forces,
-/// which make C and K not symmetric, have another ratio in each. The factor has to show in both by itself.
-///
-/// # Source
-/// Ours: each ratio has its error by the delta method.
-pub fn gain_symmetry(estimate: &Estimate) -> Option<Finding> {
-    let n = estimate.dof();
-    let free = estimate.unknowns().free();
-    let place = |matrix: Matrix, row: usize, column: usize| {
-        let is_it = |p: &Parameter| (p.matrix(), p.row(), p.column()) == (matrix, row, column);
-        free.iter().position(is_it)
-    };
-    let spread = estimate.spread();
-    // Logarithm of the ratio of two entries, and its variance.
-    let ratio = |matrix: Matrix, i: usize, j: usize| -> Option<[f64; 2]> {
-        let all = match matrix {
-            Matrix::Mass => estimate.mass(),
-            Matrix::Damping => estimate.damping(),
-            Matrix::Stiffness => estimate.stiffness(),
-        };
-        let (above, below) = (all[(i, j)], all[(j, i)]);
-        let (p, q) = (place(matrix, i, j)?, place(matrix, j, i)?);
-        let variance = spread.of(p) / above.powi(2) + spread.of(q) / below.powi(2)
-            - 2.0 * spread.between(p, q) / (above * below);
-        let log = (above / below).ln();
-        (log.is_finite() && variance > 0.0 && log * log > GAIN_SHOWS.powi(2) * variance)
-            .then_some([log, variance])
-    };
-    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
-    let found = pairs.filter_map(|(i, j)| {
-        let [of_c, variance_c] = ratio(Matrix::Damping, i, j)?;
-        let [of_k, variance_k] = ratio(Matrix::Stiffness, i, j)?;
-        let apart = (of_c - of_k).powi(2);
-        let noise = GAIN_AGREES.powi(2) * (variance_c + variance_k);
-        let weight = [variance_c.recip(), variance_k.recip()];
-        let log = (weight[0] * of_c + weight[1] * of_k) / (weight[0] + weight[1]);
-        let standard_error = (weight[0] + weight[1]).sqrt().recip();
-        (apart < noise.max((GAIN_NEAR * of_k).powi(2))).then_some((i, j, log, standard_error))
-    });
-    let (i, j, log, standard_error) = found.max_by(|a, b| {
-        let shows = |(.., log, error): &(usize, usize, f64, f64)| (log / error).abs();
-        shows(a).total_cmp(&shows(b))
-    })?;
-    let (row, column, log) = if log >= 0.0 { (i, j, log) } else { (j, i, -log) };
-    Some(Finding::Gain { row, column, ratio: log.exp(), standard_error })
+/// Difference of two masses that the kinetic energy makes equal.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct MassSymmetry {
+    /// Degree of freedom of the row of the one, and of the column of the other.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub row: usize,
+    /// Degree of freedom of the column of the one, and of the row of the other.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
+    pub column: usize,
+    /// Entry (`row`, `column`) of M, in kg.
+    pub above: f64,
+    /// Entry (`column`, `row`) of M, in kg.
+    pub below: f64,
+    /// Standard error of their difference, in kg.
+    pub standard_error: f64,
+    /// Probability that noise alone makes any two such entries differ as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+impl Check for MassSymmetry {
+    fn subject(&self) -> Subject {
+        Subject::Symmetry
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { row, column, above, below, standard_error, p_value } = self;
+        let (i, j) = (row + 1, column + 1);
+        let errors = three_digits((above - below).abs() / standard_error);
+        let [above, below] = [*above, *below].map(three_digits);
+        if self.verdict() == Verdict::Good {
+            return write!(
+                f,
+                "M is symmetric as far as the noise shows: m{i}{j} and m{j}{i} differ by {errors} \
+                 standard errors ({p_value})"
+            );
+        }
+        write!(
+            f,
+            "M is not symmetric, which the kinetic energy of a machine makes it: m{i}{j} is {above} kg \
+             and m{j}{i} {below} kg, {errors} standard errors apart ({p_value}). Possible causes: \
+             crosstalk between forces or between responses, a gain that is wrong, a sensor that is not \
+             at the point and in the direction of its force"
+        )
+    }
 }

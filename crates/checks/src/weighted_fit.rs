@@ -13,10 +13,12 @@ use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+use super::bias::{Bias, Reference};
 use super::concentration::{Part, concentration};
-use super::finding::{Finding, PValue, Reference};
+use super::finding::Finding;
+use super::limits::ROUNDING;
+use super::p_value::PValue;
 use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
-use super::thresholds::ROUNDING;
 
 /// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
 /// combination of parameters has no effect.
@@ -264,14 +266,14 @@ impl WeightedFit {
         let largest = step.iamax();
         let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
         let parameter = estimate.parameters().nth(largest)?;
-        Some(Finding::Bias {
+        Some(Finding::Bias(Bias {
             p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
             parameter: parameter.parameter,
             estimate: parameter.value,
             unbiased: parameter.value + change[largest],
             standard_error: parameter.standard_error,
             reference: Reference::MaximumLikelihood,
-        })
+        }))
     }
 }
 

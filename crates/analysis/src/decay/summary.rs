@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-use mechid_checks::thresholds::SIGNIFICANCE;
+use mechid_checks::limits::SIGNIFICANCE;
 use mechid_estimate::IdentifiedMode;
 use mechid_modal::free_decay::{DecayChannel, DecayMode, FreeDecayEstimate};
 use mechid_model::ResponseQuantity;

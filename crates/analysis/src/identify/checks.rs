@@ -1,5 +1,6 @@
 //! Checks before and after the fit, record by record.
 
+use mechid_checks::UnmeasuredForce;
 use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, negative_mass, power,
@@ -93,7 +94,7 @@ pub(crate) fn rows(
         add(When::After, Some(at), &checks);
     }
     // The lines that a nonlinearity disturbs most are those of the resonances, and no disturbance.
-    if all.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion { .. })) {
+    if all.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion(_))) {
         all.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
     }
     adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
@@ -109,7 +110,7 @@ pub(crate) fn rows(
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);
-    unexplained.filter(|_| is_seen).map(|fraction| Finding::UnmeasuredForce { fraction })
+    unexplained.filter(|_| is_seen).map(|fraction| Finding::UnmeasuredForce(UnmeasuredForce { fraction }))
 }
 
 /// Returns the faults of each channel by itself.

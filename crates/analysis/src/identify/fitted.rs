@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mechid_checks::thresholds::{LAGS, SAMPLES_PER_LAG};
+use mechid_checks::limits::{LAGS, SAMPLES_PER_LAG};
 use mechid_checks::{Finding, SpectralResidual};
 use mechid_estimate::Estimate;
 use mechid_model::SecondOrderSystem;

@@ -1,5 +1,6 @@
 //! Fits sample by sample.
 
+use mechid_checks::HighestMode;
 use mechid_checks::{
     Finding, ModeLimit, before_equation_of_motion, before_fit, claimed_period, delay_at_samples,
     delay_between_samples, fitted_step, noise_on_response, periodicity, periodicity_across,
@@ -222,7 +223,7 @@ impl SampleFit {
         let estimate = fit.into_estimate();
         // The modes that were found say more than a force held between the samples.
         for finding in &mut before_all {
-            if matches!(finding, Finding::HighestMode { limit: ModeLimit::BetweenSamples, .. }) {
+            if matches!(finding, Finding::HighestMode(HighestMode { limit: ModeLimit::BetweenSamples, .. })) {
                 *finding = fitted_step(&estimate, dt)?;
             }
         }

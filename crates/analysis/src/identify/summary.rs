@@ -216,7 +216,7 @@ impl IdentificationSummary {
     /// Returns what in the numbers themselves speaks against them.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
-        let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit { .. });
+        let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit(_));
         let mut misfits = self.checks.iter().filter(is_misfit);
         // A growth within its standard errors is no warning of the checks.
         let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);

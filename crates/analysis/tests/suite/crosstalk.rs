@@ -1,5 +1,6 @@
 //! Forces that are seen or act in the place of one another, and sensors with another gain.
 
+use mechid_checks::Gain;
 use mechid_analysis::{
     FrfSettings, FrfTable, Identify, Measurement, ResponseQuantity, Segmentation, frf, identify,
 };
@@ -212,7 +213,7 @@ fn a_sensor_with_another_gain_is_told_by_damping_and_stiffness() {
     let told = |system: &SecondOrderSystem, gain: f64, seed: u64| {
         let found = identify(&[measured(system, gain, seed)], &Identify::default()).unwrap();
         found.checks().iter().find_map(|check| match check.finding {
-            Finding::Gain { row, ratio, .. } => Some((row, ratio)),
+            Finding::Gain(Gain { row, ratio, .. }) => Some((row, ratio)),
             _ => None,
         })
     };

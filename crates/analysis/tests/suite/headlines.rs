@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use mechid_checks::{HighestMode, UnequalPeriods};
 use mechid_analysis::identify::{Band, Fit, LineChoice, Method, SampleFit};
 use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
@@ -119,7 +120,7 @@ fn strokes_of_unequal_strength_are_no_periods() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
     let unequal = |found: &Identified| {
         let mut fractions = found.checks().iter().filter_map(|check| match check.finding {
-            Finding::UnequalPeriods { fraction } => Some(fraction),
+            Finding::UnequalPeriods(UnequalPeriods { fraction }) => Some(fraction),
             _ => None,
         });
         fractions.next_back()
@@ -151,7 +152,7 @@ fn noise_on_the_force_is_no_difference_of_the_periods() {
     let responses = [(ResponseQuantity::Displacement, response.displacement())];
     let test = Measurement::from_records(&force, &responses).unwrap().period(256).unwrap();
     let found = identify(&[test], &Identify::default()).unwrap();
-    let unequal = |finding: &Finding| matches!(finding, Finding::UnequalPeriods { .. });
+    let unequal = |finding: &Finding| matches!(finding, Finding::UnequalPeriods(_));
     assert!(!found.checks().iter().any(|check| unequal(&check.finding)), "{found}");
 }
 
@@ -169,7 +170,7 @@ fn the_highest_mode_is_that_of_the_fit() {
         let how = Identify { fit: Fit::Samples(fit), ..Identify::default() };
         let found = identify(std::slice::from_ref(&test), &how).unwrap();
         let told = found.checks().iter().find_map(|check| match check.finding {
-            Finding::HighestMode { frequency_hz, .. } => Some(frequency_hz),
+            Finding::HighestMode(HighestMode { frequency_hz, .. }) => Some(frequency_hz),
             _ => None,
         });
         let fitted = found.summary().modes[0].row.natural_frequency_hz.value;

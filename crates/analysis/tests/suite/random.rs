@@ -1,5 +1,6 @@
 //! Random tests: windows cut out of the closed-form steady state under a random force of a far longer period.
 
+use mechid_checks::Linearity;
 use mechid_analysis::frf::{Estimator, frf};
 use mechid_analysis::identify::{Fit, Method};
 use mechid_analysis::sweep::{self, Kind};
@@ -427,7 +428,7 @@ fn dry_friction_under_a_random_force_is_named() {
         let found = found.unwrap();
         let mut told = found.checks().iter().filter(|check| check.is_conspicuous());
         told.find_map(|check| match check.finding {
-            Finding::Linearity { power, .. } => Some(power),
+            Finding::Linearity(Linearity { power, .. }) => Some(power),
             _ => None,
         })
     };

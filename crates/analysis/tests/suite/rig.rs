@@ -1,5 +1,6 @@
 //! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
 
+use mechid_checks::Misfit;
 use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
@@ -206,7 +207,7 @@ fn how_many_segments_each_record_has_is_told() {
 /// The lines that the misfit of a fit names.
 fn named(found: &Identified) -> Option<Concentration> {
     found.checks().iter().find_map(|check| match &check.finding {
-        Finding::Misfit { concentration, .. } => concentration.clone(),
+        Finding::Misfit(Misfit { concentration, .. }) => concentration.clone(),
         _ => None,
     })
 }

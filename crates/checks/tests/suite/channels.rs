@@ -1,5 +1,6 @@
 //! Whether the checks of the channels name what is wrong with them, and are silent where nothing is.
 
+use mechid_checks::{Bias, Clipping, Spike};
 use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, clipped_channels, constant_channels,
     delay_at_samples, delay_between_samples, delay_of_lines, kinematics, noise_on_response, power,
@@ -103,7 +104,7 @@ fn instruments_rid_a_parameter_of_its_bias() {
         let finding = noise_on_response(&response, &force, &found).unwrap()?;
         assert_eq!(finding.subject(), Subject::Bias);
         assert_eq!(finding.verdict(), Verdict::Doubtful);
-        let Finding::Bias { parameter, estimate, unbiased: instrumental, .. } = finding else {
+        let Finding::Bias(Bias { parameter, estimate, unbiased: instrumental, .. }) = finding else {
             panic!("{finding:?}");
         };
         let truth = system.matrix(parameter.matrix())[(0, 0)];
@@ -188,7 +189,7 @@ fn a_spike_is_named_but_not_a_blow() {
         Record::new(record.sampling(), data).unwrap()
     };
     let found = spiked_channels(ACCELERATION, &spiked(exact.acceleration(), 1e6), &force);
-    let [Finding::Spike { sample: 100, .. }] = found[..] else { panic!("{found:?}") };
+    let [Finding::Spike(Spike { sample: 100, .. })] = found[..] else { panic!("{found:?}") };
     assert_eq!(found[0].verdict(), Verdict::Bad);
     let quiet = Record::new(force.sampling(), force.data() * 1e-6).unwrap();
     let blow = spiked(&quiet, 1e3);
@@ -308,7 +309,7 @@ fn a_channel_that_is_cut_off_is_named() {
     let cut = clipped_channels(Quantity::Force, &record);
     assert_eq!(cut.len(), 1);
     assert_eq!((cut[0].subject(), cut[0].verdict()), (Subject::Range, Verdict::Bad));
-    let Finding::Clipping { channel, level: at, .. } = cut[0] else { panic!("{cut:?}") };
+    let Finding::Clipping(Clipping { channel, level: at, .. }) = cut[0] else { panic!("{cut:?}") };
     assert_eq!(channel, Channel { quantity: Quantity::Force, index: 1 });
     assert_eq!(at.abs(), level);
 }

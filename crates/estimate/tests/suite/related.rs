@@ -1,5 +1,6 @@
 //! Symmetric matrices, chains and proportional damping: fewer unknowns than entries.
 
+use mechid_checks::Delay;
 use mechid_checks::{Finding, delay_of_lines};
 use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
@@ -147,7 +148,7 @@ fn a_delay_of_the_force_on_a_chain_is_found() {
         for (seed, samples) in (0..).zip([0.5, -1.3, 4.0]) {
             let data = turned(&measured(&system, &omega, 0.003, seed), samples * dt);
             let found = delay_of_lines(&data, dt, &unknowns).unwrap();
-            let Finding::Delay { samples: told, .. } = found else { panic!("{found}") };
+            let Finding::Delay(Delay { samples: told, .. }) = found else { panic!("{found}") };
             assert!((told - samples).abs() < 0.1, "{told} for {samples}");
         }
     }

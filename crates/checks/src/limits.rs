@@ -102,10 +102,30 @@ pub const ASYMMETRY: f64 = 1e-6;
 
 /// Part of the motion from which it is doubtful that forces which were not measured account for it: few tests are as
 /// disturbed, and nonlinear machines leave more.
-pub(super) const UNMEASURED_FORCE: f64 = 0.1;
+pub const UNMEASURED_FORCE: f64 = 0.1;
 
-/// Standard errors by which a ratio of entries differs from 1 in damping and in stiffness where a gain makes it, and up
-/// to which both agree, or the part of the logarithm.
-pub(super) const GAIN_SHOWS: f64 = 5.0;
-pub(super) const GAIN_AGREES: f64 = 2.5;
-pub(super) const GAIN_NEAR: f64 = 0.05;
+/// Minimum number of standard errors by which the ratio of two mirrored entries differs from 1, in damping and in
+/// stiffness, for a gain to be named; below it noise may make the ratio.
+pub const GAIN_SHOWS: f64 = 5.0;
+
+/// Maximum number of standard errors between the ratios in damping and in stiffness that count as the same gain.
+pub const GAIN_AGREES: f64 = 2.5;
+
+/// Maximum difference of the logarithms of both ratios, relative to that in stiffness, that counts as the same gain
+/// too, whatever the standard errors.
+pub const GAIN_NEAR: f64 = 0.05;
+
+/// Fraction of samples that a coarsely quantised channel leaves at the level of the one before.
+pub const REPEATED_SAMPLES: f64 = 0.2;
+
+/// Minimum number of samples per level of a quantised channel.
+pub const SAMPLES_PER_LEVEL: usize = 16;
+
+/// Difference of the neighbours of a spike, over the spike.
+pub const RETURN: f64 = 0.1;
+
+/// Deviation of a level from a multiple of the step, over the step, that is rounding.
+pub const LEVEL_ROUNDING: f64 = 1e-6;
+
+/// Amplitude of a line over that of the strongest of its force, above which the response to it shows.
+pub const STRONG_LINE: f64 = 0.01;

@@ -1,0 +1,87 @@
+//! Bias of an estimate by noise on the response.
+
+use std::fmt::{self, Display, Formatter};
+
+use mechid_model::Parameter;
+
+use super::digits::six_digits;
+use super::finding::{Check, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
+
+/// Difference of an estimate from another that noise on the response does not bias.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Bias {
+    /// Probability that noise alone makes them differ as much if neither is biased.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+    /// The parameter that changes most, in standard errors.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
+    pub parameter: Parameter,
+    /// Value, in the unit of the parameter.
+    pub estimate: f64,
+    /// Value by the other estimator (unit of the parameter).
+    pub unbiased: f64,
+    /// Standard error of `estimate` (unit of the parameter).
+    pub standard_error: f64,
+    /// The other estimator.
+    pub reference: Reference,
+}
+
+/// Estimator that noise on the response does not bias.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Reference {
+    /// Instrumental variables: the samples before and after.
+    NeighbouringSamples,
+    /// Maximum likelihood, one Gauss–Newton step from the estimate.
+    MaximumLikelihood,
+}
+
+impl Check for Bias {
+    fn subject(&self) -> Subject {
+        Subject::Bias
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { p_value, parameter, estimate, unbiased, standard_error, reference } = self;
+        let [value, other] = [six_digits(*estimate), six_digits(*unbiased)];
+        let errors = (unbiased - estimate).abs() / standard_error;
+        if self.verdict() == Verdict::Good {
+            write!(
+                f,
+                "the estimate agrees with {reference} ({p_value}): {parameter} is {other} \
+                 there, {value} here, {errors:.1} standard errors away"
+            )
+        } else {
+            write!(
+                f,
+                "noise on the response biases the estimate ({p_value}): by {reference} \
+                 {parameter} is {other} instead of {value}, {errors:.1} standard errors away; \
+                 prefer maximum likelihood on whole periods"
+            )
+        }
+    }
+}
+
+impl Display for Reference {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Reference::NeighbouringSamples => "instrumental variables (neighbouring samples)",
+            Reference::MaximumLikelihood => "maximum likelihood (first step)",
+        })
+    }
+}

@@ -1,0 +1,67 @@
+//! Channels that an amplifier or a converter cut off.
+
+use std::fmt::{self, Formatter};
+
+use mechid_signal::Record;
+use mechid_signal::clipping;
+use mechid_signal::message;
+
+use super::digits::six_digits;
+use super::finding::{Channel, Check, Finding, Names, Quantity};
+use super::{Subject, Verdict};
+
+/// A channel was cut off by an amplifier or a converter.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Clipping {
+    /// The channel.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub channel: Channel,
+    /// Level at which it is cut off, in the unit of the channel.
+    pub level: f64,
+    /// Number of samples at that level.
+    pub samples: usize,
+}
+
+/// Finds the channels of a record (any unit) that were cut off by an amplifier or a converter, by
+/// [`clipping`] ([`Finding::Clipping`]).
+///
+/// # Source
+/// That of [`clipping`].
+pub fn clipped_channels(quantity: Quantity, record: &Record) -> Vec<Finding> {
+    let one = |index: usize| {
+        let clipped = clipping(record.channel(index))?;
+        let channel = Channel { quantity, index };
+        Some(Finding::Clipping(Clipping {
+            channel,
+            level: clipped.level,
+            samples: clipped.samples,
+        }))
+    };
+    (0..record.channels()).filter_map(one).collect()
+}
+
+impl Check for Clipping {
+    fn subject(&self) -> Subject {
+        Subject::Range
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.samples as f64
+    }
+
+    fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} is clipped at {}: {} at that level, three or more in a row; choose a wider \
+             range of the amplifier or converter and measure again",
+            names.channel(self.channel),
+            six_digits(self.level),
+            message::count(self.samples, "sample")
+        )
+    }
+}

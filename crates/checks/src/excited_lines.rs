@@ -1,0 +1,74 @@
+//! Number of lines that carry force, against the unknowns.
+
+use std::cmp::Ordering;
+use std::fmt::{self, Formatter};
+
+use mechid_estimate::Unknowns;
+use mechid_signal::message;
+use mechid_spectra::FrequencyData;
+
+use super::finding::{Check, Finding, Names};
+use super::limits::EXCITED_LINE;
+use super::{Subject, Verdict};
+
+/// Number of lines that carry force, against the unknowns of an equation of motion.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ExcitedLines {
+    /// Number of lines with force; each makes two real equations.
+    pub lines: usize,
+    /// Number of unknowns in the equation of motion that has most.
+    pub unknowns: usize,
+}
+
+/// Number of unknowns in the equation of motion that has most.
+pub(super) fn unknowns_of_an_equation(unknowns: &Unknowns) -> usize {
+    let free = unknowns.free();
+    let of = |equation| free.iter().filter(|p| p.row() == equation).count();
+    (0..unknowns.dof()).map(of).max().unwrap_or(0)
+}
+
+/// Number of lines that carry force, against the unknowns.
+pub(super) fn excitation(data: &FrequencyData, unknowns: &Unknowns) -> Finding {
+    let force = data.force();
+    let floor: Vec<f64> =
+        force.column_iter().map(|c| EXCITED_LINE * c.map(|f| f.norm()).max()).collect();
+    let excited = |row: &usize| {
+        force.row(*row).iter().zip(&floor).any(|(f, floor)| f.norm() > floor.max(0.0))
+    };
+    let lines = (0..data.len()).filter(excited).count();
+    Finding::ExcitedLines(ExcitedLines { lines, unknowns: unknowns_of_an_equation(unknowns) })
+}
+
+impl Check for ExcitedLines {
+    fn subject(&self) -> Subject {
+        Subject::Excitation
+    }
+
+    fn verdict(&self) -> Verdict {
+        match (2 * self.lines).cmp(&self.unknowns) {
+            Ordering::Less => Verdict::Bad,
+            Ordering::Equal => Verdict::Doubtful,
+            Ordering::Greater => Verdict::Good,
+        }
+    }
+
+    fn value(&self) -> f64 {
+        self.lines as f64
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} with force: {} for {} in each equation of motion",
+            message::count(self.lines, "line"),
+            message::count(2 * self.lines, "equation"),
+            message::count(self.unknowns, "unknown")
+        )?;
+        f.write_str(match self.verdict() {
+            Verdict::Good => "",
+            Verdict::Doubtful => "; no redundancy to estimate the noise",
+            Verdict::Bad => "; excite more lines",
+        })
+    }
+}

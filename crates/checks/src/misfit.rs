@@ -1,0 +1,121 @@
+//! Residual power against the power of the noise.
+
+use std::fmt::{self, Display, Formatter};
+
+use super::digits::{line_hz, listed};
+use super::finding::{Check, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
+
+/// Residual power against the power of the noise.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Misfit {
+    /// Residual power over its expectation for noise alone (pure number).
+    pub ratio: f64,
+    /// Probability that noise alone deviates as much, to either side against periods, above
+    /// against coherence, below against the noise of the force.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+    /// Source of the noise power.
+    pub source: NoiseSource,
+    /// The few lines that hold the power beyond the noise; `None` where it is no such lines.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub concentration: Option<Concentration>,
+}
+
+/// Few lines that hold most of a misfit.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Concentration {
+    /// Frequencies of the lines, in Hz, a list of them rising.
+    pub frequencies_hz: Vec<f64>,
+    /// Fraction of the residual power beyond the noise that goes with them.
+    pub share: f64,
+}
+
+/// Source of the noise power that a residual is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum NoiseSource {
+    /// Scatter of repeated periods.
+    Periods,
+    /// Coherence of averaged frequency responses.
+    Coherence,
+    /// Noise of the force on the lines on which it decides, stated or read above the band that it drives.
+    Force,
+}
+
+impl Check for Misfit {
+    fn subject(&self) -> Subject {
+        Subject::Misfit
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.ratio
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let (verdict, ratio) = (self.verdict(), self.ratio);
+        let times = if ratio < 1e4 { format!("{ratio:.3}") } else { format!("{ratio:.1e}") };
+        let (source, p_value) = (self.source, self.p_value);
+        write!(f, "residual power is {times} × the noise power {source} ({p_value}): ")?;
+        match &self.concentration {
+            Some(few) if verdict > Verdict::Good && ratio > 1.0 => few.sentence(f),
+            _ => f.write_str(self.explanation(verdict)),
+        }
+    }
+}
+
+impl Display for NoiseSource {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoiseSource::Periods => "estimated from the periods",
+            NoiseSource::Coherence => "that follows from the coherence",
+            NoiseSource::Force => "where that of the force decides",
+        })
+    }
+}
+
+impl Concentration {
+    fn sentence(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let hz: Vec<String> = self.frequencies_hz.iter().map(|hz| line_hz(*hz)).collect();
+        let hold = if hz.len() == 1 { "holds" } else { "hold" };
+        let share = (100.0 * self.share).floor();
+        write!(
+            f,
+            "{} Hz {hold} {share} % of the misfit: run-out, mains or another disturbance? Leave out \
+             with `without_hz` {}",
+            listed(&hz),
+            hz.join(",")
+        )
+    }
+}
+
+impl Misfit {
+    fn explanation(&self, verdict: Verdict) -> &'static str {
+        match verdict {
+            Verdict::Good => "consistent with noise",
+            _ if self.ratio < 1.0 && self.source == NoiseSource::Force => {
+                "the noise of the force is less than was taken, which biases the estimate; state it with \
+                 `force_noise`"
+            }
+            _ if self.ratio < 1.0 => {
+                "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \
+                 the standard errors are too large; average frequency responses instead"
+            }
+            _ => {
+                "exceeds the noise: wrong model (nonlinearity, missing degree of freedom, wrong known mass), \
+                 spectral leakage, or a biased estimate; do not rely on the intervals"
+            }
+        }
+    }
+}

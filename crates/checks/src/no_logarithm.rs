@@ -1,0 +1,38 @@
+//! Transition from sample to sample without a real logarithm.
+
+use std::fmt::{self, Formatter};
+
+use super::finding::{Check, Names};
+use super::{Subject, Verdict};
+
+/// The transition from sample to sample has no real logarithm: the step is too long for a mode.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct NoLogarithm {
+    /// Eigenvalue of the transition matrix, zero or negative (pure number).
+    pub eigenvalue: f64,
+}
+
+impl Check for NoLogarithm {
+    fn subject(&self) -> Subject {
+        Subject::Step
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.eigenvalue
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the transition from sample to sample has the eigenvalue {:.3e}, zero or \
+             negative: the sampling interval is too long for a mode, or the data hold mostly noise; \
+             sample faster",
+            self.eigenvalue
+        )
+    }
+}

@@ -1,0 +1,45 @@
+//! Motion that a fit takes for the response to forces that were not measured.
+
+use std::fmt::{self, Formatter};
+
+use super::digits::three_digits;
+use super::finding::{Check, Names};
+use super::limits::UNMEASURED_FORCE;
+use super::{Subject, Verdict};
+
+/// Motion that a fit leaves and takes for the response to forces that were not measured.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct UnmeasuredForce {
+    /// Part of the motion (ratio of RMS values).
+    pub fraction: f64,
+}
+
+impl Check for UnmeasuredForce {
+    fn subject(&self) -> Subject {
+        Subject::Misfit
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.fraction >= UNMEASURED_FORCE { Verdict::Doubtful } else { Verdict::Good }
+    }
+
+    fn value(&self) -> f64 {
+        self.fraction
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let percent = three_digits(100.0 * self.fraction);
+        write!(
+            f,
+            "{percent} % of the motion is taken for the response to forces that were not measured"
+        )?;
+        f.write_str(match self.verdict() {
+            Verdict::Good => "",
+            _ => {
+                ": a nonlinearity under a random force looks like that, and so does a degree of freedom that \
+                 is missing; repeat the test at another level of the force, or with periods that repeat"
+            }
+        })
+    }
+}
