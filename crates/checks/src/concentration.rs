@@ -5,13 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
 use super::limits::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED};
+use super::limits::{LINES_PER_DISTURBED, SAME_LINE};
 use super::misfit::Concentration;
-
-/// Lines beside each one named, of which at most one is.
-const LINES_PER_DISTURBED: usize = 8;
-
-/// Relative difference of frequencies that are the same line of several records.
-const SAME_LINE: f64 = 1e-9;
 
 /// Weighted residual of one record.
 pub(super) struct Part<'a> {

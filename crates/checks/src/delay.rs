@@ -12,6 +12,10 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::finding::{Check, Finding, Names};
+use super::limits::{
+    DELAY_NEAR, DELAY_PARABOLAS, DELAY_PREFERRED, DELAY_PROMISING, DELAY_REACH, DELAY_REDUCTIONS,
+    DELAY_RESOLVED, HARDLY_FOLLOWS, LEAST_PART,
+};
 use super::limits::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
 use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::after_spectral_fit;
@@ -23,33 +27,8 @@ const MAX_DELAY: isize = 16;
 /// The same where a response hardly follows the force: then a longer delay is likely.
 const MAX_LONG_DELAY: isize = 64;
 
-/// Residual power of the equations, over that of their right-hand sides, beyond which it hardly does.
-const HARDLY_FOLLOWS: f64 = 0.25;
-
 /// Steps of the search per sample, of spectra.
 const STEPS_PER_SAMPLE: isize = 2;
-
-/// Reductions of the interval around the best step, each to two thirds.
-const REDUCTIONS: usize = 24;
-
-/// Samples from that delay of the equations of motion within which the one of maximum likelihood begins in the data
-/// without a delay.
-const NEAR: f64 = 0.5;
-
-/// Samples to either side of a delay through whose sums of squares a first parabola is laid.
-const REACH: f64 = 0.25;
-
-/// Parabolas at most, part of the reach of one that the next has at least, and reach, in samples, below which there
-/// is none.
-const PARABOLAS: usize = 8;
-const LEAST_PART: f64 = 0.1;
-const RESOLVED: f64 = 0.005;
-
-/// Part of the residual power that a first parabola leaves at most where nothing else speaks for a delay.
-const PROMISING: f64 = 0.5;
-
-/// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
-const PREFERRED: f64 = 0.99;
 
 /// Finds a delay with which the equation of motion fits the lines far better ([`Finding::Delay`]), by
 /// filters, a scanning converter or a trigger. `dt` is the sampling interval of the record in s; lines
@@ -77,7 +56,7 @@ fn delay_of_equations(equations: &LateForce<'_>, dt: f64, driven: &[usize]) -> O
     let longest = longest(undelayed, driven) * STEPS_PER_SAMPLE;
     let step = best_step(undelayed, longest, |step| power(samples(step)));
     let (mut low, mut high) = (samples(step - 1), samples(step + 1));
-    for _ in 0..REDUCTIONS {
+    for _ in 0..DELAY_REDUCTIONS {
         let third = (high - low) / 3.0;
         if power(low + third)? < power(high - third)? { high -= third } else { low += third }
     }
@@ -106,12 +85,12 @@ pub fn delay_of_open_records(
     let mut likelihood = LateOpenRecord::of(&all, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
     let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
-    if near.abs() > NEAR {
+    if near.abs() > DELAY_NEAR {
         likelihood.search(near * dt)?;
     }
     let (mut samples, mut delayed) = (near, likelihood.cost(near * dt)?);
-    let mut reach = REACH;
-    for _ in 0..PARABOLAS {
+    let mut reach = DELAY_REACH;
+    for _ in 0..DELAY_PARABOLAS {
         let [before, after] = [samples - reach, samples + reach];
         let [before, after] = [likelihood.cost(before * dt)?, likelihood.cost(after * dt)?];
         let (slope, curvature) = (after - before, after - 2.0 * delayed + before);
@@ -122,11 +101,11 @@ pub fn delay_of_open_records(
         };
         samples += step * reach;
         delayed = likelihood.cost(samples * dt)?;
-        if !is_explained && delayed > PROMISING * undelayed {
+        if !is_explained && delayed > DELAY_PROMISING * undelayed {
             return None;
         }
         reach *= f64::clamp(step.abs(), LEAST_PART, 1.0);
-        if reach < RESOLVED {
+        if reach < DELAY_RESOLVED {
             break;
         }
     }
@@ -272,7 +251,7 @@ fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -
     let mut best = (0, undelayed);
     for step in (1..=max).flat_map(|size| [size, -size]) {
         match power(step) {
-            Some(power) if power < PREFERRED * best.1 => best = (step, power),
+            Some(power) if power < DELAY_PREFERRED * best.1 => best = (step, power),
             _ => {}
         }
     }

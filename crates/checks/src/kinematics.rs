@@ -10,10 +10,8 @@ use mechid_signal::Record;
 use super::digits::six_digits;
 use super::finding::{Check, Finding, Names};
 use super::limits::KINEMATIC_GAIN;
+use super::limits::STANDARD_ERRORS;
 use super::{Subject, Verdict};
-
-/// Distance of a gain from 1, in its standard errors, that noise does not reach.
-const STANDARD_ERRORS: f64 = 4.0;
 
 /// Finds the channels of which one response quantity does not change as another predicts
 /// ([`Finding::Kinematics`]): units (mm/s for m/s), interchanged columns or a sign. Checks each pair of

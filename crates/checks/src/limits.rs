@@ -129,3 +129,124 @@ pub const LEVEL_ROUNDING: f64 = 1e-6;
 
 /// Amplitude of a line over that of the strongest of its force, above which the response to it shows.
 pub const STRONG_LINE: f64 = 0.01;
+
+/// Lines beside each one named, of which at most one is.
+pub(crate) const LINES_PER_DISTURBED: usize = 8;
+
+/// Relative difference of frequencies that are the same line of several records.
+pub(crate) const SAME_LINE: f64 = 1e-9;
+
+/// Residual power of the equations, over that of their right-hand sides, beyond which it hardly does.
+pub(crate) const HARDLY_FOLLOWS: f64 = 0.25;
+
+/// Reductions of the interval around the best step, each to two thirds.
+pub(crate) const DELAY_REDUCTIONS: usize = 24;
+
+/// Samples from that delay of the equations of motion within which the one of maximum likelihood begins in the data
+/// without a delay.
+pub(crate) const DELAY_NEAR: f64 = 0.5;
+
+/// Samples to either side of a delay through whose sums of squares a first parabola is laid.
+pub(crate) const DELAY_REACH: f64 = 0.25;
+
+/// Parabolas at most, part of the reach of one that the next has at least, and reach, in samples, below which there
+/// is none.
+pub(crate) const DELAY_PARABOLAS: usize = 8;
+pub(crate) const LEAST_PART: f64 = 0.1;
+pub(crate) const DELAY_RESOLVED: f64 = 0.005;
+
+/// Part of the residual power that a first parabola leaves at most where nothing else speaks for a delay.
+pub(crate) const DELAY_PROMISING: f64 = 0.5;
+
+/// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
+pub(crate) const DELAY_PREFERRED: f64 = 0.99;
+
+/// Distance of a gain from 1, in its standard errors, that noise does not reach.
+pub(crate) const STANDARD_ERRORS: f64 = 4.0;
+
+/// Maximum number of sensitivities, residuals times parameters; of larger fits the errors of the estimate are left in
+/// the residual.
+pub(crate) const LINEARITY_SENSITIVITIES: usize = 1 << 22;
+
+/// Lines to either side over which the spectrum of a residual is averaged.
+pub(crate) const LINEARITY_NEIGHBOURS: usize = 10;
+
+/// Mismatch, over the RMS of the force, beyond which it does not repeat.
+pub(crate) const PERIOD_WORST: f64 = 0.1;
+
+/// Factor between squared mismatches of lags after which the force repeats equally well.
+pub(crate) const PERIOD_ALIKE: f64 = 2.0;
+
+/// Squared mismatch that the rounding of Fourier transforms leaves.
+pub(crate) const PERIOD_ROUNDING: f64 = 1e-12;
+
+/// Maximum number of samples by which a neighbouring period is longer or shorter.
+pub(crate) const PERIOD_NEIGHBOURS: usize = 2;
+
+/// Mismatch, over the RMS of the force, beyond which it does not repeat even with noise on it.
+pub(crate) const PERIOD_REPEATS: f64 = 0.5;
+
+/// Reduction of the squared mismatch, in its own scatter, from which a neighbouring period is better.
+pub(crate) const PERIOD_CLEARLY: f64 = 4.0;
+
+/// Minimum factor between the squared mismatch across an interruption and elsewhere.
+pub(crate) const PERIOD_INTERRUPTED: f64 = 10.0;
+
+/// Number of lines, those with the most power, of which [`STRONGEST_FRACTION`] must take power out.
+pub(crate) const STRONGEST_LINES: usize = 32;
+
+/// Fraction of the strongest lines that must take power out: not even seven lines do by chance.
+pub(crate) const STRONGEST_FRACTION: f64 = 0.9;
+
+/// Amplitude relative to that of the strongest line of a force, below which a line carries no force.
+pub(crate) const FORCE_FLOOR: f64 = 1e-3;
+
+/// Minimum number of samples per unknown.
+pub(crate) const SAMPLES_PER_UNKNOWN: usize = 4;
+
+/// 1 − coherence, below which it is rounding.
+pub(crate) const RESPONSE_ROUNDING: f64 = 1e-10;
+
+/// Maximum number of distances between lines at which residuals are correlated.
+pub(crate) const MAX_DISTANCES: usize = 12;
+
+/// Number of lines over the largest of those distances: beyond, few pairs are left, and their products
+/// are not normally distributed.
+pub(crate) const LINES_PER_DISTANCE: usize = 8;
+
+/// Minimum number of pairs of lines at a distance.
+pub(crate) const RESPONSE_PAIRS: usize = 8;
+
+/// Minimum number of lines per such distance, and per lag of the correlation with a force: more would
+/// leave no direction in which noise and an error of the model differ.
+pub(crate) const LINES_PER_CORRELATION: usize = 8;
+
+/// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
+pub(crate) const FREE_RESIDUALS: f64 = 8.0;
+
+/// Least part of the power that is stated of the response to an unmeasured force that the mean of periods has.
+pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
+
+/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
+/// combination of parameters has no effect.
+pub(crate) const FIT_RANK: f64 = 1e-12;
+
+/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
+pub(crate) const FIT_DECIDES: f64 = 10.0;
+
+/// Loads of the ends of a record that a channel is fitted with.
+pub(crate) const FIT_LOADS: f64 = 6.0;
+
+/// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
+pub(crate) const FIT_STEPS: usize = 8;
+
+/// Residual power that another such step removes, over the variance of a residual, below which there is
+/// none.
+pub(crate) const FIT_SETTLED: f64 = 0.01;
+
+/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
+/// the estimate leaves it.
+pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
+
+/// Likewise, maximum number of products, sensitivities times parameters: some seconds.
+pub(crate) const FIT_PRODUCTS: usize = 1 << 32;

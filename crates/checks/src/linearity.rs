@@ -13,6 +13,7 @@ use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::finding::{Check, Finding, Names};
+use super::limits::{LINEARITY_NEIGHBOURS, LINEARITY_SENSITIVITIES};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
@@ -84,10 +85,6 @@ pub fn linearity_of_open_record(
 /// # Source
 /// Harris (1978), Proceedings of the IEEE 66, 51–83.
 const HANN: [f64; 3] = [1.0, -2.0 / 3.0, 1.0 / 6.0];
-
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the errors of the estimate are left in
-/// the residual.
-const SENSITIVITIES: usize = 1 << 22;
 
 /// A residual and the receptances by which forces are seen in it.
 struct Tested {
@@ -192,7 +189,7 @@ impl Tested {
 /// Changes of the response, in the quantity measured, with each free parameter, channels × lines; `None` of large fits.
 fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatrix<Complex<f64>>>> {
     let (n, unknowns) = (data.dof(), estimate.unknowns());
-    if 2 * n * data.len() * unknowns.independent() > SENSITIVITIES {
+    if 2 * n * data.len() * unknowns.independent() > LINEARITY_SENSITIVITIES {
         return None;
     }
     let values = DVector::from_iterator(
@@ -262,9 +259,6 @@ fn without_linear_part(
     Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
-/// Lines to either side over which the spectrum of a residual is averaged.
-const NEIGHBOURS: usize = 10;
-
 /// Probability that noise with the spectrum of the residual (channels × lines, the sizes of its lines around each) is
 /// correlated as much with the responses, lines of it being correlated among themselves.
 fn p_value(
@@ -298,7 +292,9 @@ fn p_value(
 /// Mean of the values around each.
 fn around(values: &[f64]) -> Vec<f64> {
     let count = values.len();
-    let window = |at: usize| at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(count);
+    let window = |at: usize| {
+        at.saturating_sub(LINEARITY_NEIGHBOURS)..(at + LINEARITY_NEIGHBOURS + 1).min(count)
+    };
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
     (0..count).map(|at| mean(&values[window(at)])).collect()
 }

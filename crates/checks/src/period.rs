@@ -6,25 +6,11 @@ use mechid_signal::Record;
 use mechid_signal::measures::aperiodic_autocorrelation;
 
 use super::finding::{Check, Finding, Names};
+use super::limits::{
+    PERIOD_ALIKE, PERIOD_CLEARLY, PERIOD_INTERRUPTED, PERIOD_NEIGHBOURS, PERIOD_REPEATS,
+    PERIOD_ROUNDING, PERIOD_WORST,
+};
 use super::{Subject, Verdict};
-
-/// Mismatch, over the RMS of the force, beyond which it does not repeat.
-const WORST: f64 = 0.1;
-
-/// Factor between squared mismatches of lags after which the force repeats equally well.
-const ALIKE: f64 = 2.0;
-
-/// Squared mismatch that the rounding of Fourier transforms leaves.
-const ROUNDING: f64 = 1e-12;
-
-/// Maximum number of samples by which a neighbouring period is longer or shorter.
-const NEIGHBOURS: usize = 2;
-
-/// Mismatch, over the RMS of the force, beyond which it does not repeat even with noise on it.
-const REPEATS: f64 = 0.5;
-
-/// Reduction of the squared mismatch, in its own scatter, from which a neighbouring period is better.
-const CLEARLY: f64 = 4.0;
 
 /// Finds out by the force (N), the samples of which are one or several such periods, what is wrong with
 /// a claimed period (in samples); `None` if nothing speaks against it.
@@ -51,16 +37,16 @@ fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     let rms = (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt();
     let size = x.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
-    (rms > ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
+    (rms > PERIOD_ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
 }
 
 /// A period close by after which the force repeats, and clearly better. Mismatches are RMS differences over
 /// √2 times the RMS of the force. The next longer and shorter periods must be worse: if not, the true one is
 /// further away.
 fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
-    let longest = period + NEIGHBOURS + 1;
+    let longest = period + PERIOD_NEIGHBOURS + 1;
     let pairs = channels[0].len().checked_sub(longest)?;
-    if period <= NEIGHBOURS + 1 || pairs < period / 2 {
+    if period <= PERIOD_NEIGHBOURS + 1 || pairs < period / 2 {
         return None;
     }
     let differences = |lag: usize| -> Vec<f64> {
@@ -71,27 +57,24 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     };
     let sum = |squares: &[f64]| squares.iter().sum::<f64>();
     let claimed = differences(period);
-    let (found, best) = (period - NEIGHBOURS - 1..=longest)
+    let (found, best) = (period - PERIOD_NEIGHBOURS - 1..=longest)
         .map(|lag| (lag, differences(lag)))
         .min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1)))?;
-    if found.abs_diff(period) > NEIGHBOURS {
+    if found.abs_diff(period) > PERIOD_NEIGHBOURS {
         return None;
     }
     let gain: Vec<f64> = claimed.iter().zip(&best).map(|(a, b)| a - b).collect();
     let scatter = gain.iter().map(|g| g * g).sum::<f64>().sqrt();
     let share = |squares: &[f64]| (0.5 * sum(squares) / squares.len() as f64).sqrt();
-    let clear = share(&best) <= REPEATS
-        && share(&claimed) > ROUNDING.sqrt()
-        && sum(&gain) > CLEARLY * scatter;
+    let clear = share(&best) <= PERIOD_REPEATS
+        && share(&claimed) > PERIOD_ROUNDING.sqrt()
+        && sum(&gain) > PERIOD_CLEARLY * scatter;
     clear.then(|| PeriodFault::Neighbour {
         period: found,
         mismatch: share(&best),
         claimed_mismatch: share(&claimed),
     })
 }
-
-/// Minimum factor between the squared mismatch across an interruption and elsewhere.
-const INTERRUPTED: f64 = 10.0;
 
 /// The first sample that does not follow from the one a claimed period before, if that holds of one
 /// stretch of a period at most and of no other. The mismatch is the RMS difference of the others over
@@ -118,11 +101,13 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     // Summed anew: the difference of large sums is rounding.
     let others: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
     let others = others / (pairs - period) as f64;
-    if within(worst) <= WORST * WORST || others > (WORST * WORST).min(within(worst) / INTERRUPTED) {
+    if within(worst) <= PERIOD_WORST * PERIOD_WORST
+        || others > (PERIOD_WORST * PERIOD_WORST).min(within(worst) / PERIOD_INTERRUPTED)
+    {
         return None;
     }
     // A single sample may be like the one a period before by chance, or unlike it by noise.
-    let off = others.max(within(worst) / INTERRUPTED);
+    let off = others.max(within(worst) / PERIOD_INTERRUPTED);
     let first = (worst..worst + period).find(|k| squares[*k] > off)?;
     Some(PeriodFault::Interruption { sample: first + period, mismatch: others.sqrt() })
 }
@@ -132,17 +117,17 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
 fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let squares = squared_mismatches(channels);
     // Behind the lags at which a slow force resembles itself.
-    let apart = (1..squares.len()).find(|lag| squares[*lag] > WORST * WORST)?;
+    let apart = (1..squares.len()).find(|lag| squares[*lag] > PERIOD_WORST * PERIOD_WORST)?;
     let best = squares[apart..].iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-    let alike = |lag: &usize| squares[*lag] <= ALIKE * best + ROUNDING;
-    if best > WORST * WORST || squares.get(period).is_some_and(|_| alike(&period)) {
+    let alike = |lag: &usize| squares[*lag] <= PERIOD_ALIKE * best + PERIOD_ROUNDING;
+    if best > PERIOD_WORST * PERIOD_WORST || squares.get(period).is_some_and(|_| alike(&period)) {
         return None;
     }
     let first = (apart..squares.len()).find(alike)?;
     let around = (first..squares.len()).take_while(alike);
     let nearest = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
     // What wanders slowly repeats better after several periods.
-    let repeats = squares.get(period).is_some_and(|square| *square <= WORST * WORST);
+    let repeats = squares.get(period).is_some_and(|square| *square <= PERIOD_WORST * PERIOD_WORST);
     if repeats && nearest % period == 0 {
         return None;
     }

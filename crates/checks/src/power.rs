@@ -9,16 +9,8 @@ use mechid_signal::{Record, Spectrum};
 
 use super::finding::{Check, Finding, Names};
 use super::limits::POWER_TAKEN_OUT;
+use super::limits::{FORCE_FLOOR, STRONGEST_FRACTION, STRONGEST_LINES};
 use super::{Subject, Verdict};
-
-/// Number of lines, those with the most power, of which [`STRONGEST_FRACTION`] must take power out.
-const STRONGEST_LINES: usize = 32;
-
-/// Fraction of the strongest lines that must take power out: not even seven lines do by chance.
-const STRONGEST_FRACTION: f64 = 0.9;
-
-/// Amplitude relative to that of the strongest line of a force, below which a line carries no force.
-const FORCE_FLOOR: f64 = 1e-3;
 
 /// Finds forces (N) that take power out of the machine, line by line and in the mean
 /// ([`Finding::PowerFlow`]): then they are not what drives it. Force and response have one channel per

@@ -12,11 +12,9 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::MAX_SAMPLES;
 use super::bias::{Bias, Reference};
 use super::finding::Finding;
+use super::limits::SAMPLES_PER_UNKNOWN;
 use super::limits::{LAGS, ROUNDING, SIGNIFICANCE};
 use super::p_value::PValue;
-
-/// Minimum number of samples per unknown.
-const SAMPLES_PER_UNKNOWN: usize = 4;
 
 /// Tests whether the response one sample before and after explains the residual of the equation of
 /// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)

@@ -7,22 +7,10 @@ use mechid_spectra::frf::Frf;
 use nalgebra::{Complex, DMatrix};
 
 use super::finding::Finding;
+use super::limits::{LINES_PER_DISTANCE, MAX_DISTANCES, RESPONSE_PAIRS, RESPONSE_ROUNDING};
 use super::misfit::{Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
 use super::whiteness::{Residual, Whiteness};
-
-/// 1 − coherence, below which it is rounding.
-const ROUNDING: f64 = 1e-10;
-
-/// Maximum number of distances between lines at which residuals are correlated.
-const DISTANCES: usize = 12;
-
-/// Number of lines over the largest of those distances: beyond, few pairs are left, and their products
-/// are not normally distributed.
-const LINES_PER_DISTANCE: usize = 8;
-
-/// Minimum number of pairs of lines at a distance.
-const PAIRS: usize = 8;
 
 /// Tests whether the residual of an estimate on frequency responses has the power that follows from
 /// their coherence ([`Finding::Misfit`]), and whether it is correlated from line to line beyond the
@@ -50,7 +38,7 @@ pub fn after_response_fit(
     let data = frf.data(force_dof)?;
     let mut coherence: Vec<f64> = frf.coherence().iter().copied().collect();
     coherence.sort_by(f64::total_cmp);
-    if 1.0 - coherence[coherence.len() / 2] < ROUNDING {
+    if 1.0 - coherence[coherence.len() / 2] < RESPONSE_ROUNDING {
         return Ok(Vec::new());
     }
     let Some(residual) = in_units_of_noise(&data, estimate) else { return Ok(Vec::new()) };
@@ -139,8 +127,8 @@ impl<'a> Series<'a> {
     fn line_to_line(&self, residual: &[Complex<f64>]) -> Option<(Correlation, usize)> {
         let (count, first) = (residual.len() as f64, self.correlation.len());
         let distances: Vec<usize> = (first..self.lines.len() / LINES_PER_DISTANCE)
-            .filter(|distance| self.pairs(*distance).count() >= PAIRS)
-            .take(DISTANCES)
+            .filter(|distance| self.pairs(*distance).count() >= RESPONSE_PAIRS)
+            .take(MAX_DISTANCES)
             .collect();
         if distances.is_empty() {
             return None;

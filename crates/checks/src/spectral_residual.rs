@@ -11,22 +11,10 @@ use super::concentration::Part;
 use super::cross_correlation::CrossCorrelation;
 use super::finding::Finding;
 use super::limits::LAGS;
+use super::limits::{FREE_RESIDUALS, LINES_PER_CORRELATION, MAX_DISTANCES, SPECTRAL_LEAKED};
 use super::misfit::{Concentration, Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
 use super::whiteness::{Residual, Whiteness};
-
-/// Maximum distance of lines, counted in lines of the fit, at which residuals are correlated.
-const DISTANCES: usize = 12;
-
-/// Minimum number of lines per such distance, and per lag of the correlation with a force: more would
-/// leave no direction in which noise and an error of the model differ.
-const LINES_PER_CORRELATION: usize = 8;
-
-/// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
-pub(super) const FREE_RESIDUALS: f64 = 8.0;
-
-/// Least part of the power that is stated of the response to an unmeasured force that the mean of periods has.
-const LEAKED: f64 = 0.5;
 
 /// Residual of one record of a fit of spectra, in units of its noise.
 #[derive(Debug, Clone)]
@@ -209,7 +197,7 @@ impl SpectralResidual {
         // Too little is no noise, either: then the periods differ by more than noise.
         let below = match &self.with_ends {
             // The noise of few periods also has what an unmeasured force leaves at the ends of each.
-            Some(_) if power > LEAKED * mean => 1.0,
+            Some(_) if power > SPECTRAL_LEAKED * mean => 1.0,
             _ => 1.0 - above,
         };
         let above = match &self.with_ends {
@@ -251,7 +239,7 @@ impl SpectralResidual {
     pub fn line_to_line(&self, channel: usize) -> Option<Correlation> {
         let rows: Vec<usize> =
             self.ascending().into_iter().map(|line| self.row(line, channel)).collect();
-        let last = DISTANCES.min(rows.len() / LINES_PER_CORRELATION);
+        let last = MAX_DISTANCES.min(rows.len() / LINES_PER_CORRELATION);
         if last == 0 {
             return None;
         }

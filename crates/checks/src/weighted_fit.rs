@@ -17,32 +17,12 @@ use super::bias::{Bias, Reference};
 use super::concentration::{Part, concentration};
 use super::finding::Finding;
 use super::limits::ROUNDING;
+use super::limits::{
+    FIT_DECIDES, FIT_LOADS, FIT_PRODUCTS, FIT_RANK, FIT_SETTLED, FIT_STEPS, FREE_RESIDUALS,
+    MAX_SENSITIVITIES,
+};
 use super::p_value::PValue;
-use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
-
-/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
-/// combination of parameters has no effect.
-const RANK: f64 = 1e-12;
-
-/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
-const DECIDES: f64 = 10.0;
-
-/// Loads of the ends of a record that a channel is fitted with.
-const LOADS: f64 = 6.0;
-
-/// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
-const STEPS: usize = 8;
-
-/// Residual power that another such step removes, over the variance of a residual, below which there is
-/// none.
-const SETTLED: f64 = 0.01;
-
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
-/// the estimate leaves it.
-const SENSITIVITIES: usize = 1 << 24;
-
-/// Likewise, maximum number of products, sensitivities times parameters: some seconds.
-const PRODUCTS: usize = 1 << 32;
+use super::spectral_residual::SpectralResidual;
 
 /// Result of the tests after a fit of spectra.
 #[derive(Debug, Clone)]
@@ -156,7 +136,8 @@ impl WeightedFit {
         };
         let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
         let sensitivities = rows * start.len();
-        let small = sensitivities <= SENSITIVITIES && sensitivities * start.len() <= PRODUCTS;
+        let small =
+            sensitivities <= MAX_SENSITIVITIES && sensitivities * start.len() <= FIT_PRODUCTS;
         let entries_of = |values: &DVector<f64>| match &relations {
             None => values.clone(),
             Some(relations) => relations.entries(values.as_slice()),
@@ -182,9 +163,9 @@ impl WeightedFit {
         };
         let mut values = start;
         let mut linear = linearised(&values)?;
-        for _ in 0..STEPS {
+        for _ in 0..FIT_STEPS {
             let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
-            if linear.coefficients.norm_squared() <= SETTLED * unit {
+            if linear.coefficients.norm_squared() <= FIT_SETTLED * unit {
                 break;
             }
             // Half a step where a whole one goes too far.
@@ -207,7 +188,7 @@ impl WeightedFit {
             let jumps: Vec<FrequencyData> = match extent {
                 Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
                 Extent::WholePeriod if has_unmeasured_force(record) => {
-                    let loads = |dof| (0..LOADS as usize).map(move |power| (dof, power));
+                    let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
                     channels
                         .flat_map(loads)
                         .map(|(dof, power)| record.of_load(dof, power))
@@ -348,10 +329,10 @@ fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)
     }
     let residuals = residuals(std::slice::from_ref(data), estimate)?;
     let channels = residuals.len() as f64;
-    let fitted = estimate.parameters().len() as f64 / channels + LOADS;
+    let fitted = estimate.parameters().len() as f64 / channels + FIT_LOADS;
     let of_channel = |pairs: Vec<(f64, f64)>| {
         let own = motion_level(pairs.iter().copied()).powi(2);
-        let decided = pairs.iter().filter(|(_, known)| *known > DECIDES * own);
+        let decided = pairs.iter().filter(|(_, known)| *known > FIT_DECIDES * own);
         let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
             (count + 1.0, over + power / (own + known))
         });
@@ -413,7 +394,7 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
     }
     // Without dependent parameters the triangle alone tells, in a fraction of the time.
     if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
-        && r.norm() * inverse.norm() * RANK < 1.0
+        && r.norm() * inverse.norm() * FIT_RANK < 1.0
     {
         let mut basis = inverse;
         basis.column_iter_mut().for_each(|mut column| column.component_div_assign(&scale));
@@ -422,7 +403,7 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
     let svd = svd(r).ok()?;
     let (singular, v_t) = (&svd.singular_values, svd.v_t.as_ref()?);
     let kept: Vec<usize> =
-        (0..parameters).filter(|at| singular[*at] > RANK * singular.max()).collect();
+        (0..parameters).filter(|at| singular[*at] > FIT_RANK * singular.max()).collect();
     Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
         v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
     }))
@@ -446,7 +427,7 @@ fn without(
             column -= &explained * explained.tr_mul(&column);
         }
         let left = column.norm();
-        if left > RANK.sqrt() {
+        if left > FIT_RANK.sqrt() {
             column.unscale_mut(left);
             values.axpy(-column.dot(&values), &column, 1.0);
             let at = explained.ncols();

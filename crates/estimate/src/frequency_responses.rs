@@ -6,16 +6,9 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::frequency_domain::{OutputErrorFit, Whitened, output_error};
+use crate::limits::{MAX_SENSITIVITIES, SHARPENING_ROUNDS, SHARPENING_SETTLED};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
-
-/// Rounds of sharpening at most; each takes most of what is left of the bias.
-const ROUNDS: usize = 20;
-/// Step, in standard errors of the parameters, below which nothing is left.
-const SETTLED: f64 = 0.02;
-/// Maximum number of sensitivities, residuals times parameters; of larger fits errors of lines are taken as
-/// independent, and the responses as they are.
-const SENSITIVITIES: usize = 1 << 22;
 
 /// An estimate from averaged frequency responses.
 #[derive(Debug, Clone)]
@@ -56,7 +49,7 @@ pub fn output_error_of_responses(
     let count = unknowns.independent();
     let plain = |fit| ResponseEstimate { fit, responses: raw.clone(), blunted: 0.0, settled: true };
     if records.iter().any(|(frf, _)| !frf.has_error_covariance())
-        || 2 * data.dof() * data.len() * count > SENSITIVITIES
+        || 2 * data.dof() * data.len() * count > MAX_SENSITIVITIES
     {
         return Ok(plain(fit));
     }
@@ -79,7 +72,7 @@ pub fn output_error_of_responses(
     if raw.iter().any(Frf::is_smoothed) {
         settled = false;
         let first = theta.clone();
-        for _ in 0..ROUNDS {
+        for _ in 0..SHARPENING_ROUNDS {
             let system = match unknowns.assemble(entries(&theta).as_slice()) {
                 [m, c, k] => mechid_model::SecondOrderSystem::new(m, c, k)?,
             };
@@ -98,7 +91,7 @@ pub fn output_error_of_responses(
             }
             theta += step;
             blunted = in_errors(&so_far);
-            if length <= SETTLED {
+            if length <= SHARPENING_SETTLED {
                 settled = true;
                 break;
             }

@@ -32,6 +32,7 @@ mod estimate;
 pub mod frequency_domain;
 mod frequency_responses;
 pub mod likelihood;
+mod limits;
 mod modal;
 mod prediction;
 mod related_equations;

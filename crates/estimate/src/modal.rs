@@ -8,6 +8,7 @@ use mechid_numerics::{NumericsError, Uncertain};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::covariance::Covariance;
+use crate::limits::{RIGID_BODY_LEVEL, SAME_SHAPE};
 use crate::{Estimate, EstimateError};
 
 /// A mode of an identified machine.
@@ -130,12 +131,6 @@ fn modes(
     };
     Ok(partners.iter().enumerate().map(identify).collect())
 }
-
-/// Least modal assurance criterion of real eigenvalues that belong together where there are several pairs.
-const SAME_SHAPE: f64 = 0.9;
-
-/// Level of the interval by which a mode is one of a rigid body.
-const RIGID_BODY_LEVEL: f64 = 0.99;
 
 /// Pairs the real eigenvalues of overdamped modes: the only two there are, otherwise those whose shapes
 /// agree best, as proportional damping makes them do exactly.

@@ -9,17 +9,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::covariance::Covariance;
 use crate::equation_of_motion::only_ratios;
 use crate::estimate::EstimateParts;
+use crate::limits::{EQUATION_ROUNDING, RELATED_SETTLED, RELATED_STEPS, ROWS_PER_EQUATION};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
-
-/// Steps of the search for proportional damping, the only relation that is not linear.
-const STEPS: usize = 100;
-/// Change of the unknowns, in their scale, that ends the search.
-const SETTLED: f64 = 1e-12;
-/// Residual of an equation over its force that is rounding.
-const ROUNDING: f64 = 1e-11;
-/// Rows per equation from which the residuals show how the equations are correlated.
-const ROWS_PER_EQUATION: usize = 10;
 
 /// All equations of motion, compressed to rows of the same Gram matrix.
 pub(crate) struct RelatedEquations<'a> {
@@ -79,7 +71,7 @@ impl RelatedEquations<'_> {
             (self.residuals(free, &theta) * weights.transpose()).norm_squared()
         };
         let mut before = cost(&unknowns);
-        for _ in 0..STEPS {
+        for _ in 0..RELATED_STEPS {
             let solution = self.step(free, relations, &unknowns, weights)?;
             let step = solution.coefficients.column(0);
             if !step.iter().all(|value| value.is_finite()) {
@@ -88,7 +80,7 @@ impl RelatedEquations<'_> {
             // In units of what the data tell of each unknown.
             let scale = solution.unscaled_covariance.diagonal().map(f64::sqrt);
             let size = unknowns.component_div(&scale).norm();
-            let settled = step.component_div(&scale).norm() <= SETTLED * size;
+            let settled = step.component_div(&scale).norm() <= RELATED_SETTLED * size;
             let lower = [1.0, 0.5, 0.25, 0.125].into_iter().find_map(|part| {
                 let next = &unknowns + step * part;
                 let lower = cost(&next);
@@ -103,7 +95,7 @@ impl RelatedEquations<'_> {
                 return Ok(Fit { unknowns, solution });
             }
         }
-        Err(EstimateError::NotConverged { searches: 1, steps: STEPS })
+        Err(EstimateError::NotConverged { searches: 1, steps: RELATED_STEPS })
     }
 
     /// Change of the independent unknowns to the least squares of the weighted equations, linearised.
@@ -160,7 +152,7 @@ impl RelatedEquations<'_> {
         let size = self.targets.norm();
         let mut covariance = residuals.tr_mul(residuals);
         // An equation that fits exactly must not take all the weight.
-        let floor = (ROUNDING * size).powi(2);
+        let floor = (EQUATION_ROUNDING * size).powi(2);
         if covariance.diagonal().max() <= floor {
             return None;
         }

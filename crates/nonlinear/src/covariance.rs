@@ -4,21 +4,12 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::grid::Grid;
-
-/// Blocks of one experiment, at most.
-const MOST: usize = 32;
-
-/// Blocks of all experiments from which their scatter is trusted.
-pub(super) const FEWEST: usize = 10;
-
-/// Time constants of the free response that a block is long, at least: scores of neighbouring blocks
-/// are then nearly independent.
-const TIME_CONSTANTS: f64 = 3.0;
+use crate::limits::{COVARIANCE_MOST, TIME_CONSTANTS};
 
 /// Blocks for an experiment of this duration (s), whose slowest free response decays at `rate` (1/s).
 pub(super) fn block_count(duration: f64, rate: f64) -> usize {
     match duration * rate / TIME_CONSTANTS {
-        blocks if blocks.is_finite() => (blocks as usize).clamp(1, MOST),
+        blocks if blocks.is_finite() => (blocks as usize).clamp(1, COVARIANCE_MOST),
         _ => 1,
     }
 }

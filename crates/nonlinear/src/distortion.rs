@@ -14,6 +14,7 @@ use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
 use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
+use crate::limits::{DISTORTION_DRIVEN, DISTORTION_PAIRS, DISTORTION_SIGNIFICANT};
 
 /// Response on lines without force, against that on lines with force.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,16 +67,6 @@ const KINDS: [(Option<[u32; 2]>, &str); 4] = [
     (Some([0, 3]), "cubic damping"),
 ];
 
-/// Part of the largest amplitude of the force from which a line counts as driven: mains hum in the
-/// channel of the force does not.
-const DRIVEN: f64 = 0.03;
-
-/// Probability below which a kind is named.
-const SIGNIFICANT: f64 = 1e-3;
-
-/// Degrees of freedom up to which terms between any two of them are looked for.
-const PAIRS: usize = 4;
-
 /// Looks for even and odd distortion, and for the one term that explains most of what a linear model
 /// leaves, in whole periods of force (N) and response of one or several experiments at the lines of a band.
 ///
@@ -125,7 +116,7 @@ fn levels(
     measured: ResponseQuantity,
 ) -> Result<[Option<Level>; 2], EstimateError> {
     let mean = force.period_mean(lines.sampling().len())?;
-    let driven = Lines::excited(&mean, DRIVEN)?.as_slice().to_vec();
+    let driven = Lines::excited(&mean, DISTORTION_DRIVEN)?.as_slice().to_vec();
     let odd_only = !driven.is_empty() && driven.iter().all(|line| line % 2 == 1);
     let free = |parity: usize| -> Vec<usize> {
         let chosen = lines.as_slice().iter().filter(|n| **n % 2 == parity && !driven.contains(n));
@@ -260,7 +251,7 @@ fn candidates(dof: usize) -> Result<(Terms, Vec<String>), EstimateError> {
     let single = (0..dof).map(Coordinate::Dof);
     let pairs = (0..dof).flat_map(|i| (i + 1..dof).map(move |j| Coordinate::Difference(i, j)));
     let (mut terms, mut names) = (Vec::new(), Vec::new());
-    for place in single.chain(pairs.filter(|_| dof <= PAIRS)) {
+    for place in single.chain(pairs.filter(|_| dof <= DISTORTION_PAIRS)) {
         for (exponents, name) in KINDS {
             let coefficient = format!("t_{}", terms.len() + 1);
             terms.push(match exponents {
@@ -280,7 +271,7 @@ impl Distortion {
     /// The kind of term that a linear model lacks most; `None` if what it leaves is consistent with
     /// noise.
     pub fn kind(&self) -> Option<&Kind> {
-        self.kinds.first().filter(|kind| kind.p_value < SIGNIFICANT)
+        self.kinds.first().filter(|kind| kind.p_value < DISTORTION_SIGNIFICANT)
     }
 }
 

@@ -10,13 +10,14 @@ use mechid_signal::message;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::SteadyExperiments;
-use super::covariance::{BlockScores, FEWEST, InTime, block_count, in_time};
+use super::covariance::{BlockScores, InTime, block_count, in_time};
 use super::equations::Equations;
 use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 use super::experiments::Columns;
 use super::grid::Grid;
 use super::shape::{Shape, ShapeConstants, fit_shape};
 use super::weighting::{Weighting, Weights};
+use crate::limits::{FEWEST, WEIGHTING_ROUNDS, WEIGHTING_SETTLED};
 
 /// Settings of [`equation_error`]: weighting of the rows, and constants to search for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,12 +27,6 @@ pub struct EquationErrorOptions {
     /// Constants that do not enter linearly, none by default.
     pub shape: ShapeConstants,
 }
-
-/// Rounds of weighting, at most.
-const ROUNDS: usize = 12;
-
-/// Change of the weights, relative, below which another round is useless.
-const SETTLED: f64 = 1e-3;
 
 /// Least squares on −ω²M X + iωC X + K X + Σ θ F{f(q, q̇)} = F over the lines of steady periods.
 ///
@@ -71,11 +66,11 @@ pub fn equation_error(
     let mut shape = Shape::new(terms, options.shape);
     let mut fit = weighted(&equations, &shape, options.weighting, None)?;
     if shape.count() > 0 {
-        for _ in 0..ROUNDS {
+        for _ in 0..WEIGHTING_ROUNDS {
             let before = fit.weights.of_rows.clone();
             shape = fit_shape(&equations, shape, &fit.weights.of_rows)?;
             fit = weighted(&equations, &shape, options.weighting, Some(fit.weights))?;
-            if settled(&before, &fit.weights.of_rows, 10.0 * SETTLED) {
+            if settled(&before, &fit.weights.of_rows, 10.0 * WEIGHTING_SETTLED) {
                 break;
             }
         }
@@ -107,7 +102,8 @@ pub(super) fn weighted(
         let coefficients: Vec<f64> = solution.coefficients.column(0).iter().copied().collect();
         let residuals = equations.residuals(&columns, &coefficients);
         let next = Weights::from_residuals(equations, &residuals, &coefficients, weighting);
-        if round == ROUNDS || settled(&weights.of_rows, &next.of_rows, SETTLED) {
+        if round == WEIGHTING_ROUNDS || settled(&weights.of_rows, &next.of_rows, WEIGHTING_SETTLED)
+        {
             let nrmse = nrmse(equations, &columns, &residuals);
             let condition = solution.condition;
             return Ok(Fit { columns, coefficients, weights: next, nrmse, condition });

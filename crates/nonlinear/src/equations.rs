@@ -8,9 +8,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::experiments::Columns;
 use super::{ChannelPhase, SteadyExperiments};
-
-/// Lines whose rows are handed to the least squares at a time.
-const CHUNK: usize = 256;
+use crate::limits::EQUATIONS_CHUNK;
 
 /// A coefficient of the equations: an entry of M, C or K, or that of a term.
 #[derive(Clone, Copy)]
@@ -162,8 +160,8 @@ impl<'a> Equations<'a> {
         extra: &[DMatrix<Complex<f64>>],
     ) -> Result<(), EstimateError> {
         let n = self.data.dof();
-        for start in (0..self.rows.len()).step_by(CHUNK) {
-            let len = CHUNK.min(self.rows.len() - start);
+        for start in (0..self.rows.len()).step_by(EQUATIONS_CHUNK) {
+            let len = EQUATIONS_CHUNK.min(self.rows.len() - start);
             let mut regressors = DMatrix::zeros(2 * len * n, self.count());
             let mut targets = DMatrix::zeros(2 * len * n, 1 + extra.len());
             for (dof, coefficients) in self.coefficients.iter().enumerate() {

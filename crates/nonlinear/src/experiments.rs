@@ -11,10 +11,7 @@ use rayon::prelude::*;
 use super::ChannelPhase;
 use super::channel_phase::displacement_lines;
 use super::grid::Grid;
-
-/// Samples of the grid that nonlinear terms are evaluated on, per sample: products of up to seven
-/// lines of the record do not fold back onto it.
-const FINER: usize = 4;
+use crate::limits::EXPERIMENT_FINER;
 
 /// Forces and responses in the steady state under periodic excitation, one mean period of each
 /// experiment.
@@ -56,7 +53,7 @@ impl SteadyExperiments {
         let mut rising = lines.as_slice().to_vec();
         rising.sort_unstable();
         rising.dedup();
-        let grid = Grid::new(period.len().div_ceil(2), FINER * period.len());
+        let grid = Grid::new(period.len().div_ceil(2), EXPERIMENT_FINER * period.len());
         Self { lines: rising, period, dof, measured, grid, steady: Vec::new() }
     }
 
@@ -130,7 +127,7 @@ impl SteadyExperiments {
         };
         let signals = self.signals(steady, &corrections, terms);
         let mut of_terms = DMatrix::zeros(rows.len(), terms.len());
-        let samples = FINER * self.period.len();
+        let samples = EXPERIMENT_FINER * self.period.len();
         for (term, mut column) in terms.iter().zip(of_terms.column_iter_mut()) {
             let mut values = vec![0.0; samples];
             let (mut x, mut v) = (vec![0.0; self.dof], vec![0.0; self.dof]);
@@ -207,7 +204,7 @@ impl SteadyExperiments {
         for steady in &self.steady {
             let signals = self.signals(steady, &corrections, terms);
             for (term, range) in terms.iter().zip(&mut ranges) {
-                for k in 0..FINER * self.period.len() {
+                for k in 0..EXPERIMENT_FINER * self.period.len() {
                     for (kind, largest) in range.iter_mut().enumerate() {
                         let of = |dof: usize| signals[dof].as_ref().map_or(0.0, |s| s[kind][k]);
                         let sum = (0..self.dof).map(|dof| term.coordinate().sign(dof) * of(dof));

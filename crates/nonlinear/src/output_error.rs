@@ -12,12 +12,13 @@ use mechid_signal::{Extent, Record, message};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::covariance::{BlockScores, FEWEST, InTime, block_count};
+use super::covariance::{BlockScores, InTime, block_count};
 use super::equation_error::slowest_decay;
 use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 use super::limits::SEARCH_STEPS;
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
+use crate::limits::{FEWEST, OUTPUT_FORGOTTEN};
 
 /// A record for [`output_error`].
 #[derive(Debug, Clone)]
@@ -42,9 +43,6 @@ pub struct NonlinearFit {
     /// Gauss–Newton steps taken.
     pub steps: usize,
 }
-
-/// Time constants of the slowest mode after which the start shows no longer.
-const FORGOTTEN: f64 = 8.0;
 
 /// Least squares on the measured less the simulated response: free entries of M, C and K, the
 /// coefficients of the terms, the constants inside their laws, and the state each record starts from.
@@ -208,7 +206,7 @@ impl<'a> Problem<'a> {
                 .map(|constant| constant.value),
         );
         let state = |record: &Prepared| {
-            let samples = FORGOTTEN / (rate * record.response.sampling().dt());
+            let samples = OUTPUT_FORGOTTEN / (rate * record.response.sampling().dt());
             let len = (samples.min(1e9) as usize).clamp(16, record.response.len().max(16));
             let len = len.min(record.response.len());
             let (force, response) = (record.plain.window(0, len)?, record.response.window(0, len)?);

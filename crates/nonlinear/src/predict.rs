@@ -9,12 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::limits::SEARCH_STEPS;
 use super::simulate::{Course, Direction, FineForce, Tangent};
-
-/// Newton steps towards a periodic response, at most.
-const SHOTS: usize = 30;
-
-/// Change of the state over a period, relative, that counts as none.
-const CLOSED: f64 = 1e-10;
+use crate::limits::{PREDICTION_CLOSED, PREDICTION_SHOTS};
 
 /// Displacement, velocity and acceleration of a nonlinear system under a sampled force (N), from
 /// `start` for an open record, in a steady state for a whole period (the search for it begins at
@@ -74,12 +69,12 @@ fn steady_start(
         2 * n,
         start.displacement().iter().chain(start.velocity().iter()).copied(),
     );
-    for _ in 0..SHOTS {
+    for _ in 0..PREDICTION_SHOTS {
         let Some(course) = tangent.run(fine, &initial(&state)?) else { return Err(none) };
         let end = DVector::from_column_slice(&course.end[..2 * n]);
         let gap = &end - &state;
         let size = course.state.amax();
-        if gap.amax() <= CLOSED * size || size == 0.0 {
+        if gap.amax() <= PREDICTION_CLOSED * size || size == 0.0 {
             return initial(&end);
         }
         let over = DMatrix::from_column_slice(2 * n, 2 * n, &course.end[2 * n..]);

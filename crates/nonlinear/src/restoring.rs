@@ -9,6 +9,7 @@ use super::SteadyExperiments;
 use super::equations::{Equations, power};
 use super::estimate::NonlinearEstimate;
 use super::grid::Grid;
+use crate::limits::{HIGHEST_ORDER, RESTORING_NEGLIGIBLE, RESTORING_POOR};
 
 /// Points of the restoring-force surface: the measured force less that of the masses, over
 /// displacement and velocity. All records are samples of one period × degrees of freedom.
@@ -44,25 +45,16 @@ pub struct Extrapolation {
 /// (pure number).
 pub const REACH: f64 = 1.5;
 
-/// Power above which a term grows faster than data of one amplitude can vouch for.
-const HIGHEST_ORDER: f64 = 3.5;
-
-/// Relative standard error of the restoring force above which its extrapolation is poor.
-const POOR: f64 = 0.1;
-
-/// Part of the restoring force below which the growth of a term does not matter.
-const NEGLIGIBLE: f64 = 0.01;
-
 impl Extrapolation {
     /// Returns true if the restoring force is poorly known beyond the data: its standard error exceeds 10 % there,
     /// or a term of fourth or higher order makes more than 1 % of it.
     pub fn is_poor(&self) -> bool {
-        self.relative_error[1] > POOR || self.grows_fast()
+        self.relative_error[1] > RESTORING_POOR || self.grows_fast()
     }
 
     /// Returns true if the term is of fourth or higher order and makes more than 1 % of the force there.
     pub fn grows_fast(&self) -> bool {
-        self.order > HIGHEST_ORDER && self.share[1].abs() > NEGLIGIBLE
+        self.order > HIGHEST_ORDER && self.share[1].abs() > RESTORING_NEGLIGIBLE
     }
 }
 

@@ -10,6 +10,7 @@ use super::equation_error::{EquationErrorOptions, equation_error, weighted};
 use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
 use super::{SteadyExperiments, Weighting};
+use crate::limits::{SELECTION_LEVEL, SELECTION_ZERO};
 
 /// Criterion by which a term is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,12 +62,6 @@ pub struct SelectionStep {
     /// Part of the weighted force, a ratio, that is left with it.
     pub unexplained: f64,
 }
-
-/// Level of the test on experiments held out.
-const LEVEL: f64 = 0.05;
-
-/// Level of the test on a coefficient.
-const ZERO: f64 = 0.01;
 
 /// Adds to the terms given, one after the other, the candidate that lowers the equation error most, as
 /// long as the criterion finds it worth it, and removes those that turn out to be uncertain
@@ -164,7 +159,7 @@ fn uncertain(
     let mut least: Option<(f64, String)> = None;
     for term in terms.iter().filter(is_candidate) {
         let estimate = fit.parameter(term.name())?.estimate;
-        let [low, high] = estimate.interval(1.0 - ZERO / candidates.len() as f64)?;
+        let [low, high] = estimate.interval(1.0 - SELECTION_ZERO / candidates.len() as f64)?;
         let certainty = estimate.value.abs() / estimate.standard_error;
         if low <= 0.0 && high >= 0.0 && least.as_ref().is_none_or(|(least, _)| certainty < *least) {
             least = Some((certainty, term.name().to_owned()));
@@ -243,7 +238,7 @@ impl Judge {
         let variance = falls.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / (count - 1.0);
         let limit = StudentsT::new(0.0, 1.0, count - 1.0)
             .expect("at least three experiments")
-            .inverse_cdf(1.0 - LEVEL / self.candidates.max(1) as f64);
+            .inverse_cdf(1.0 - SELECTION_LEVEL / self.candidates.max(1) as f64);
         mean > limit * (variance / count).sqrt()
     }
 

@@ -9,6 +9,7 @@ use super::ChannelPhase;
 use super::equations::Equations;
 use super::experiments::Columns;
 use super::limits::SEARCH_STEPS;
+use crate::limits::{SHAPE_RADIAN, SHAPE_STEP};
 
 /// Constants to search for, besides the parameters that enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,12 +35,6 @@ pub(super) struct Shape {
     channels: ChannelPhase,
     free: ShapeConstants,
 }
-
-/// Step of a derivative with respect to a constant, relative to its size or scale.
-const STEP: f64 = 1e-5;
-
-/// Scale of a phase, in rad.
-const RADIAN: f64 = 1.0;
 
 impl Shape {
     pub(super) fn new(terms: &Terms, free: ShapeConstants) -> Self {
@@ -117,9 +112,9 @@ impl Shape {
         let channels = usize::from(self.free.delay) + 2 * usize::from(self.free.phase);
         let laws = values.len() - channels;
         let step = |(at, value): (usize, &f64)| match at {
-            at if at < laws => STEP * value.abs(),
-            at if at == laws && self.free.delay => STEP * dt,
-            _ => STEP * RADIAN,
+            at if at < laws => SHAPE_STEP * value.abs(),
+            at if at == laws && self.free.delay => SHAPE_STEP * dt,
+            _ => SHAPE_STEP * SHAPE_RADIAN,
         };
         values.iter().enumerate().map(step).collect()
     }
@@ -190,7 +185,7 @@ fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     let scales = start.steps(projected.equations.data.period().dt());
     let of = |((name, column), step): ((String, f64), f64)| {
         // With all other constants known: a lower bound.
-        (deviation > column * step / STEP).then_some(name)
+        (deviation > column * step / SHAPE_STEP).then_some(name)
     };
     let lengths = jacobian.column_iter().map(|column| column.norm());
     let names = start.names().map(|(name, _)| name);

@@ -6,6 +6,10 @@ use mechid_signal::resample::refine;
 use mechid_signal::{Extent, Interpolation, Record};
 use nalgebra::DMatrix;
 
+use crate::limits::{
+    FEWEST_STEPS, MOST_STEPS, SIMULATION_SETTLED, SIMULATION_STEP, SIMULATION_TURN,
+};
+
 /// Quantity that a response is differentiated by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Direction {
@@ -18,19 +22,6 @@ pub(super) enum Direction {
     /// A constant inside the law of a term.
     Constant(usize, usize),
 }
-
-/// Angle (rad) that the fastest mode of the linear part may turn in a step.
-const TURN: f64 = 0.3;
-
-/// Steps in a sampling interval, at least: the force may change sign from sample to sample.
-const FEWEST_STEPS: usize = 2;
-
-/// Steps in a sampling interval, at most.
-const MOST_STEPS: usize = 256;
-
-/// Change of the response, as a part of its peak, by twice as many steps, that shows enough of them:
-/// what is left of a rule of fourth order is a fifteenth of it.
-const SETTLED: f64 = 1.5e-4;
 
 /// A force on the instants that the stages of the steps ask for.
 pub(super) struct FineForce {
@@ -54,7 +45,7 @@ impl FineForce {
         let dt = force.sampling().dt();
         let modes = system.linear().modes()?;
         let rate = modes.iter().map(|mode| mode.eigenvalue().norm()).fold(0.0, f64::max);
-        let needed = (rate * dt / TURN).ceil();
+        let needed = (rate * dt / SIMULATION_TURN).ceil();
         if needed > MOST_STEPS as f64 {
             return Err(EstimateError::TooStiff { rate, dt });
         }
@@ -71,7 +62,7 @@ impl FineForce {
             if let (Some(before), Some(after)) = (&before, &after) {
                 let n = system.dof();
                 let of = |course: &Course| course.state.columns(0, n).into_owned();
-                if (of(before) - of(after)).amax() <= SETTLED * of(after).amax() {
+                if (of(before) - of(after)).amax() <= SIMULATION_SETTLED * of(after).amax() {
                     break;
                 }
             }
@@ -130,9 +121,6 @@ pub(super) struct Course {
     pub(super) end: Vec<f64>,
 }
 
-/// Relative step of the derivative with respect to a constant of a law.
-const STEP: f64 = 1e-6;
-
 impl<'a> Tangent<'a> {
     pub(super) fn new(system: &'a NonlinearSystem, directions: &'a [Direction]) -> Self {
         let n = system.dof();
@@ -143,7 +131,7 @@ impl<'a> Tangent<'a> {
             let constants: Vec<f64> = term.law().constants().iter().map(|c| c.value).collect();
             (0..constants.len())
                 .filter_map(|at| {
-                    let step = STEP * constants[at].abs();
+                    let step = SIMULATION_STEP * constants[at].abs();
                     let mut other = constants.clone();
                     other[at] += step;
                     Some((step, term.with_constants(&other)?))

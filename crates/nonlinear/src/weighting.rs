@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::equations::Equations;
+use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
 
 /// Assumed size of the equation error over the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,15 +26,6 @@ pub enum Weighting {
     SmoothSpectrum,
 }
 
-/// Lines to either side that the spectrum of the residual is averaged over, at least.
-const HALF_WIDTH: usize = 10;
-
-/// Averages of independent lines that a smooth spectrum has, at most.
-const GROUPS: usize = 32;
-
-/// Part of the largest residual power of an equation below which none is taken to lie.
-const FLOOR: f64 = 1e-12;
-
 /// Weights of rows (lines × degrees of freedom) and what they rest on.
 pub(super) struct Weights {
     pub(super) of_rows: DMatrix<f64>,
@@ -42,7 +34,7 @@ pub(super) struct Weights {
 
 /// Lines to either side of a smooth spectrum over so many; `None` if they are too few for one.
 fn half_width(lines: usize) -> Option<usize> {
-    let half = HALF_WIDTH.max(lines / (2 * GROUPS));
+    let half = HALF_WIDTH.max(lines / (2 * WEIGHTING_GROUPS));
     (lines >= 2 * (2 * half + 1)).then_some(half)
 }
 
@@ -142,7 +134,7 @@ fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
             sums[row + 1] = sums[row] + column[row];
         }
         let largest = column.rows(first, rows - first).max();
-        let floor = (FLOOR * largest).max(f64::MIN_POSITIVE);
+        let floor = (WEIGHTING_FLOOR * largest).max(f64::MIN_POSITIVE);
         for row in 0..rows {
             let (low, high) =
                 (row.max(first).saturating_sub(half).max(first), (row + half + 1).min(rows));

@@ -10,14 +10,12 @@ use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::SpectraError;
+use crate::limits::SCATTER_ROUNDING;
 use crate::lines::{Lines, check_sampling};
 use crate::noise::pulse::PulseNoise;
 use crate::noise::spectrum::NoiseSpectrum;
 use crate::noise::spectrum::variance_on_lines;
 use crate::open_record::OpenRecord;
-
-/// Noise relative to the signal (RMS), below which it is rounding.
-const SCATTER_ROUNDING: f64 = 1e-10;
 
 /// Complex amplitudes of forces and displacements, one row per frequency and experiment.
 ///

@@ -14,6 +14,7 @@
 mod error;
 pub mod frequency_data;
 pub mod frf;
+mod limits;
 pub mod line_data;
 mod line_noise;
 mod lines;

@@ -8,6 +8,7 @@ use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix};
 
 use crate::SpectraError;
+use crate::limits::LINE_ROUNDING;
 
 /// Spectral lines to be read from records of one sampling, the transform planned once.
 ///
@@ -19,9 +20,6 @@ pub struct Lines {
     lines: Vec<usize>,
     plan: Arc<dyn RealToComplex<f64>>,
 }
-
-/// Lines below this part of the largest sample are rounding.
-const ROUNDING: f64 = 1e-12;
 
 impl fmt::Debug for Lines {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -68,7 +66,7 @@ impl Lines {
         let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
         let amplitudes = all.read(force)?.map(|z| z.norm());
         // A constant has a spectrum too: its rounding.
-        let rounding = |c: usize| ROUNDING * force.column(c).amax();
+        let rounding = |c: usize| LINE_ROUNDING * force.column(c).amax();
         let largest = amplitudes.column_iter().map(|c| c.max()).enumerate();
         let largest: Vec<f64> =
             largest.map(|(c, max)| if max > rounding(c) { max } else { 0.0 }).collect();

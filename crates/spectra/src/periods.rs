@@ -9,6 +9,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::SpectraError;
 use crate::frequency_data::FrequencyData;
+use crate::limits::{PERIODS_HALVINGS, PERIODS_REPEATS, PERIODS_TERMS};
 use crate::lines::{Lines, check_sampling};
 use crate::noise::between_lines::{BetweenLines, periods_as_one};
 use crate::noise::pooling::Pooling;
@@ -44,9 +45,6 @@ pub struct RepeatedPeriods {
     /// Steps in which the values of each channel come, 2n; zero where they do not.
     steps: Vec<f64>,
 }
-
-/// A force whose periods differ from their mean by this part of it, in the RMS, repeats to rounding.
-const REPEATS: f64 = 1e-12;
 
 impl RepeatedPeriods {
     /// Splits records of several whole periods; `lines` belong to one period, and the
@@ -332,7 +330,7 @@ impl RepeatedPeriods {
         let (n, count) = (self.dof, self.count as f64);
         let scatter = self.scatter.iter().map(|s| (n..2 * n).map(|i| s[(i, i)].re).sum::<f64>());
         let rms = (scatter.sum::<f64>() / count).sqrt();
-        rms <= REPEATS * self.sum.columns(n, n).norm() / count
+        rms <= PERIODS_REPEATS * self.sum.columns(n, n).norm() / count
     }
 
     fn at_least(&self, needed: usize) -> Result<(), SpectraError> {
@@ -349,11 +347,6 @@ impl RepeatedPeriods {
     }
 }
 
-/// Terms of the series of a sawtooth that count.
-const TERMS: i32 = 64;
-/// Halvings by which noise is found.
-const HALVINGS: usize = 50;
-
 /// Variance of rounding to steps of 1 that is alike in all periods, beside noise of which values in steps scatter so much
 /// (variances, in squares of a step).
 ///
@@ -365,10 +358,10 @@ fn alike(scatter: f64) -> f64 {
             let k2 = f64::from(k * k);
             (-4.0 * PI * PI * k2 * variance).exp() / (2.0 * PI * PI * k2)
         };
-        (1..=TERMS).map(term).sum()
+        (1..=PERIODS_TERMS).map(term).sum()
     };
     let (mut low, mut high) = (0.0, scatter.max(0.0));
-    for _ in 0..HALVINGS {
+    for _ in 0..PERIODS_HALVINGS {
         let middle = 0.5 * (low + high);
         match middle + 1.0 / 12.0 - beside(middle) < scatter {
             true => low = middle,

@@ -12,35 +12,12 @@ use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_data::FrequencyData;
+use crate::limits::{
+    GAINS_PER_LINE, LOOKED_AT, SINUSOID_AROUND, SINUSOID_BESIDE, SINUSOID_CONSPICUOUS,
+    SINUSOID_EXPLAINED, SINUSOID_FEWEST, SINUSOID_FITTED, SINUSOID_FREQUENCIES, SINUSOID_LEFT,
+    SINUSOID_MOST, SINUSOID_NEXT, SINUSOID_ROUNDS, SINUSOID_SECTIONS,
+};
 use crate::open_record::OpenRecord;
-
-/// Power of a line under Hann's window over the level around it from which it is looked at: noise passes it on one
-/// of 10⁷ lines, with a level of 20 independent lines.
-const CONSPICUOUS: f64 = 30.0;
-/// Lines to either side whose median is the level around a line, and those next to it that do not count.
-const AROUND: usize = 24;
-const NEXT: usize = 3;
-/// Fewest lines that make a level.
-const FEWEST: usize = 16;
-/// Lines to either side that a sinusoid is fitted to; under Hann's window it has next to nothing beyond.
-const FITTED: usize = 4;
-/// Lines to either side of which a sinusoid has to explain the power above the level, and the part it may leave: a
-/// band of noise, or a frequency that changes, leaves more.
-const EXPLAINED: usize = 8;
-const LEFT: f64 = 0.25;
-/// Part of the power of the strongest new one that others found with it have at least: what a fit beside a strong one
-/// leaves near a resonance may look like a weak one.
-const BESIDE: f64 = 0.1;
-/// Sinusoids of a record at most, and lines that are looked at.
-const MOST: usize = 16;
-const LOOKED_AT: usize = 96;
-/// Receptances from one line to the next, of which a mean is taken.
-const GAINS_PER_LINE: usize = 16;
-/// Rounds in which each sinusoid is fitted again beside all others.
-const ROUNDS: usize = 2;
-/// Frequencies tried between the line before and the line after, and the golden sections that follow.
-const FREQUENCIES: usize = 20;
-const SECTIONS: usize = 40;
 
 /// A sinusoid beside the response to the forces: Re(c e^{iωt}) in each channel, from the first sample on.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,11 +162,12 @@ impl<'a> Search<'a> {
         let level = levels(&hann(&own), &whole);
         let force = hann(&force);
         let of_force = levels(&force, &whole);
-        let stands_out =
-            |at: usize| (0..n).any(|c| force[(at, c)].norm_sqr() > CONSPICUOUS * of_force[(at, c)]);
+        let stands_out = |at: usize| {
+            (0..n).any(|c| force[(at, c)].norm_sqr() > SINUSOID_CONSPICUOUS * of_force[(at, c)])
+        };
         let mut done = vec![false; count];
         for at in (0..count).filter(|at| stands_out(*at)) {
-            done[around(at, NEXT, count)].fill(true);
+            done[around(at, SINUSOID_NEXT, count)].fill(true);
         }
         let is_resonant = vec![false; count];
         let measured = data.measured();
@@ -204,17 +182,17 @@ impl<'a> Search<'a> {
             self.put(sinusoid, 1.0);
             let at = sinusoid.line - self.first;
             self.allow_for_receptance(at);
-            let stands_out = self.stands_out(&hann(&self.residual), at) > CONSPICUOUS;
+            let stands_out = self.stands_out(&hann(&self.residual), at) > SINUSOID_CONSPICUOUS;
             if stands_out {
                 self.put(sinusoid, -1.0);
             }
             stands_out
         });
         let mut windowed = hann(&self.residual);
-        let mut least = CONSPICUOUS;
+        let mut least = SINUSOID_CONSPICUOUS;
         for _ in 0..LOOKED_AT {
             let Some((ratio, at)) = self.most_conspicuous(&windowed) else { break };
-            if ratio <= least || found.len() >= MOST {
+            if ratio <= least || found.len() >= SINUSOID_MOST {
                 break;
             }
             if !self.is_resonant[at] {
@@ -225,14 +203,14 @@ impl<'a> Search<'a> {
             self.put(&sinusoid, -1.0);
             let less = hann(&self.residual);
             let [before, after] = [&windowed, &less].map(|of| self.excess(of, at));
-            if after <= LEFT * before {
-                least = least.max(BESIDE * ratio);
+            if after <= SINUSOID_LEFT * before {
+                least = least.max(SINUSOID_BESIDE * ratio);
                 found.push(sinusoid);
                 windowed = less;
             } else {
                 self.put(&sinusoid, 1.0);
                 let count = self.done.len();
-                self.done[around(at, EXPLAINED, count)].fill(true);
+                self.done[around(at, SINUSOID_EXPLAINED, count)].fill(true);
             }
         }
         self.refine(&mut found);
@@ -241,7 +219,7 @@ impl<'a> Search<'a> {
 
     /// Fits each sinusoid again, beside all others.
     fn refine(&mut self, found: &mut [Sinusoid]) {
-        for _ in 0..ROUNDS {
+        for _ in 0..SINUSOID_ROUNDS {
             for sinusoid in &mut *found {
                 self.put(sinusoid, 1.0);
                 *sinusoid = self.fit(&hann(&self.residual), sinusoid.line - self.first);
@@ -266,8 +244,8 @@ impl<'a> Search<'a> {
         let steps = 1..2 * GAINS_PER_LINE;
         let near = steps.map(|step| line - 1.0 + step as f64 / GAINS_PER_LINE as f64);
         let near: Vec<f64> = near.filter(|place| *place > 0.0).collect();
-        let others: Vec<f64> = around(at, AROUND, self.done.len())
-            .filter(|row| row.abs_diff(at) > NEXT)
+        let others: Vec<f64> = around(at, SINUSOID_AROUND, self.done.len())
+            .filter(|row| row.abs_diff(at) > SINUSOID_NEXT)
             .map(|row| (self.first + row) as f64)
             .collect();
         for channel in 0..self.level.ncols() {
@@ -297,7 +275,7 @@ impl<'a> Search<'a> {
 
     /// Power above the level around a line, over the level.
     fn excess(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
-        let rows = around(at, EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
+        let rows = around(at, SINUSOID_EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
         let of = |row: usize| -> f64 {
             let channels = (0..windowed.ncols()).filter(|c| self.level[(row, *c)].is_finite());
             channels.map(|c| windowed[(row, c)].norm_sqr() / self.level[(row, c)] - 1.0).sum()
@@ -307,7 +285,7 @@ impl<'a> Search<'a> {
 
     /// The sinusoid between the neighbours of a line that leaves least around it.
     fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
-        let rows = around(at, FITTED, self.done.len()).filter(|row| self.whole[*row]);
+        let rows = around(at, SINUSOID_FITTED, self.done.len()).filter(|row| self.whole[*row]);
         let rows: Vec<usize> = rows.collect();
         let channels = windowed.ncols();
         let parts = DMatrix::from_fn(2 * rows.len(), channels, |part, c| {
@@ -325,12 +303,12 @@ impl<'a> Search<'a> {
         };
         let cost = |place: f64| solved(place).0;
         let middle = (self.first + at) as f64;
-        let step = 2.0 / FREQUENCIES as f64;
-        let tried = (0..=FREQUENCIES).map(|k| middle - 1.0 + step * k as f64);
+        let step = 2.0 / SINUSOID_FREQUENCIES as f64;
+        let tried = (0..=SINUSOID_FREQUENCIES).map(|k| middle - 1.0 + step * k as f64);
         let best = tried.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(middle);
         let (mut low, mut high) = (best - step, best + step);
         const GOLDEN: f64 = 0.618_033_988_749_895;
-        for _ in 0..SECTIONS {
+        for _ in 0..SINUSOID_SECTIONS {
             let inner = GOLDEN * (high - low);
             if cost(high - inner) < cost(low + inner) {
                 high = low + inner;
@@ -392,16 +370,16 @@ fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
 
 /// The power around each line of each channel.
 fn levels(windowed: &DMatrix<Complex<f64>>, whole: &[bool]) -> DMatrix<f64> {
-    let mut powers = Vec::with_capacity(2 * AROUND);
+    let mut powers = Vec::with_capacity(2 * SINUSOID_AROUND);
     DMatrix::from_fn(windowed.nrows(), windowed.ncols(), |at, channel| {
         if !whole[at] {
             return f64::INFINITY;
         }
-        let others = around(at, AROUND, whole.len());
-        let others = others.filter(|row| whole[*row] && row.abs_diff(at) > NEXT);
+        let others = around(at, SINUSOID_AROUND, whole.len());
+        let others = others.filter(|row| whole[*row] && row.abs_diff(at) > SINUSOID_NEXT);
         powers.clear();
         powers.extend(others.map(|row| windowed[(row, channel)].norm_sqr()));
-        if powers.len() < FEWEST {
+        if powers.len() < SINUSOID_FEWEST {
             return f64::INFINITY;
         }
         let middle = powers.len() / 2;

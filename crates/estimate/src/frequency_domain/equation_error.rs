@@ -4,6 +4,7 @@ use mechid_spectra::FrequencyData;
 use mechid_spectra::SpectraError;
 use nalgebra::{Complex, DMatrix};
 
+use crate::limits::WEIGHTING_CLEAR;
 use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 
 /// Least squares on −ω²M X + iωC X + K X = F at every row, real and imaginary parts apart.
@@ -58,9 +59,6 @@ pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateE
     weighted_rows(data, 0.0, |_| 1.0)
 }
 
-/// Noise of more than this part of a line's power makes it unclear.
-const CLEAR: f64 = 0.1;
-
 /// [`equation_error`] with every row divided by what the stated noise puts into its equation, by
 /// the measured receptance: of frequency responses the weight is the coherence over what it lacks
 /// of 1, so that lines which only noise has reached do not decide. Once of all lines, and once of
@@ -71,7 +69,7 @@ pub(super) fn weighted_equation_errors<'a>(
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
 ) -> impl Iterator<Item = Estimate> + 'a {
-    [f64::INFINITY, CLEAR].into_iter().filter_map(|clear| {
+    [f64::INFINITY, WEIGHTING_CLEAR].into_iter().filter_map(|clear| {
         let rows = weighted_rows(data, 0.0, noise_weight(data, clear)?);
         let solution = rows.ok()?.solve(unknowns).ok()?;
         solution.check_determined().ok().map(|()| solution)
@@ -80,7 +78,7 @@ pub(super) fn weighted_equation_errors<'a>(
 
 /// A weight for each row of a search for a delay: where noise is stated, that of clear lines by it.
 pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
-    match noise_weight(data, CLEAR) {
+    match noise_weight(data, WEIGHTING_CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
         None => vec![1.0; data.len()],
     }

@@ -11,10 +11,8 @@ use super::output_error_fit::{plausible, spare};
 use super::residual_noise::white_noise_at;
 use super::starts::Starts;
 use crate::Unknowns;
+use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
-
-/// Steps of the search from one delay to the next.
-const STEPS: usize = 30;
 
 /// Maximum likelihood for the lines of open records with the force some time later, the loads of their ends being
 /// found anew with each delay.
@@ -65,7 +63,7 @@ impl<'a> LateOpenRecord<'a> {
     pub fn cost(&mut self, delay: f64) -> Option<f64> {
         let late = self.data.with_later_force(delay);
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
-        let found = minimise(&mut misfit, self.theta.clone(), STEPS)?;
+        let found = minimise(&mut misfit, self.theta.clone(), DELAY_STEPS)?;
         self.theta = found.parameters;
         Some(found.cost)
     }

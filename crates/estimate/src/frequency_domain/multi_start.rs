@@ -6,34 +6,11 @@ use nalgebra::DVector;
 use super::search::Restartable;
 use super::starts::Starts;
 use crate::EstimateError;
-
-/// Steps of the first search.
-const STEPS: usize = 200;
-/// Steps of the others, which are there to confirm it.
-const STEPS_MORE: usize = 60;
-/// Steps of a search in resampled data, which need not end at a minimum.
-const STEPS_RESAMPLED: usize = 15;
-/// Minima whose sums of squares differ by less than this share are one.
-const SAME: f64 = 1e-6;
-/// Sums of squares as small as this, in units of the noise or the response, are rounding.
-const EXACT: f64 = 1e-16;
-/// Starts whose sums of squares differ by less than this share are searched from last, for they
-/// would lead to the same minimum.
-const ALIKE: f64 = 0.01;
-/// Searches at least where the noise explains the best minimum.
-const CONFIRMED: usize = 2;
-/// Searches at least where it does not.
-const CONFIRMED_OTHERWISE: usize = 4;
-/// Rounds of linear least squares before a search.
-const LINEAR_ROUNDS: usize = 6;
-/// Restarts in a row that have to find nothing better where one minimum only has been seen.
-const RESTARTS: usize = 2;
-/// The same where there are several that the noise explains.
-const RESTARTS_AMONG_MANY: usize = 12;
-/// Restarts at most.
-const MAX_RESTARTS: u64 = 60;
-/// Ends of searches from which restarts are made, by turns.
-const RESTARTED: usize = 3;
+use crate::limits::{
+    CONFIRMED_OTHERWISE, LINEAR_ROUNDS, MAX_RESTARTS, RESTART_ALIKE, RESTART_CONFIRMED,
+    RESTART_EXACT, RESTART_RESTARTED, RESTART_RESTARTS, RESTART_SAME, RESTARTS_AMONG_MANY,
+    SEARCH_STEPS, STEPS_MORE, STEPS_RESAMPLED,
+};
 
 /// Sums of squares that noise explains.
 #[derive(Debug, Clone, Copy)]
@@ -75,10 +52,10 @@ pub(super) fn search(
     let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };
     for start in in_order(problem, starts.families()) {
         log::debug!("search {}", ends.searches + 1);
-        let steps = if ends.searches == 0 { STEPS } else { STEPS_MORE };
+        let steps = if ends.searches == 0 { SEARCH_STEPS } else { STEPS_MORE };
         let start = linear_rounds(problem, start, &plausible);
         ends.push(start.and_then(|start| minimise(problem, start, steps)));
-        let needed = if ends.explained() { CONFIRMED } else { CONFIRMED_OTHERWISE };
+        let needed = if ends.explained() { RESTART_CONFIRMED } else { CONFIRMED_OTHERWISE };
         if ends.searches >= needed && !ends.many() {
             break;
         }
@@ -87,9 +64,9 @@ pub(super) fn search(
         restart(problem, &mut ends);
     }
     if let Some(open) = ends.open() {
-        ends.push(minimise(problem, open, STEPS));
+        ends.push(minimise(problem, open, SEARCH_STEPS));
     }
-    let failed = EstimateError::NotConverged { searches: ends.searches, steps: STEPS };
+    let failed = EstimateError::NotConverged { searches: ends.searches, steps: SEARCH_STEPS };
     let best = ends.distinct.into_iter().find(|end| end.minimum.converged).ok_or(failed)?;
     problem.try_at(&best.minimum.parameters);
     problem.accept();
@@ -107,7 +84,7 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
         problem.resample(None);
         let gained = ends.push(moved.and_then(|m| minimise(problem, m.parameters, STEPS_MORE)));
         without_gain = if gained { 0 } else { without_gain + 1 };
-        let enough = if ends.many() { RESTARTS_AMONG_MANY } else { RESTARTS };
+        let enough = if ends.many() { RESTARTS_AMONG_MANY } else { RESTART_RESTARTS };
         if without_gain >= enough {
             return;
         }
@@ -169,7 +146,7 @@ impl Ends {
         let Some(minimum) = ended else { return false };
         let same = |end: &&mut End| {
             let (a, b) = (minimum.cost, end.minimum.cost);
-            (a - b).abs() <= SAME * a.max(b) + EXACT
+            (a - b).abs() <= RESTART_SAME * a.max(b) + RESTART_EXACT
         };
         if let Some(end) = self.distinct.iter_mut().find(same) {
             end.count += 1;
@@ -209,7 +186,7 @@ impl Ends {
 
     /// One of the best ends.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
-        let count = if self.many() { RESTARTED.min(self.distinct.len()) } else { 1 };
+        let count = if self.many() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;
         Some(end.minimum.parameters.clone())
     }
@@ -222,8 +199,9 @@ impl GlobalMinimum {
     /// [`EstimateError::NotConverged`].
     pub(super) fn followed(self, problem: &mut impl Restartable) -> Result<Self, EstimateError> {
         let Self { minimum: before, searches, agreeing } = self;
-        let minimum = minimise(problem, before.parameters, STEPS).filter(|m| m.converged);
-        let mut minimum = minimum.ok_or(EstimateError::NotConverged { searches, steps: STEPS })?;
+        let minimum = minimise(problem, before.parameters, SEARCH_STEPS).filter(|m| m.converged);
+        let mut minimum =
+            minimum.ok_or(EstimateError::NotConverged { searches, steps: SEARCH_STEPS })?;
         minimum.steps += before.steps;
         Ok(Self { minimum, searches, agreeing })
     }
@@ -244,7 +222,7 @@ fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) ->
     for (family, cost, start) in best {
         if family == 0 {
             first.insert(0, start);
-        } else if cost <= before * (1.0 + ALIKE) {
+        } else if cost <= before * (1.0 + RESTART_ALIKE) {
             last.push(start);
             continue;
         } else {

@@ -11,13 +11,7 @@ use mechid_spectra::transient;
 use nalgebra::{DMatrix, DVector};
 
 use crate::Unknowns;
-
-/// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
-const DEPENDENT: f64 = 1e-14;
-/// Part of its length that every regressor of related entries has to itself.
-const RIDGE: f64 = 1e-7;
-/// Lines whose products are held at a time.
-const LINES: usize = 256;
+use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_LINES, GRAM_RIDGE};
 
 /// Places of the unknowns in the equations of motion.
 #[derive(Debug)]
@@ -178,14 +172,14 @@ impl Layout {
             return None;
         }
         if related {
-            let lengths = factor.r().column_iter().map(|column| RIDGE * column.norm());
+            let lengths = factor.r().column_iter().map(|column| GRAM_RIDGE * column.norm());
             let lengths = DVector::from_iterator(self.columns.len(), lengths);
             if !factor.push(&[DMatrix::from_diagonal(&lengths).as_view()]) {
                 return None;
             }
         }
         let r = factor.r().clone();
-        let independent = |at: usize| r[(at, at)].abs() > DEPENDENT * r.column(at).norm();
+        let independent = |at: usize| r[(at, at)].abs() > GRAM_DEPENDENT * r.column(at).norm();
         let solved = (0..self.columns.len()).all(independent)
             && r.tr_solve_upper_triangular_mut(&mut factors.regressors);
         solved.then_some(r)
@@ -214,9 +208,9 @@ impl Layout {
     fn products(&self, factors: &Factors) -> DMatrix<f64> {
         let (q, lines) = (self.columns.len(), factors.weights.nrows() / 2);
         let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
-        let mut pairs = DMatrix::zeros(sums.nrows(), LINES.min(lines));
-        for start in (0..lines).step_by(LINES) {
-            let len = LINES.min(lines - start);
+        let mut pairs = DMatrix::zeros(sums.nrows(), GRAM_LINES.min(lines));
+        for start in (0..lines).step_by(GRAM_LINES) {
+            let len = GRAM_LINES.min(lines - start);
             for imaginary in [false, true] {
                 for (at, mut column) in pairs.columns_mut(0, len).column_iter_mut().enumerate() {
                     let re = factors.regressors.column(start + at);
@@ -294,9 +288,6 @@ impl NormalEquations {
     }
 }
 
-/// Steps of Lanczos, after which an extreme eigenvalue is known to many digits.
-const LANCZOS: usize = 80;
-
 /// The largest eigenvalue of a symmetric positive definite matrix, given by its products.
 ///
 /// # Source
@@ -304,7 +295,7 @@ const LANCZOS: usize = 80;
 /// kept orthogonal.
 fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
     let mut basis: Vec<DVector<f64>> = Vec::new();
-    let mut projected = DMatrix::zeros(LANCZOS.min(size), LANCZOS.min(size));
+    let mut projected = DMatrix::zeros(GRAM_LANCZOS.min(size), GRAM_LANCZOS.min(size));
     // Anything that is orthogonal to no eigenvector.
     let mut next = DVector::from_fn(size, |at, _| 1.0 + (0.7 * (at * at) as f64).sin());
     for at in 0..projected.nrows() {
@@ -347,7 +338,7 @@ impl Coordinates {
         }
         let mut triangle = factor.r().clone();
         let independent =
-            |at: usize| triangle[(at, at)].abs() > DEPENDENT * triangle.column(at).norm();
+            |at: usize| triangle[(at, at)].abs() > GRAM_DEPENDENT * triangle.column(at).norm();
         if !(0..count).all(independent) {
             return None;
         }

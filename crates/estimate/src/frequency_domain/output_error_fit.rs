@@ -14,11 +14,9 @@ use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, Plausible};
 use super::weight_uncertainty::WeightUncertainty;
 use crate::estimate::EstimateParts;
+use crate::limits::FIT_PLAUSIBLE;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
-
-/// Standard deviations by which the misfit ratio of a right model may differ from 1.
-const PLAUSIBLE: f64 = 6.0;
 
 /// An [`Estimate`] by maximum likelihood, with what its search tells.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,7 +138,7 @@ impl EndLoads {
 /// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
 pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
-    Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
+    Plausible { expected, factor: 1.0 + FIT_PLAUSIBLE * spread }
 }
 
 /// Scale of the covariance relative to the inverse of the Fisher information.

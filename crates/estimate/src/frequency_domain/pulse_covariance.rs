@@ -9,9 +9,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::Whitened;
 use super::output_error_fit::{entries, parts};
 use crate::Unknowns;
-
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the lines are taken to err one by one.
-const SENSITIVITIES: usize = 1 << 22;
+use crate::limits::MAX_SENSITIVITIES;
 
 /// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the lines to err one by
 /// one; `None` without such noise and for large fits.
@@ -28,7 +26,7 @@ pub(super) fn excess(
     noise: &NoiseSpectrum,
 ) -> Option<DMatrix<f64>> {
     let (n, count) = (data.dof(), unknowns.independent());
-    if data.pulses().is_empty() || 2 * n * data.len() * count > SENSITIVITIES {
+    if data.pulses().is_empty() || 2 * n * data.len() * count > MAX_SENSITIVITIES {
         return None;
     }
     let (independent, tau) = parts(data, theta);

@@ -21,26 +21,11 @@ use super::output_error_fit::{
 };
 use super::pulse_covariance;
 use super::starts::Starts;
+use crate::limits::{
+    COLOURED_ROUNDS, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST, RESIDUAL_ROUNDING,
+    SINUSOID_ROUNDS, SINUSOID_TOLERANCE, WEIGHT_TOLERANCE,
+};
 use crate::{EstimateError, Unknowns};
-
-/// Relative change of the noise levels below which another round of weighting is useless.
-const WEIGHT_TOLERANCE: f64 = 1e-3;
-/// A residual this small against the motion is rounding.
-const ROUNDING: f64 = 1e-12;
-/// Rounds of weighting by levels; the second is nearly always the last but one.
-const MAX_ROUNDS: usize = 10;
-/// Rounds of weighting by a spectrum: the first is efficient already, the others find its form.
-const COLOURED_ROUNDS: usize = 3;
-/// Maximum number of sensitivities, residuals times parameters, of which leverages are computed.
-const SENSITIVITIES: usize = 1 << 20;
-/// Rounds of sinusoids found in the residual of a fit to what is left without those found before, and the change
-/// of what is left, over the residual, below which another one is useless.
-const SINUSOID_ROUNDS: usize = 8;
-const SINUSOID_TOLERANCE: f64 = 1e-3;
-/// Least power of a residual, relative to that of the noise before.
-const LEAST: f64 = 1e-12;
-/// Least part of its noise that a residual is taken to keep.
-const KEPT: f64 = 0.1;
 
 /// A fit and the noise by which it was weighted.
 struct Weighted {
@@ -168,7 +153,7 @@ fn with_white_noise(
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
         // Rounding has no level that could settle.
-        let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
+        let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= RESIDUAL_ROUNDING * x);
         if settled || exact || (known_force && data.dof() == 1) {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
@@ -227,8 +212,8 @@ fn spectrum_of_residual(
             let own = before.noise.covariance(row)[(channel, channel)].re;
             let share = own / (own + by_force[(row, channel)]);
             // No residual at all would take all the weight.
-            let power = scale * (share * errors[(row, channel)].norm_sqr()).max(LEAST * own);
-            let kept = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(KEPT));
+            let power = scale * (share * errors[(row, channel)].norm_sqr()).max(NOISE_LEAST * own);
+            let kept = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(NOISE_KEPT));
             covariance[(channel, channel)] = Complex::from(power / kept);
         }
         covariance
@@ -247,7 +232,7 @@ fn spectrum_of_residual(
 /// where it is small.
 fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
     let (n, rows) = (data.dof(), data.len());
-    if 2 * n * rows * unknowns.free().len() > SENSITIVITIES {
+    if 2 * n * rows * unknowns.free().len() > MAX_LEVERAGES {
         return None;
     }
     let (independent, tau) = parts(data, &fit.fit.minimum.parameters);

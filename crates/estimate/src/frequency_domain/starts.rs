@@ -12,15 +12,13 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::equation_error::weighted_equation_errors;
+use crate::limits::INITIAL_ROUNDS;
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
 
 /// Exponents e of the weights ω^−e that stand in for a noise that is white in the displacement,
 /// whose part in the equation of motion grows with ω² where mass decides.
 const EXPONENTS: [i32; 3] = [0, -2, -3];
-/// Rounds of weighting by the dynamic stiffness found before.
-const ROUNDS: usize = 4;
-
 /// Linear estimates from spectra, each equation of motion by itself.
 pub(super) struct Starts<'a> {
     /// Data as measured; of open records those under a window that leaves little of their ends.
@@ -122,7 +120,7 @@ impl<'a> Starts<'a> {
     /// The estimates of every round of weighting, from `start` on.
     fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut rounds: Vec<DVector<f64>> = Vec::new();
-        for _ in 0..ROUNDS {
+        for _ in 0..INITIAL_ROUNDS {
             let weights = self.weights(rounds.last().unwrap_or(start));
             let Some(next) = weights.and_then(|w| self.estimate(kind, &w)) else { break };
             rounds.push(next);

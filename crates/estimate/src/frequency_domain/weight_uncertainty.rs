@@ -5,9 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Whitened;
 use crate::Unknowns;
-
-/// Maximum number of sensitivities, residuals times parameters.
-const SENSITIVITIES: usize = 1 << 20;
+use crate::limits::MAX_LEVERAGES;
 
 /// Correction of the covariance of an estimate, and how well that covariance itself is known.
 pub(super) struct WeightUncertainty {
@@ -36,7 +34,7 @@ impl WeightUncertainty {
     ) -> Option<Self> {
         let (n, count) = (data.dof(), unknowns.independent());
         let parts = noise.smooth_parts()?;
-        if 2 * n * data.len() * values.len() > SENSITIVITIES {
+        if 2 * n * data.len() * values.len() > MAX_LEVERAGES {
             return None;
         }
         let covariance = |row: usize| noise.covariance(row).clone();

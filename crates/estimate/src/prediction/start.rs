@@ -9,9 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::predict;
 use crate::EstimateError;
-
-/// Relative singular value below which a direction of the start does not show in the motion.
-const UNSEEN: f64 = 1e-10;
+use crate::limits::INITIAL_UNSEEN;
 
 /// The displacement and velocity at the first sample with which [`predict`] comes closest to the
 /// motions measured, each channel relative to its size: noise on the first sample does not matter,
@@ -153,7 +151,7 @@ impl StartFit {
             })
             .collect();
         let svd = svd(free)?;
-        let floor = UNSEEN * svd.singular_values.max();
+        let floor = INITIAL_UNSEEN * svd.singular_values.max();
         let mut start = svd.solve(&gap, floor).expect("both sides were computed");
         for (value, length) in start.iter_mut().zip(lengths) {
             *value = if length > 0.0 { *value / length } else { 0.0 };

@@ -9,10 +9,8 @@ use mechid_signal::{Interpolation, Record, Sampling};
 use nalgebra::{DMatrix, DMatrixView};
 
 use super::TimeDomainFit;
+use crate::limits::TRANSITION_BLOCK;
 use crate::{EstimateError, Unknowns};
-
-/// Pairs reduced at a time.
-const BLOCK: usize = 256;
 
 /// Pairs of neighbouring samples, reduced block by block to one small triangle.
 ///
@@ -85,9 +83,9 @@ impl Transitions {
             Extent::Open => displacement.len() - 1,
             Extent::WholePeriod => displacement.len(),
         };
-        let mut block = DMatrix::zeros(BLOCK, 6 * self.dof);
-        for start in (0..pairs).step_by(BLOCK) {
-            let len = BLOCK.min(pairs - start);
+        let mut block = DMatrix::zeros(TRANSITION_BLOCK, 6 * self.dof);
+        for start in (0..pairs).step_by(TRANSITION_BLOCK) {
+            let len = TRANSITION_BLOCK.min(pairs - start);
             self.fill(&mut block, quantities, start, len);
             if !self.factor.push(&[block.rows(0, len)]) {
                 return Err(NumericsError::Overflow.into());

@@ -1,10 +1,6 @@
 //! Noise whose samples depend on those before: its prediction errors are white.
 
-/// Largest order that is tried.
-const MOST_ORDER: usize = 20;
-
-/// Samples that each order needs.
-const SAMPLES_PER_ORDER: usize = 20;
+use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 
 /// Noise of one channel as an autoregression; of order 0 it is white.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -12,14 +12,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::FreeDecayError;
 use super::fit::{Data, Fit};
+use super::limits::{ESTIMATE_LAGS, LEAST_ONSET, ONSET_SHARE};
 use super::poles::{Pole, linear_columns};
-
-/// Lags over which a residual is tested for being white.
-const LAGS: usize = 20;
-/// Number of samples over that of the first ones, which are compared with the others.
-const ONSET_SHARE: usize = 50;
-/// Least number of first samples.
-const LEAST_ONSET: usize = 10;
 
 /// A mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
@@ -311,7 +305,7 @@ fn channel(
     let (linear, noise) = (&fit.channels[at].linear, &fit.noise[at]);
     let square: f64 = residual.iter().map(|e| e * e).sum();
     let len = data.len() as f64;
-    let lags = LAGS.min(data.len() / 4).max(1);
+    let lags = ESTIMATE_LAGS.min(data.len() / 4).max(1);
     let white = noise.whitened(residual, 0, 0);
     Ok(DecayChannel {
         offset: if data.constant { scale * linear[linear.len() - 1] } else { 0.0 },

@@ -4,20 +4,8 @@ use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::autoregression::Autoregression;
+use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING};
 use super::poles::{Pole, columns, linear_columns};
-
-/// Rows made at a time.
-const CHUNK: usize = 4096;
-/// Steps of a search.
-pub(super) const MAX_STEPS: usize = 50;
-/// Decrease of minus twice the log likelihood that ends the last search …
-pub(super) const FINE: f64 = 1e-7;
-/// … and one of those that compare numbers of modes.
-pub(super) const COARSE: f64 = 1e-2;
-/// Damping at which no descent is to be had.
-const MAX_DAMPING: f64 = 1e8;
-/// Residual over the RMS of a channel below which it is rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// Samples × channels, each of unit RMS about its mean, and whether each has a constant.
 #[derive(Debug)]
@@ -66,10 +54,10 @@ impl Data {
     /// Columns of poles, some rows at a time.
     pub(super) fn chunks(&self, poles: &[Pole]) -> impl Iterator<Item = DMatrix<f64>> {
         let chunk = |first: usize| {
-            let end = self.len().min(first + CHUNK);
+            let end = self.len().min(first + POLE_CHUNK);
             columns(poles, self.constant, first, end, self.len())
         };
-        (0..self.len()).step_by(CHUNK).map(chunk)
+        (0..self.len()).step_by(POLE_CHUNK).map(chunk)
     }
 
     /// Residual of each channel, samples × channels.
@@ -78,7 +66,7 @@ impl Data {
         let linear = linear_columns(&fit.poles, self.constant);
         for (at, basis) in self.chunks(&fit.poles).enumerate() {
             for (channel, of) in fit.channels.iter().enumerate() {
-                let mut rows = residual.view_mut((at * CHUNK, channel), (basis.nrows(), 1));
+                let mut rows = residual.view_mut((at * POLE_CHUNK, channel), (basis.nrows(), 1));
                 rows -= basis.columns(0, linear) * &of.linear;
             }
         }
@@ -94,8 +82,8 @@ impl Data {
     ) -> Option<DMatrix<f64>> {
         let width = linear_columns(poles, self.constant) + 2 * poles.len() + channels.len();
         let mut factor = TriangularFactor::new(width);
-        for first in (0..self.len()).step_by(CHUNK) {
-            let end = self.len().min(first + CHUNK);
+        for first in (0..self.len()).step_by(POLE_CHUNK) {
+            let end = self.len().min(first + POLE_CHUNK);
             let before = noise.order().min(first);
             let basis = columns(poles, self.constant, first - before, end, self.len());
             let rows = first - before..end;
@@ -138,7 +126,7 @@ impl Data {
                 }
                 let turned = slopes(&solved, nonlinear);
                 let square = column.rows_range(linear..).norm_squared();
-                let floor = (ROUNDING * ROUNDING) * self.len() as f64;
+                let floor = (POLE_ROUNDING * POLE_ROUNDING) * self.len() as f64;
                 fits[channel] = Some(ChannelFit {
                     square: square + floor,
                     along: upper.view((0, linear), (linear, nonlinear)) * &turned,

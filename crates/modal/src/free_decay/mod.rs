@@ -4,6 +4,7 @@ mod autoregression;
 mod error;
 mod estimate;
 mod fit;
+mod limits;
 mod poles;
 mod select;
 mod start;
@@ -17,6 +18,7 @@ pub use self::error::FreeDecayError;
 pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
 use self::fit::Data;
 use self::select::Search;
+use super::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
 
 /// Settings of [`free_decay`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,15 +39,6 @@ impl Default for FreeDecay {
         Self { modes: None, max_modes: 10, offset: true }
     }
 }
-
-/// Largest number of modes that are fitted.
-const MOST_MODES: usize = 40;
-/// Samples that each of the poles needs.
-const SAMPLES_PER_MODE: usize = 12;
-/// Largest number of samples that are fitted.
-const MOST_SAMPLES: usize = 1 << 18;
-/// Standard errors by which a growth rate above zero is no scatter.
-const SURE: f64 = 4.0;
 
 /// Finds the modes in a free response: sums of decaying oscillations and noise, samples × channels of one
 /// quantity in any unit.
@@ -134,7 +127,7 @@ pub fn free_decay(
     let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
     for mode in found.modes() {
         let growth = &mode.mode.growth_rate;
-        if mode.energy_share > 0.5 && growth.value > SURE * growth.standard_error {
+        if mode.energy_share > 0.5 && growth.value > FREE_DECAY_SURE * growth.standard_error {
             return Err(FreeDecayError::Grows {
                 frequency_hz: mode.mode.damped_frequency_hz.value,
                 growth_rate: growth.value,

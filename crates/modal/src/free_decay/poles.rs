@@ -4,11 +4,9 @@ use std::f64::consts::PI;
 
 use nalgebra::{Complex, DMatrix};
 
-/// Growth over the record from which on a mode is written from its end backwards.
-const FROM_THE_END: f64 = 3.0;
-
-/// Samples after which an exponential is computed afresh, not from the sample before.
-const AFRESH: usize = 32;
+use super::limits::{
+    FASTEST_DECAY, FROM_THE_END, MOST_DAMPING, MOST_GROWTH, POLE_AFRESH, POLE_HIGHEST,
+};
 
 /// exp(λ k) at sample k, λ = `growth` + i `turn`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,19 +17,10 @@ pub(super) struct Pole {
     pub turn: f64,
 }
 
-/// Fastest decay, in nepers per sample.
-pub(super) const FASTEST_DECAY: f64 = 1.5;
-/// Largest growth over a record, in nepers.
-pub(super) const MOST_GROWTH: f64 = 30.0;
-/// Largest damping ratio.
-const MOST_DAMPING: f64 = 0.9;
-/// Highest frequency over half the sampling rate.
-const HIGHEST: f64 = 0.98;
-
 /// Lowest and highest turn in a record of `len` samples, in rad per sample: half a cycle in the record,
 /// and nearly half the sampling rate.
 pub(super) fn turns(len: usize) -> [f64; 2] {
-    [PI / len as f64, HIGHEST * PI]
+    [PI / len as f64, POLE_HIGHEST * PI]
 }
 
 impl Pole {
@@ -75,7 +64,7 @@ pub(super) fn columns(
         let mut value = Complex::default();
         for row in 0..end - first {
             let k = (first + row) as f64;
-            value = match row % AFRESH {
+            value = match row % POLE_AFRESH {
                 0 => Complex::from_polar((pole.growth * (k - origin)).exp(), pole.turn * k),
                 _ => value * step,
             };

@@ -4,16 +4,10 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::autoregression::Autoregression;
-use super::fit::{COARSE, Data, Fit};
+use super::fit::{Data, Fit};
+use super::limits::{COARSE, COLOUR_ROUNDS, FALSE_DECAY, SELECTION_PATIENCE};
 use super::poles::{Pole, linear_columns};
 use super::start::{Subspace, strongest};
-
-/// Probability that noise alone gains as much as a further decay must.
-pub(super) const FALSE_DECAY: f64 = 1e-3;
-/// Numbers of decays that may gain nothing before the search for more ends.
-const PATIENCE: usize = 2;
-/// Rounds in which the colour of the noise and the poles follow one another.
-const COLOUR_ROUNDS: usize = 3;
 
 /// Decrease of minus twice the log likelihood that a further decay must bring.
 ///
@@ -97,7 +91,7 @@ impl<'a> Search<'a> {
         let nothing = self.nothing()?;
         let (mut last, mut best) = (nothing.clone(), nothing.clone());
         let (mut idle, mut first_gain) = ([0; 2], 0.0);
-        while last.decays() < most && idle.iter().any(|idle| *idle < PATIENCE) {
+        while last.decays() < most && idle.iter().any(|idle| *idle < SELECTION_PATIENCE) {
             let Some(next) = self.one_more(&last) else { break };
             if last.decays() == 0 {
                 first_gain = nothing.better().cost - next.better().cost;

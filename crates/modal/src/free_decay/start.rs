@@ -7,18 +7,10 @@ use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix};
 
-use super::poles::{FASTEST_DECAY, Pole, turns};
-
-/// Rows of the Hankel matrix, whatever the number of samples.
-const HANKEL_ROWS: usize = 160;
-/// Share of the power that may lie above half the rate at which the Hankel matrix is read.
-const ALIASED: f64 = 0.01;
-/// Decays over the record that a peak is looked for with, in nepers; each is that much faster than the
-/// last.
-const FIRST_DECAY: f64 = 2.0;
-const FASTER: f64 = 3.0;
-/// Growth over the record that a peak is looked for with, in nepers.
-const GROWTH: f64 = 6.0;
+use super::limits::{
+    FASTEST_DECAY, FIRST_DECAY, HANKEL_ROWS, INITIAL_ALIASED, INITIAL_FASTER, INITIAL_GROWTH,
+};
+use super::poles::{Pole, turns};
 
 /// The decay that a residual of unit variance (samples × channels) holds most of: the peak of the matched
 /// filters of a number of decays.
@@ -28,11 +20,11 @@ pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
     let plan = transform::forward(padded);
     let (mut samples, mut lines) = (plan.make_input_vec(), plan.make_output_vec());
     let [low, high] = turns(len);
-    let decays = std::iter::successors(Some(FIRST_DECAY), |decay| Some(decay * FASTER))
+    let decays = std::iter::successors(Some(FIRST_DECAY), |decay| Some(decay * INITIAL_FASTER))
         .map(|decay| -decay / len as f64)
         .take_while(|growth| -growth < 0.5 * FASTEST_DECAY);
     let mut best: Option<(f64, Pole)> = None;
-    for growth in [GROWTH / len as f64, 0.0].into_iter().chain(decays) {
+    for growth in [INITIAL_GROWTH / len as f64, 0.0].into_iter().chain(decays) {
         let origin = if growth > 0.0 { len - 1 } else { 0 } as f64;
         let weights: Vec<f64> = (0..len).map(|k| (growth * (k as f64 - origin)).exp()).collect();
         let energy = 0.5 * weights.iter().map(|w| w * w).sum::<f64>();
@@ -157,7 +149,7 @@ fn stride(samples: &DMatrix<f64>) -> Option<usize> {
         let turn = PI / (2 * stride) as f64;
         let first = (turn * len as f64 / TAU) as usize;
         let above: f64 = power[first.min(power.len())..].iter().sum();
-        if above > ALIASED * total || 8 * stride > len {
+        if above > INITIAL_ALIASED * total || 8 * stride > len {
             return Some(stride);
         }
         stride *= 2;

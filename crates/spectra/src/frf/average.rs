@@ -10,22 +10,10 @@ use super::scatter::Scatter;
 use super::segments::weigh;
 use super::{ComplexMatrix, Crosstalk, Frf, FrfEstimator, Segments};
 use crate::SpectraError;
+use crate::limits::{
+    AVERAGE_IDLE, AVERAGE_PEAK, AVERAGE_STRETCH, AVERAGE_WEAK, LARGEST_EVIDENCE, MEAN_EVIDENCE,
+};
 use crate::lines::{Lines, check_sampling};
-
-/// Amplitude of a force over that of the strongest, below which its channel may be idle.
-const IDLE: f64 = 0.1;
-/// Mean of −ln p over lines and channels up to which nothing shows; of no signal it is 1.
-const MEAN_EVIDENCE: f64 = 3.0;
-/// Largest −ln p, beyond the logarithm of their number, up to which nothing shows: a probability of 10⁻³.
-const LARGEST_EVIDENCE: f64 = 6.9;
-
-/// Power of a force over that of its strongest line, below which a line may be undriven.
-const WEAK: f64 = 0.01;
-/// Number of neighbouring lines by which it is told whether anything shows: of so many the mean of −ln p stays
-/// below [`MEAN_EVIDENCE`] in all but one of 10⁵ cases where nothing does.
-const STRETCH: usize = 8;
-/// Half the width, in lines, of the peak that a window makes of one line.
-const PEAK: usize = 2;
 
 /// Sums from which frequency responses are estimated, gathered stretch by stretch; memory does not grow
 /// with the record.
@@ -140,7 +128,7 @@ impl FrfAverage {
         }
         let powers: Vec<f64> = (0..self.inputs).map(|input| self.power(input)).collect();
         let strongest = powers.iter().copied().fold(0.0, f64::max);
-        let is_weak = |input: &usize| powers[*input] < IDLE * IDLE * strongest;
+        let is_weak = |input: &usize| powers[*input] < AVERAGE_IDLE * AVERAGE_IDLE * strongest;
         (0..self.inputs).filter(is_weak).filter(|input| self.is_idle(*input, averages)).collect()
     }
 
@@ -172,7 +160,7 @@ impl FrfAverage {
         let weakest = (0..self.inputs).min_by(|i, j| own[*i].total_cmp(&own[*j]))?;
         let strongest = (0..self.inputs).map(|input| self.power(input)).fold(0.0, f64::max);
         let evidence = |sum: &CrossSpectra| sum.evidence_of_motion(weakest, averages);
-        let is_weak = own[weakest] < IDLE * IDLE * strongest;
+        let is_weak = own[weakest] < AVERAGE_IDLE * AVERAGE_IDLE * strongest;
         (is_weak && shows_nothing(self.sums.iter().map(evidence))).then_some(weakest)
     }
 
@@ -220,7 +208,8 @@ impl FrfAverage {
         }
         let strongest =
             |input: usize| self.sums.iter().map(|sum| sum.force_power(input)).fold(0.0, f64::max);
-        let limits: Vec<f64> = (0..self.inputs).map(|input| WEAK * strongest(input)).collect();
+        let limits: Vec<f64> =
+            (0..self.inputs).map(|input| AVERAGE_WEAK * strongest(input)).collect();
         let is_weak = |sum: &CrossSpectra| {
             limits.iter().enumerate().all(|(input, limit)| sum.force_power(input) < *limit)
         };
@@ -233,8 +222,8 @@ impl FrfAverage {
         let shown: Vec<(f64, f64)> =
             (0..count).map(|at| if weak[at] { evidence(at) } else { (0.0, 0.0) }).collect();
         let mut undriven = vec![false; count];
-        for first in 0..(count + 1).saturating_sub(STRETCH) {
-            let stretch = first..first + STRETCH;
+        for first in 0..(count + 1).saturating_sub(AVERAGE_STRETCH) {
+            let stretch = first..first + AVERAGE_STRETCH;
             let (sum, number) = shown[stretch.clone()]
                 .iter()
                 .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
@@ -248,7 +237,9 @@ impl FrfAverage {
             let run = first..first + run.len();
             first = run.end;
             if undriven[run.clone()].contains(&true) {
-                left_out[run.start.saturating_sub(PEAK)..(run.end + PEAK).min(count)].fill(true);
+                left_out
+                    [run.start.saturating_sub(AVERAGE_PEAK)..(run.end + AVERAGE_PEAK).min(count)]
+                    .fill(true);
             }
         }
         let driven: Vec<usize> = (0..count).filter(|at| !left_out[*at]).collect();

@@ -6,9 +6,7 @@ use statrs::distribution::{Beta, ContinuousCDF};
 
 use super::ComplexMatrix;
 use crate::SpectraError;
-
-/// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
-const FORCE_TOLERANCE: f64 = 1e-10;
+use crate::limits::FORCE_TOLERANCE;
 
 /// Amplitudes of all channels at one line.
 type Amplitudes<'a> = MatrixView<'a, Complex<f64>, U1, Dyn, U1, Dyn>;

@@ -6,13 +6,7 @@ use statrs::distribution::{Beta, ContinuousCDF};
 
 use super::{Frf, FrfAverage, FrfEstimator};
 use crate::SpectraError;
-
-/// Probability that noise of a channel has so much in common with the force of the lines.
-const CHANCE: f64 = 1e-4;
-/// Amplitude of a force over that of the one that drives the lines, below which it is rounding.
-const ROUNDING: f64 = 1e-9;
-/// Rounds in which the parts of the others are taken off: each leaves of them as much as they are of the whole.
-const ROUNDS: usize = 8;
+use crate::limits::{INTERLEAVED_CHANCE, INTERLEAVED_ROUNDING, INTERLEAVED_ROUNDS};
 
 /// Frequency responses to forces each of which has lines of its own.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +54,7 @@ impl OwnLines {
             }
         }
         let mut responses = raw.clone();
-        for _ in 0..ROUNDS {
+        for _ in 0..INTERLEAVED_ROUNDS {
             let mut next = raw.clone();
             for coupling in &couplings {
                 coupling.take_off(&responses[coupling.force], &mut next[coupling.driver]);
@@ -99,7 +93,7 @@ impl Coupling {
         let (lines, spare) = (average.sums.len() as f64, average.pieces.saturating_sub(1) as f64);
         // The part that noise has in common with the driver is a beta variate.
         let by_chance = Beta::new(lines, lines * spare).ok()?.sf(common / (common + left));
-        (by_chance < CHANCE && found.share() > ROUNDING).then_some(found)
+        (by_chance < INTERLEAVED_CHANCE && found.share() > INTERLEAVED_ROUNDING).then_some(found)
     }
 
     fn share(&self) -> f64 {

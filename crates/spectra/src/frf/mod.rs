@@ -18,6 +18,7 @@ use self::scatter::Scatter;
 pub use self::segments::Segments;
 use crate::SpectraError;
 use crate::frequency_data::FrequencyData;
+use crate::limits::COHERENCE_ROUNDING;
 use crate::lines::Lines;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
@@ -53,9 +54,6 @@ pub struct Frf {
     /// What is known of the errors beyond those variances; `None` of responses measured elsewhere.
     scatter: Option<Scatter>,
 }
-
-/// No coherence is known closer to 1 than this: the rounding of the sums behind it.
-const COHERENCE_ROUNDING: f64 = 1e-14;
 
 impl Frf {
     /// Frequency responses at some lines of the segments, from all segments of the records.

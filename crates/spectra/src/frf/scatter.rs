@@ -5,14 +5,8 @@ use std::collections::HashMap;
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
 
-use super::segments::SMOOTHING_STEPS;
-use super::{COHERENCE_ROUNDING, ComplexMatrix, Frf, Segments};
-
-/// Complex deviations that a variance is made of at least where neighbouring lines can lend theirs: weights of
-/// fewer cost more than a tenth of the scatter.
-const DEVIATIONS: f64 = 20.0;
-/// Deviations of a line of periods below which it is not weighted by itself: of a table nothing else would tell.
-const FEW: f64 = 8.0;
+use super::{ComplexMatrix, Frf, Segments};
+use crate::limits::{COHERENCE_ROUNDING, SCATTER_DEVIATIONS, SCATTER_FEW, SMOOTHING_STEPS};
 
 /// What averages over segments tell of the errors of their responses.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +50,7 @@ impl Scatter {
         segments: Segments,
     ) -> Self {
         let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
-        let few = frf.averages - (inputs as f64) < FEW;
+        let few = frf.averages - (inputs as f64) < SCATTER_FEW;
         match segments {
             Segments::Periods(_) if few => {
                 let widest = unexplained.len().saturating_sub(1) / 2;
@@ -78,7 +72,7 @@ impl Scatter {
         let own = frf.averages - inputs as f64;
         let lines = unexplained.len();
         let freedom = |half: usize| own * independent(2 * half + 1, &frf.line_correlation);
-        let half = (0..=widest).find(|half| freedom(*half) >= DEVIATIONS).unwrap_or(widest);
+        let half = (0..=widest).find(|half| freedom(*half) >= SCATTER_DEVIATIONS).unwrap_or(widest);
         let pooled = (0..lines).map(|line| {
             let first = line.saturating_sub(half).min(lines - (2 * half + 1).min(lines));
             let around = first..(first + 2 * half + 1).min(lines);

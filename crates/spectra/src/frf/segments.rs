@@ -6,18 +6,7 @@ use mechid_signal::Window;
 use nalgebra::{Complex, DVectorView};
 
 use crate::SpectraError;
-
-/// Lines less correlated than this count as independent.
-const INDEPENDENT: f64 = 0.01;
-
-/// Lines further apart than this are not looked at: no window ties them together.
-const FARTHEST_LINES: usize = 16;
-
-/// Steps of a line by which a response is smoothed: that to a force three segments ago is still told from others.
-pub(super) const SMOOTHING_STEPS: usize = 4;
-
-/// Lines to either side over which a window smooths.
-const SMOOTHED_LINES: usize = 6;
+use crate::limits::{FARTHEST_LINES, SEGMENT_INDEPENDENT, SMOOTHED_LINES, SMOOTHING_STEPS};
 
 /// Segments of a record to average over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +79,7 @@ impl Segments {
         let at_zero = at(0);
         let mut correlation: Vec<f64> =
             (0..FARTHEST_LINES.min(len)).map(|lines| at(lines) / at_zero).collect();
-        let tied = correlation.iter().rposition(|c| *c >= INDEPENDENT).unwrap_or(0);
+        let tied = correlation.iter().rposition(|c| *c >= SEGMENT_INDEPENDENT).unwrap_or(0);
         correlation.truncate(tied + 1);
         correlation
     }

@@ -3,12 +3,7 @@
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Maximum number of periods in a row that are taken as one.
-const MAX_PERIODS: usize = 16;
-/// Minimum number: of two the only line between is as near to the next line of a period.
-const MIN_PERIODS: usize = 3;
-/// Maximum number of samples, of all channels, that are held: 8 MB.
-const MAX_HELD: usize = 1 << 20;
+use crate::limits::{MAX_HELD, MAX_PERIODS, MIN_PERIODS};
 
 /// Periods in a row, held until their spectrum can be taken as that of one record.
 ///

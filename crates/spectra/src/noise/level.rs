@@ -1,12 +1,6 @@
 //! The level of white noise beside noise that is known.
 
-/// Rounds of scoring; it converges in a few.
-const ROUNDS: usize = 60;
-/// Relative change of the variance at which the search ends.
-const SETTLED: f64 = 1e-6;
-/// Least variance, relative to the mean power of the residual: a channel without any noise of its own must not
-/// take all the weight.
-const LEAST: f64 = 1e-12;
+use crate::limits::{LEVEL_LEAST, LEVEL_ROUNDS, LEVEL_SETTLED};
 
 /// Standard deviation s for which residuals of the powers |e|² and known variances g, in pairs (|e|², g) of one
 /// unit, are most likely as circular Gaussian numbers of the variances s² + g; next to nothing where g alone
@@ -17,9 +11,9 @@ const LEAST: f64 = 1e-12;
 pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
     let residuals: Vec<(f64, f64)> = residuals.collect();
     let mean = residuals.iter().map(|(power, _)| power).sum::<f64>() / residuals.len() as f64;
-    let least = LEAST * mean;
+    let least = LEVEL_LEAST * mean;
     let mut variance = mean;
-    for _ in 0..ROUNDS {
+    for _ in 0..LEVEL_ROUNDS {
         let (mut excess, mut weights) = (0.0, 0.0);
         for (power, known) in &residuals {
             let total = (variance + known).max(f64::MIN_POSITIVE);
@@ -28,7 +22,7 @@ pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
             weights += weight;
         }
         let next = (excess / weights).max(least);
-        if !next.is_finite() || (next - variance).abs() <= SETTLED * variance {
+        if !next.is_finite() || (next - variance).abs() <= LEVEL_SETTLED * variance {
             break;
         }
         // From a variance far too small the weights of few lines would throw it to and fro.

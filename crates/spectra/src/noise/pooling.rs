@@ -11,16 +11,11 @@ use mechid_signal::message;
 use nalgebra::{Complex, DMatrix};
 
 use self::neighbours::Neighbours;
+use crate::limits::{POOLING_MARGIN, POOLING_SPARE};
 use crate::noise::smooth;
 use crate::noise::smooth::{Form, Smooth};
 
 type Covariances = Vec<DMatrix<Complex<f64>>>;
-
-/// Complex deviations, beyond the channels, that a covariance is made of at least where the choice is free.
-const SPARE: f64 = 6.0;
-/// Advantage in the log likelihood of new data, per complex deviation of all, by which a mean over lines has
-/// to predict better than a smooth spectrum.
-const MARGIN: f64 = 4.0;
 
 /// Choice of the lines that share a covariance of the noise.
 ///
@@ -313,11 +308,11 @@ impl Candidate {
         let each = modelled.iter().zip(&covariance).map(|(s, sample)| misfit(s, sample));
         let Some(misfit) = each.sum::<Option<f64>>() else { return smooth };
         let unknowns = channels * form.terms() as f64 + channels * (channels - 1.0);
-        let to_beat = misfit + (unknowns - MARGIN) / self.nu;
+        let to_beat = misfit + (unknowns - POOLING_MARGIN) / self.nu;
         let half_widths = (0..usize::BITS).map(|power| (1usize << power) - 1);
         let half_widths = half_widths.take_while(|half| 4 * half + 2 <= covariance.len());
         let enough = half_widths.filter(|half| {
-            (2 * half + 1) as f64 * self.nu >= (2.0 * channels).max(channels + SPARE)
+            (2 * half + 1) as f64 * self.nu >= (2.0 * channels).max(channels + POOLING_SPARE)
         });
         let neighbours = Neighbours::new(&covariance);
         let scored = enough.filter_map(|half_width| {

@@ -8,29 +8,10 @@ use nalgebra::{DMatrix, DVector};
 
 pub(crate) use self::bump::Bump;
 use self::bump::{most_conspicuous, widths};
-
-/// Highest order of log power in log frequency.
-const MAX_ORDER: usize = 6;
-/// Lines among which a form is searched; of more, neighbours are taken together, for the search tries hundreds of forms.
-const SEARCHED: usize = 4096;
-/// Minimum number of lines per order.
-const LINES_PER_ORDER: usize = 8;
-/// Maximum number of bumps.
-const MAX_BUMPS: usize = 24;
-/// Complex deviations that a level below those beside it is made of at least: few lines may be quiet by
-/// chance, and would then have all the weight.
-const QUIET_DEVIATIONS: f64 = 12.0;
-/// Largest leverage of a line, over the complex deviations of its sample and without that of bumps, with which a
-/// polynomial is trusted to be lower there than one of a lower order: at the ends of the band few lines decide.
-const END_LEVERAGE: f64 = 0.25;
-/// Steps of the search for the log power.
-const STEPS: usize = 200;
-/// Change of the log power (RMS) below which it is found, and while forms are compared: what that misses of the
-/// likelihood is its square.
-const TOLERANCE: f64 = 1e-9;
-const COMPARED: f64 = 1e-4;
-/// Smallest power, relative to the mean over the lines, at which the search starts.
-const FLOOR: f64 = 1e-9;
+use crate::limits::{
+    END_LEVERAGE, LINES_PER_ORDER, MAX_BUMPS, MAX_ORDER, QUIET_DEVIATIONS, SMOOTH_COMPARED,
+    SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS, SMOOTH_TOLERANCE,
+};
 
 /// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the frequency,
 /// with bumps on it.
@@ -126,6 +107,8 @@ pub struct Smooth {
 /// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
 pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let group = omega.len().div_ceil(SEARCHED);
+pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
+    let group = omega.len().div_ceil(SMOOTH_SEARCHED);
     if group <= 1 {
         return searched(omega, variances, nu);
     }
@@ -179,7 +162,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
             + channels * smooth.form.terms() as f64 * per_term
             + 2.0 * smooth.form.bumps.len() as f64 * per_place
     };
-    let compared = |form: Form| fit_within(COMPARED, form, omega, variances, nu);
+    let compared = |form: Form| fit_within(SMOOTH_COMPARED, form, omega, variances, nu);
     let mut best: Option<(f64, Smooth)> = None;
     for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
         let mut smooth = compared(Form { order, bumps: Vec::new() });
@@ -206,7 +189,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
 
 /// The spectrum of a given form.
 pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
-    fit_within(TOLERANCE, form, omega, variances, nu)
+    fit_within(SMOOTH_TOLERANCE, form, omega, variances, nu)
 }
 
 /// The same, found within a `tolerance` of the log power (RMS).
@@ -255,7 +238,7 @@ fn most_likely(
     variances: &DVector<f64>,
     tolerance: f64,
 ) -> (DVector<f64>, f64) {
-    let floor = (FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
+    let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
     let logarithms = variances.map(|v| v.max(floor).ln());
     let mut log_power = basis * basis.tr_mul(&logarithms);
     // The level follows from the sum of the likelihood.
@@ -266,7 +249,7 @@ fn most_likely(
     let tolerance = tolerance * (variances.len() as f64).sqrt();
     let (mut next_ratio, mut weighted) = (ratio.clone(), ratio.clone());
     let mut information = DMatrix::zeros(basis.ncols(), basis.ncols());
-    for _ in 0..STEPS {
+    for _ in 0..SMOOTH_STEPS {
         let slope = basis.tr_mul(&ratio.add_scalar(-1.0));
         for j in 0..basis.ncols() {
             weighted.zip_zip_apply(&basis.column(j), &ratio, |w, own, ratio| *w = own * ratio);

@@ -4,25 +4,11 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{FLOOR, QUIET_DEVIATIONS};
+use crate::limits::{
+    BEST_WIDTHS, BUMP_HIGHER, BUMP_HIGHEST, BUMP_PEAK, BUMP_VARIATIONS, BUMP_WIDER, HEIGHT_STEPS,
+    HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
+};
 
-/// Power of a peak over the floor that is tried first.
-const PEAK: f64 = 100.0;
-/// Factor by which the width of a peak is varied.
-const WIDER: f64 = 1.3;
-/// Factor by which the power of a peak over the floor is varied, its flanks being kept.
-const HIGHER: f64 = 3.0;
-/// Distance at which a peak ends, over that at which it is as high as the floor.
-const PEAK_REACH: f64 = 10.0;
-/// Number of flat bands, of different widths, about which others are tried.
-const BEST_WIDTHS: usize = 6;
-/// Rounds of variations of a bump.
-const VARIATIONS: usize = 12;
-/// Steps of the search for the height of a bump, and the change of the height that ends it.
-const HEIGHT_STEPS: usize = 10;
-const HEIGHT_TOLERANCE: f64 = 1e-4;
-/// Largest height, in the logarithm of the power.
-const HIGHEST: f64 = 30.0;
 /// Shape that is added to the log powers about a line, times an unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
@@ -75,8 +61,8 @@ impl Bump {
         let Self { middle, reach, .. } = Self::flat(band);
         [
             Self::tent(middle, 2.0 * reach),
-            Self::peak(middle, 0.5 * reach, PEAK),
-            Self::peak(middle, reach, PEAK),
+            Self::peak(middle, 0.5 * reach, BUMP_PEAK),
+            Self::peak(middle, reach, BUMP_PEAK),
         ]
     }
 
@@ -98,10 +84,10 @@ impl Bump {
             Shape::Peak { above_floor, half_width } => vec![
                 Self::peak(middle - 0.5 * half_width, half_width, above_floor),
                 Self::peak(middle + 0.5 * half_width, half_width, above_floor),
-                Self::peak(middle, half_width / WIDER, above_floor),
-                Self::peak(middle, half_width * WIDER, above_floor),
-                Self::peak(middle, half_width * HIGHER.sqrt(), above_floor / HIGHER),
-                Self::peak(middle, half_width / HIGHER.sqrt(), above_floor * HIGHER),
+                Self::peak(middle, half_width / BUMP_WIDER, above_floor),
+                Self::peak(middle, half_width * BUMP_WIDER, above_floor),
+                Self::peak(middle, half_width * BUMP_HIGHER.sqrt(), above_floor / BUMP_HIGHER),
+                Self::peak(middle, half_width / BUMP_HIGHER.sqrt(), above_floor * BUMP_HIGHER),
             ],
         }
     }
@@ -169,7 +155,7 @@ pub(super) fn most_conspicuous(
             let all = below[(lines, channel)];
             let [mean, inside, other] =
                 [all / (count + others), inside / count, (all - inside) / others]
-                    .map(|level: f64| level.max(FLOOR));
+                    .map(|level: f64| level.max(SMOOTH_FLOOR));
             match inside > other || count * nu >= QUIET_DEVIATIONS {
                 true => count * (mean / inside).ln() + others * (mean / other).ln(),
                 false => 0.0,
@@ -190,7 +176,7 @@ pub(super) fn most_conspicuous(
     let none = vec![0.0; channels];
     let others = flat.iter().flat_map(|(_, band)| Bump::about(band));
     let mut other = best(&mut others.map(|bump| Gained::of(bump, &none, &levels, nu)))?;
-    for _ in 0..VARIATIONS {
+    for _ in 0..BUMP_VARIATIONS {
         let varied = other.bump.varied().into_iter();
         let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
         let with_gain = |bump: Bump| Gained::of(bump, &other.heights, &levels, nu);
@@ -245,7 +231,7 @@ fn raised(
 ) -> f64 {
     let area: f64 = parts.iter().sum();
     let total = outside + inside.iter().sum::<f64>();
-    let (mut least, mut most) = (-HIGHEST, HIGHEST);
+    let (mut least, mut most) = (-BUMP_HIGHEST, BUMP_HIGHEST);
     let mut sum = total;
     for _ in 0..HEIGHT_STEPS {
         let (mut first, mut second) = (0.0, 0.0);
