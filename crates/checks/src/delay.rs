@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Formatter};
 
-use mechid_estimate::frequency_domain::{LateForce, LateOpenRecord, OutputErrorFit, output_error};
+use mechid_estimate::frequency_domain::{
+    DelayedForce, DelayedOpenRecord, OutputErrorFit, output_error,
+};
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Response;
@@ -40,7 +42,7 @@ const STEPS_PER_SAMPLE: isize = 2;
 /// Ours: least squares on the equation of motion with the force turned by e^(−iωτ).
 pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Option<Finding> {
     let driven = driven(&data.force().map(|f| f.norm()));
-    let equations = LateForce::new(data, unknowns, &driven)?;
+    let equations = DelayedForce::new(data, unknowns, &driven)?;
     let undelayed = equations.residual_power(0.0)?;
     let delay = delay_of_equations(&equations, dt, &driven)?;
     let power = equations.residual_power(delay * dt)?;
@@ -49,7 +51,7 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
 }
 
 /// The delay, in samples, with which the equations of motion fit best.
-fn delay_of_equations(equations: &LateForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
+fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
     let power = |samples: f64| equations.residual_power(samples * dt);
     let undelayed = power(0.0)?;
     let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
@@ -82,7 +84,7 @@ pub fn delay_of_open_records(
 ) -> Option<Finding> {
     let (first, others) = records.split_first()?;
     let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
-    let mut likelihood = LateOpenRecord::of(&all, unknowns, fit)?;
+    let mut likelihood = DelayedOpenRecord::of(&all, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
     let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {
@@ -147,7 +149,7 @@ fn delay_under_window(
     };
     let driven = driven(&data.force().map(|f| f.norm()));
     let weights = data.omega().iter().map(weight).collect();
-    let equations = LateForce::weighted(&windowed, weights, unknowns, &driven)?;
+    let equations = DelayedForce::weighted(&windowed, weights, unknowns, &driven)?;
     delay_of_equations(&equations, dt, &driven)
 }
 

@@ -21,7 +21,7 @@ pub(crate) const RESTART_SAME: f64 = 1e-6;
 /// Sums of squares as small as this, in units of the noise or the response, are rounding.
 pub(crate) const RESTART_EXACT: f64 = 1e-16;
 
-/// Starts whose sums of squares differ by less than this share are searched from last, for they
+/// InitialEstimates whose sums of squares differ by less than this share are searched from last, for they
 /// would lead to the same minimum.
 pub(crate) const RESTART_ALIKE: f64 = 0.01;
 

@@ -1,12 +1,8 @@
 //! Predicted response of an identified machine, for validation on a record that was not fitted.
 
 mod ahead;
+mod initial_state;
 mod periodic;
-mod start;
-
-pub use self::ahead::missing_force;
-pub use self::periodic::predict_periodic;
-pub use self::start::{StartFit, fitted_start};
 
 use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem, StateTransition};
 use mechid_numerics::check_size;
@@ -14,6 +10,9 @@ use mechid_numerics::linear_algebra::singular_values;
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
+pub use self::ahead::missing_force;
+pub use self::initial_state::{StartFit, fitted_start};
+pub use self::periodic::predict_periodic;
 use crate::EstimateError;
 
 /// Returns the part of the variation of each channel that a prediction explains, in per cent:

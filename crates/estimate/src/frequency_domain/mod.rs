@@ -42,10 +42,11 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
+mod delayed_force;
+mod delayed_open_record;
 mod equation_error;
+mod initial_estimates;
 mod instrumental;
-mod late_force;
-mod late_open_record;
 mod likelihood_ratio;
 mod misfit;
 mod multi_start;
@@ -53,16 +54,15 @@ mod normal_equations;
 mod output_error;
 mod output_error_fit;
 mod pulse_covariance;
-mod residual_noise;
 mod search;
-mod starts;
+mod unknown_noise;
 mod weight_uncertainty;
 mod whitened;
 
+pub use delayed_force::DelayedForce;
+pub use delayed_open_record::DelayedOpenRecord;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
-pub use late_force::LateForce;
-pub use late_open_record::LateOpenRecord;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use output_error::in_units_of_noise;
 pub use output_error::{output_error, output_error_near, output_error_pooling};

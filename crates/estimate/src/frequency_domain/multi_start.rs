@@ -3,8 +3,8 @@
 use mechid_numerics::gauss_newton::{Minimum, minimise};
 use nalgebra::DVector;
 
+use super::initial_estimates::InitialEstimates;
 use super::search::Restartable;
-use super::starts::Starts;
 use crate::EstimateError;
 use crate::limits::{
     CONFIRMED_OTHERWISE, LINEAR_ROUNDS, MAX_RESTARTS, RESTART_ALIKE, RESTART_CONFIRMED,
@@ -46,7 +46,7 @@ pub(super) struct GlobalMinimum {
 /// bootstrap, lead out of minima that it does not.
 pub(super) fn search(
     problem: &mut impl Restartable,
-    starts: &Starts<'_>,
+    starts: &InitialEstimates<'_>,
     plausible: Plausible,
 ) -> Result<GlobalMinimum, EstimateError> {
     let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };

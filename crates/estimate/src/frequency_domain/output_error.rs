@@ -8,13 +8,13 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::equation_error;
+use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{
     OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
 };
-use super::residual_noise::with_residual_noise;
-use super::starts::Starts;
+use super::unknown_noise::with_unknown_noise;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -95,7 +95,7 @@ fn search_near(
     equation_error(data, unknowns)?.check_determined()?;
     match data.noise() {
         Some(noise) => with_known_noise(data, unknowns, noise, nominal),
-        None => with_residual_noise(data, unknowns, nominal, residual),
+        None => with_unknown_noise(data, unknowns, nominal, residual),
     }
 }
 
@@ -107,7 +107,7 @@ fn with_known_noise(
 ) -> Result<OutputErrorFit, EstimateError> {
     let inflation = sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?;
     let mut misfit = Misfit::new(data, unknowns, noise)?;
-    let starts = Starts::new(data, unknowns, noise).with_nominal(nominal);
+    let starts = InitialEstimates::new(data, unknowns, noise).with_nominal(nominal);
     let spare = spare(data, unknowns) as f64;
     // A sampled covariance makes the weights too large by ν/(ν − n) on average.
     let expected = spare * noise.mean_inverse_ratio(data.dof());

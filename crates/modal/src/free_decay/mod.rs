@@ -4,10 +4,10 @@ mod autoregression;
 mod error;
 mod estimate;
 mod fit;
+mod initial_poles;
 mod limits;
 mod poles;
 mod select;
-mod start;
 
 use mechid_signal::Record;
 use mechid_signal::SignalError;

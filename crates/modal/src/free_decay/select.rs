@@ -5,9 +5,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::autoregression::Autoregression;
 use super::fit::{Data, Fit};
+use super::initial_poles::{Subspace, strongest};
 use super::limits::{COARSE, COLOUR_ROUNDS, FALSE_DECAY, SELECTION_PATIENCE};
 use super::poles::{Pole, linear_columns};
-use super::start::{Subspace, strongest};
 
 /// Decrease of minus twice the log likelihood that a further decay must bring.
 ///

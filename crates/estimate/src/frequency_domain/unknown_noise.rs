@@ -13,6 +13,7 @@ use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Whitened;
+use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
@@ -20,7 +21,6 @@ use super::output_error_fit::{
     uncertain_weights,
 };
 use super::pulse_covariance;
-use super::starts::Starts;
 use crate::limits::{
     COLOURED_ROUNDS, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST, RESIDUAL_ROUNDING,
     SINUSOID_ROUNDS, SINUSOID_TOLERANCE, WEIGHT_TOLERANCE,
@@ -35,7 +35,7 @@ struct Weighted {
 
 /// Noise of unknown level of each channel of the motion, white or of the spectrum that the residual shows, found
 /// in turn with the parameters; the forces have the noise that the data state of them.
-pub(super) fn with_residual_noise(
+pub(super) fn with_unknown_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
     nominal: Option<&SecondOrderSystem>,
@@ -141,7 +141,7 @@ fn with_white_noise(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         let fit = match last {
             None => {
-                let starts = Starts::new(data, unknowns, &noise).with_nominal(nominal);
+                let starts = InitialEstimates::new(data, unknowns, &noise).with_nominal(nominal);
                 let spare = spare(data, unknowns) as f64;
                 search(&mut misfit, &starts, plausible(None, spare, spare))?
             }

@@ -1,4 +1,4 @@
-//! Starts of the search for the maximum of the likelihood: linear estimates of the equation of
+//! InitialEstimates of the search for the maximum of the likelihood: linear estimates of the equation of
 //! motion, with weights and corrections for noise.
 
 use std::borrow::Cow;
@@ -20,7 +20,7 @@ use crate::{Estimate, Unknowns};
 /// whose part in the equation of motion grows with ω² where mass decides.
 const EXPONENTS: [i32; 3] = [0, -2, -3];
 /// Linear estimates from spectra, each equation of motion by itself.
-pub(super) struct Starts<'a> {
+pub(super) struct InitialEstimates<'a> {
     /// Data as measured; of open records those under a window that leaves little of their ends.
     data: Cow<'a, FrequencyData>,
     /// Number of unknown loads of these ends, which start at zero.
@@ -51,7 +51,7 @@ enum Kind {
 /// Weights of the equations, rows × dof.
 type Weights = DMatrix<f64>;
 
-impl<'a> Starts<'a> {
+impl<'a> InitialEstimates<'a> {
     pub(super) fn new(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,
@@ -238,7 +238,7 @@ impl<'a> Starts<'a> {
         factor.push(&[rows.as_view()]).then(|| factor.r().clone())
     }
 
-    /// E of the Gram matrix of the columns of [`Starts::triangle`] that noise alone would have.
+    /// E of the Gram matrix of the columns of [`InitialEstimates::triangle`] that noise alone would have.
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
         let mut gram = DMatrix::zeros(last + 1, last + 1);

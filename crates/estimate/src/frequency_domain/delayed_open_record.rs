@@ -5,18 +5,18 @@ use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
 
 use super::OutputErrorFit;
+use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{plausible, spare};
-use super::residual_noise::white_noise_at;
-use super::starts::Starts;
+use super::unknown_noise::white_noise_at;
 use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
 
 /// Maximum likelihood for the lines of open records with the force some time later, the loads of their ends being
 /// found anew with each delay.
-pub struct LateOpenRecord<'a> {
+pub struct DelayedOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
     /// Noise that the residual without a delay shows.
@@ -25,7 +25,7 @@ pub struct LateOpenRecord<'a> {
     theta: DVector<f64>,
 }
 
-impl<'a> LateOpenRecord<'a> {
+impl<'a> DelayedOpenRecord<'a> {
     /// Begins with the result of a `fit` to the same data.
     pub fn of(
         data: &'a FrequencyData,
@@ -52,7 +52,7 @@ impl<'a> LateOpenRecord<'a> {
     pub fn search(&mut self, delay: f64) -> Option<()> {
         let late = self.data.with_later_force(delay);
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
-        let starts = Starts::new(&late, self.unknowns, &self.noise);
+        let starts = InitialEstimates::new(&late, self.unknowns, &self.noise);
         let spare = self.spare() as f64;
         let found = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
         self.theta = found.minimum.parameters;

@@ -12,7 +12,7 @@ use crate::relations::Relations;
 /// How well equations of motion fit the lines of spectra, whatever the delay of the force.
 ///
 /// A delay turns the forces alone: the motions with unknown entries are factored once.
-pub struct LateForce<'a> {
+pub struct DelayedForce<'a> {
     data: &'a FrequencyData,
     /// Weight of each line.
     weight: Vec<f64>,
@@ -32,7 +32,7 @@ struct Group {
     known: DMatrix<f64>,
 }
 
-impl<'a> LateForce<'a> {
+impl<'a> DelayedForce<'a> {
     /// `None` if the data leave an entry open, as they do with any delay. A force acts on the degrees of
     /// freedom `driven`, counted from 0.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
@@ -154,7 +154,7 @@ mod tests {
         let some = free.clone().fix(Matrix::Damping, 0, 1, 0.7).unwrap();
         let known = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 3.0)).unwrap();
         for unknowns in [free, some, known] {
-            let late = LateForce::new(&data, &unknowns, &[0, 1]).unwrap();
+            let late = DelayedForce::new(&data, &unknowns, &[0, 1]).unwrap();
             for delay in [0.0, 0.03, -0.2] {
                 let rows = weighted_rows(&data, delay, |_| 1.0).unwrap();
                 let fit = rows.solve(&unknowns).unwrap();
