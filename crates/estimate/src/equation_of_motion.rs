@@ -11,6 +11,7 @@ use crate::covariance::{Covariance, Product};
 use crate::error::NAMED_PARAMETERS;
 use crate::estimate::EstimateParts;
 use crate::related_equations::RelatedEquations;
+use crate::unknowns::only_ratios;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
@@ -332,11 +333,4 @@ impl Group {
         }
         undetermined
     }
-}
-
-/// Returns the error of an equation of motion, counted from 0, that has neither a force nor a known entry.
-pub fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
-    let of_equation = unknowns.free().into_iter().filter(|p| p.row() == equation);
-    let parameters = message::list(of_equation, ", ", NAMED_PARAMETERS);
-    EstimateError::OnlyRatios { dof: equation + 1, parameters }
 }

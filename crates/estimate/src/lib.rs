@@ -42,7 +42,7 @@ pub mod time_domain;
 mod unknowns;
 
 pub use covariance::{Covariance, Product};
-pub use equation_of_motion::{EquationOfMotion, only_ratios};
+pub use equation_of_motion::EquationOfMotion;
 pub use error::{EstimateError, NAMED_DIRECTIONS, NAMED_PARAMETERS};
 pub use estimate::{Estimate, EstimateParts, Estimated, Undetermined};
 pub use frequency_responses::{ResponseEstimate, output_error_of_responses};
@@ -52,4 +52,4 @@ pub use prediction::{
 };
 pub use relations::Relations;
 pub use sweep::{Sweep, SweepPoint, sweep};
-pub use unknowns::Unknowns;
+pub use unknowns::{Unknowns, only_ratios};

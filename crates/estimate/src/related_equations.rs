@@ -7,10 +7,10 @@ use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::Covariance;
-use crate::equation_of_motion::only_ratios;
 use crate::estimate::EstimateParts;
 use crate::limits::{EQUATION_ROUNDING, RELATED_SETTLED, RELATED_STEPS, ROWS_PER_EQUATION};
 use crate::relations::Relations;
+use crate::unknowns::only_ratios;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// All equations of motion, compressed to rows of the same Gram matrix.

@@ -1,9 +1,11 @@
 //! Free and known entries of M, C and K.
 
 use mechid_model::{Matrix, Parameter};
+use mechid_signal::message;
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
+use crate::error::NAMED_PARAMETERS;
 use crate::relations::Relations;
 
 /// Free entries of M, C and K, and the values of the others.
@@ -315,6 +317,13 @@ mod form {
             }
         }
     }
+}
+
+/// Returns the error of an equation of motion, counted from 0, that has neither a force nor a known entry.
+pub fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
+    let of_equation = unknowns.free().into_iter().filter(|p| p.row() == equation);
+    let parameters = message::list(of_equation, ", ", NAMED_PARAMETERS);
+    EstimateError::OnlyRatios { dof: equation + 1, parameters }
 }
 
 #[cfg(test)]

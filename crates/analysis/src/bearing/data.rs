@@ -11,8 +11,8 @@ use nalgebra::{Complex, DMatrix};
 use super::IdentifyBearing;
 use crate::AnalysisError;
 use crate::identify::Disturbance;
+use crate::identify::IdentifyResponses;
 use crate::identify::left_out::LineRule;
-use crate::identify::tables::IdentifyResponses;
 use crate::identify::tabulated::response_data;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Measurement, Windowed};
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
-use crate::identify::tables::IdentifyResponses;
+use crate::identify::IdentifyResponses;
 use crate::identify::{LeftOut, LineChoice};
 
 /// Settings of the identification of a bearing.

@@ -110,7 +110,9 @@ pub(crate) fn rows(
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);
-    unexplained.filter(|_| is_seen).map(|fraction| Finding::UnmeasuredForce(UnmeasuredForce { fraction }))
+    unexplained
+        .filter(|_| is_seen)
+        .map(|fraction| Finding::UnmeasuredForce(UnmeasuredForce { fraction }))
 }
 
 /// Returns the faults of each channel by itself.

@@ -12,8 +12,8 @@ use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 
 use super::coherence::ResponseCoherence;
 use super::force_noise::ForceNoise;
-use super::nonlinear::SelectionSummary;
 use super::prediction::{Model, Prediction};
+use super::selection::SelectionSummary;
 use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
 use crate::machine::NonlinearPart;

@@ -3,11 +3,12 @@
 use std::str::FromStr;
 
 use mechid_io::LineSpec;
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Record, Sampling, driven_lines, lines};
 use serde::{Deserialize, Serialize};
 
 use super::lines::{LineChoice, choose_lines};
 use crate::AnalysisError;
+use crate::measurement::Block;
 
 /// Lines that carry something else than the response to the force, such as run-out or mains.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -129,6 +130,22 @@ impl LeftOut {
         }
         Ok(lines)
     }
+}
+
+/// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
+/// cancel.
+pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
+    let sampling = held.force.sampling().with_len(held.period)?;
+    let driven = rule.lines(&held.force, held.period)?;
+    let all = match rule.choice {
+        LineChoice::Lines(_) => driven,
+        LineChoice::Band(band) => lines::band(sampling, band.low_hz, band.high_hz),
+        LineChoice::Driven => {
+            let last = driven_lines(&held.force, held.period)?.last().copied().unwrap_or(1);
+            (1..=last).collect()
+        }
+    };
+    rule.without.keep(all, sampling)
 }
 
 #[cfg(test)]

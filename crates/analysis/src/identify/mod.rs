@@ -35,9 +35,12 @@ pub mod nonlinear;
 mod open_records;
 pub mod options;
 pub mod prediction;
+mod remarks;
+mod response_settings;
 mod responses;
 pub mod rows;
 mod samples;
+pub mod selection;
 mod sinusoids;
 pub(crate) mod spectra;
 pub mod structure;
@@ -71,10 +74,11 @@ pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
+pub use self::response_settings::IdentifyResponses;
 pub use self::sinusoids::SinusoidRow;
 pub use self::structure::{Form, Structure};
 use self::summary::IdentificationSummary;
-pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
+pub use self::tables::{IdentifiedResponses, identify_responses};
 pub use self::unscaled::Unscaled;
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;

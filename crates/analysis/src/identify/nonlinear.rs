@@ -5,20 +5,21 @@ use mechid_estimate::Unknowns;
 use mechid_model::Terms;
 use mechid_nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
-    SelectionStep, StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion,
-    equation_error, output_error, select_terms,
+    StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error,
+    output_error, select_terms,
 };
 use mechid_signal::{Extent, Record, driven_lines, lines, message};
 use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
-use super::left_out::LineRule;
-use super::lines::LineChoice;
+use super::left_out::{LineRule, all_lines};
 use super::options::{Method, Nonlinear};
 use super::prediction::{Model, Prediction};
+use super::remarks::one_motion_of;
 use super::rows::Uncertain;
-use super::spectra::{one_motion_of, periods};
+use super::selection::SelectionSummary;
+use super::spectra::periods;
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::{significant, text_table};
@@ -87,33 +88,6 @@ impl ExtrapolationRow {
             )
         })
     }
-}
-
-/// Terms that were tried, one after the other.
-#[derive(Debug, Clone, Serialize)]
-pub struct SelectionSummary {
-    /// Criterion by which a term was added.
-    pub criterion: Criterion,
-    /// Number of candidates.
-    pub candidates: usize,
-    /// The fits, the first without any candidate, then with each term that was added.
-    pub steps: Vec<SelectionRow>,
-    /// The candidate that came next and was not worth it; `None` if all were added.
-    pub refused: Option<SelectionRow>,
-    /// Names of the terms that were added and removed again, because their coefficients do not differ from
-    /// zero by their standard errors.
-    pub removed: Vec<String>,
-}
-
-/// One step of a selection of terms.
-#[derive(Debug, Clone, Serialize)]
-pub struct SelectionRow {
-    /// Name of the term added; `None` for the first step.
-    pub added: Option<String>,
-    /// The criterion with it, a pure number, the smaller the better.
-    pub score: f64,
-    /// Part of the weighted force that is left with it, a ratio.
-    pub unexplained: f64,
 }
 
 /// One parameter beside those of M, C and K.
@@ -286,63 +260,6 @@ fn select(
     }
     let Nonlinear { terms, candidates, criterion, weighting, .. } = how;
     Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
-}
-
-impl SelectionSummary {
-    fn of(selection: Selection, how: &Nonlinear) -> Self {
-        let row = |step: SelectionStep| SelectionRow {
-            added: step.added,
-            score: step.score,
-            unexplained: step.unexplained,
-        };
-        Self {
-            criterion: how.criterion,
-            candidates: how.candidates.len(),
-            steps: selection.steps.into_iter().map(row).collect(),
-            refused: selection.refused.map(row),
-            removed: selection.removed,
-        }
-    }
-
-    /// Returns the steps as a table below a heading.
-    fn text(&self) -> String {
-        let by = match self.criterion {
-            Criterion::Information => "information criterion",
-            Criterion::HeldOut => "records held out",
-        };
-        let mut rows = vec![["term", "force left", "criterion", ""].map(str::to_owned).to_vec()];
-        let steps = self.steps.iter().map(|row| match &row.added {
-            None => (row, ""),
-            Some(name) if self.removed.contains(name) => (row, "removed: may be zero"),
-            Some(_) => (row, "added"),
-        });
-        for (row, verdict) in steps.chain(self.refused.iter().map(|row| (row, "refused"))) {
-            rows.push(vec![
-                row.added.clone().unwrap_or_else(|| "none of them".into()),
-                format!("{} %", significant(100.0 * row.unexplained, 3)),
-                significant(row.score, 5),
-                verdict.into(),
-            ]);
-        }
-        let candidates = message::count(self.candidates, "candidate");
-        format!("selection from {candidates} by the {by}\n{}", text_table(&rows))
-    }
-}
-
-/// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
-/// cancel.
-pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
-    let sampling = held.force.sampling().with_len(held.period)?;
-    let driven = rule.lines(&held.force, held.period)?;
-    let all = match rule.choice {
-        LineChoice::Lines(_) => driven,
-        LineChoice::Band(band) => lines::band(sampling, band.low_hz, band.high_hz),
-        LineChoice::Driven => {
-            let last = driven_lines(&held.force, held.period)?.last().copied().unwrap_or(1);
-            (1..=last).collect()
-        }
-    };
-    rule.without.keep(all, sampling)
 }
 
 /// Returns, record by record, the part of the response that the steady state under the measured force

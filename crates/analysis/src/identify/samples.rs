@@ -223,7 +223,10 @@ impl SampleFit {
         let estimate = fit.into_estimate();
         // The modes that were found say more than a force held between the samples.
         for finding in &mut before_all {
-            if matches!(finding, Finding::HighestMode(HighestMode { limit: ModeLimit::BetweenSamples, .. })) {
+            if matches!(
+                finding,
+                Finding::HighestMode(HighestMode { limit: ModeLimit::BetweenSamples, .. })
+            ) {
                 *finding = fitted_step(&estimate, dt)?;
             }
         }

@@ -13,11 +13,11 @@ use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, SpectraError};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
-use super::left_out::LineRule;
-use super::nonlinear::all_lines;
+use super::left_out::{LineRule, all_lines};
 use super::open_records::joined;
 use super::options::Method;
 use super::prediction::Prediction;
+use super::remarks::{of_noise, one_motion_of};
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
@@ -386,29 +386,4 @@ fn with_noise(
         },
         None => periods.mean(),
     }
-}
-
-/// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
-pub(super) fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
-    let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
-    distinct.dedup();
-    let model = distinct.join("; ");
-    match (periods, shows) {
-        (0 | 1, _) => format!(
-            "one period does not show its noise: it was taken from the residual, on the motion alone; \
-             noise spectrum: {model}"
-        ),
-        (_, false) => format!(
-            "the periods differ by rounding only: the noise was taken from the residual, on the motion \
-             alone; noise spectrum: {model}"
-        ),
-        (periods, true) => format!("noise spectrum, from {periods} periods: {model}"),
-    }
-}
-
-/// Returns the remark on kinds of response that are not used.
-pub fn one_motion_of(measured: &Block) -> Vec<String> {
-    let unused = measured.responses().len() > 1;
-    let kind = measured.response().1;
-    Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
 }

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::added_decay;
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
+use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
 use super::rows::{
     CONFIDENCE, ParameterRow, ProportionalDamping, carries_covariance, covariance, mode_table,
@@ -30,27 +31,6 @@ use crate::machine::Machine;
 use crate::measurement::Channels;
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant};
-
-/// Settings of an identification from tables of frequency responses.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IdentifyResponses {
-    /// Measured quantity of the responses; `None`: as the table states it.
-    pub quantity: Option<ResponseQuantity>,
-    /// Number of independent averages behind the coherence, a pure number.
-    pub averages: Option<f64>,
-    /// Points of the responses, one per degree of freedom; empty: all, in the order of the table.
-    pub points: Vec<String>,
-    /// Frequency band to use; `None`: all frequencies above zero.
-    pub band: Option<Band>,
-    /// Known masses.
-    pub mass: KnownMass,
-    /// Form of M, C and K, such as that of a chain.
-    #[serde(skip_serializing_if = "Structure::is_empty")]
-    pub structure: Structure,
-    /// Estimator; `None`: maximum likelihood.
-    pub method: Option<Method>,
-}
 
 /// Identifies the machine behind one or several tables of frequency responses, which are fitted
 /// together; each needs the response at every point where a force acts.

@@ -13,7 +13,7 @@ use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix};
 
 use super::checks::When;
-use super::tables::IdentifyResponses;
+use super::response_settings::IdentifyResponses;
 use super::{Band, added_decay};
 use crate::AnalysisError;
 

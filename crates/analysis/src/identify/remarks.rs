@@ -1,0 +1,30 @@
+//! Remarks that several kinds of fit make.
+
+use mechid_spectra::NoiseModel;
+
+use crate::measurement::Block;
+
+/// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
+pub(super) fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
+    let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
+    distinct.dedup();
+    let model = distinct.join("; ");
+    match (periods, shows) {
+        (0 | 1, _) => format!(
+            "one period does not show its noise: it was taken from the residual, on the motion alone; \
+             noise spectrum: {model}"
+        ),
+        (_, false) => format!(
+            "the periods differ by rounding only: the noise was taken from the residual, on the motion \
+             alone; noise spectrum: {model}"
+        ),
+        (periods, true) => format!("noise spectrum, from {periods} periods: {model}"),
+    }
+}
+
+/// Returns the remark on kinds of response that are not used.
+pub fn one_motion_of(measured: &Block) -> Vec<String> {
+    let unused = measured.responses().len() > 1;
+    let kind = measured.response().1;
+    Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
+}
