@@ -1,5 +1,6 @@
 //! Maximum likelihood on averaged frequency responses, with what their segments do to them.
 
+use mechid_model::SecondOrderSystem;
 use mechid_spectra::SpectraError;
 use mechid_spectra::frf::Frf;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -54,49 +55,22 @@ pub fn output_error_of_responses(
         return Ok(plain(fit));
     }
     let relations = Relations::of(unknowns);
-    let entries = |theta: &DVector<f64>| match &relations {
-        None => theta.clone(),
-        Some(relations) => relations.entries(theta.as_slice()),
-    };
+    let model = Sharpening { records, unknowns, noise: &noise, relations: relations.as_ref() };
     let values: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
     let start = match &relations {
         None => DVector::from_column_slice(&values),
         Some(relations) => relations.unknowns(&values),
     };
-    let (mut theta, mut responses) = (start, raw.clone());
-    let Some(mut errors) = Errors::of(records, &responses, unknowns, &entries(&theta), &noise)
-    else {
-        return Ok(plain(fit));
+    let Some(errors) = model.errors(&raw, &start) else { return Ok(plain(fit)) };
+    let start = Sharpened {
+        theta: start,
+        responses: raw.clone(),
+        errors,
+        blunted: 0.0,
+        settled: !raw.iter().any(Frf::is_smoothed),
     };
-    let (mut settled, mut blunted) = (true, 0.0);
-    if raw.iter().any(Frf::is_smoothed) {
-        settled = false;
-        let first = theta.clone();
-        for _ in 0..SHARPENING_ROUNDS {
-            let system = match unknowns.assemble(entries(&theta).as_slice()) {
-                [m, c, k] => mechid_model::SecondOrderSystem::new(m, c, k)?,
-            };
-            let sharp: Vec<Frf> =
-                records.iter().map(|(frf, dofs)| frf.sharpened(&system, dofs)).collect();
-            let Some(next) = Errors::of(records, &sharp, unknowns, &entries(&theta), &noise) else {
-                break;
-            };
-            let step = next.step();
-            (errors, responses) = (next, sharp);
-            let deviations = errors.deviations();
-            let in_errors = |step: &DVector<f64>| step.component_div(&deviations).amax();
-            let (length, so_far) = (in_errors(&step), &theta + &step - &first);
-            if !length.is_finite() {
-                break;
-            }
-            theta += step;
-            blunted = in_errors(&so_far);
-            if length <= SHARPENING_SETTLED {
-                settled = true;
-                break;
-            }
-        }
-    }
+    let sharpened = if start.settled { start } else { model.sharpen(start)? };
+    let Sharpened { theta, responses, errors, blunted, settled } = sharpened;
     let (covariance, degrees_of_freedom) = errors.covariance(records);
     let covariance = match &relations {
         None => covariance,
@@ -105,12 +79,71 @@ pub fn output_error_of_responses(
             &tangent * covariance * tangent.transpose()
         }
     };
-    let values = entries(&theta).as_slice().to_vec();
+    let values = model.entries(&theta).as_slice().to_vec();
     let estimate: Estimate = fit.estimate.moved(values, covariance, degrees_of_freedom)?;
     let power = 0.5 * errors.white.residual.norm_squared() / (data.dof() * data.len()) as f64;
     let misfit_ratio = if blunted > 0.0 { power } else { fit.misfit_ratio };
     let fit = OutputErrorFit { estimate, misfit_ratio, ..fit };
     Ok(ResponseEstimate { fit, responses, blunted, settled })
+}
+
+/// What the sharpening of responses needs to know.
+struct Sharpening<'a> {
+    records: &'a [(Frf, Vec<usize>)],
+    unknowns: &'a Unknowns,
+    noise: &'a NoiseSpectrum,
+    relations: Option<&'a Relations>,
+}
+
+/// Parameters, and responses less what the window of their segments makes of those of the system with them.
+struct Sharpened {
+    theta: DVector<f64>,
+    responses: Vec<Frf>,
+    errors: Errors,
+    blunted: f64,
+    settled: bool,
+}
+
+impl Sharpening<'_> {
+    /// Returns the free entries of M, C and K.
+    fn entries(&self, theta: &DVector<f64>) -> DVector<f64> {
+        match self.relations {
+            None => theta.clone(),
+            Some(relations) => relations.entries(theta.as_slice()),
+        }
+    }
+
+    fn errors(&self, responses: &[Frf], theta: &DVector<f64>) -> Option<Errors> {
+        Errors::of(self.records, responses, self.unknowns, &self.entries(theta), self.noise)
+    }
+
+    /// Takes turns in sharpening the responses with the system and estimating the system from them.
+    fn sharpen(&self, start: Sharpened) -> Result<Sharpened, EstimateError> {
+        let first = start.theta.clone();
+        let mut at = start;
+        for _ in 0..SHARPENING_ROUNDS {
+            let [m, c, k] = self.unknowns.assemble(self.entries(&at.theta).as_slice());
+            let system = SecondOrderSystem::new(m, c, k)?;
+            let sharp: Vec<Frf> =
+                self.records.iter().map(|(frf, dofs)| frf.sharpened(&system, dofs)).collect();
+            let Some(next) = self.errors(&sharp, &at.theta) else { break };
+            let step = next.step();
+            (at.errors, at.responses) = (next, sharp);
+            let deviations = at.errors.deviations();
+            let in_errors = |step: &DVector<f64>| step.component_div(&deviations).amax();
+            let (length, so_far) = (in_errors(&step), &at.theta + &step - &first);
+            if !length.is_finite() {
+                break;
+            }
+            at.theta += step;
+            at.blunted = in_errors(&so_far);
+            if length <= SHARPENING_SETTLED {
+                at.settled = true;
+                break;
+            }
+        }
+        Ok(at)
+    }
 }
 
 /// Responses, one after the other, as data of one fit.

@@ -156,6 +156,40 @@ pub(super) struct Scale {
     pub(super) noise: Vec<NoiseModel>,
 }
 
+impl Scale {
+    /// Returns the covariance of the independent unknowns, over the level of the noise, and its degrees of
+    /// freedom, from the inverse of the Fisher information.
+    fn covariance(&self, inverse: DMatrix<f64>) -> (DMatrix<f64>, usize) {
+        let (covariance, degrees_of_freedom) = match &self.weights {
+            None => (inverse * self.inflation, self.degrees_of_freedom),
+            Some(weights) => {
+                let fewest = weights.degrees_of_freedom.min(self.degrees_of_freedom as f64);
+                (inverse + &weights.excess, fewest.max(1.0) as usize)
+            }
+        };
+        match &self.pulses {
+            Some(excess) => (covariance + excess, degrees_of_freedom),
+            None => (covariance, degrees_of_freedom),
+        }
+    }
+}
+
+/// Returns the free entries of M, C and K and their covariance, from those of the independent unknowns.
+fn of_entries(
+    unknowns: &Unknowns,
+    independent: &[f64],
+    covariance: DMatrix<f64>,
+) -> (Vec<f64>, DMatrix<f64>) {
+    match Relations::of(unknowns) {
+        None => (independent.to_vec(), covariance),
+        Some(relations) => {
+            let tangent = relations.tangent(independent);
+            let entries = relations.entries(independent).as_slice().to_vec();
+            (entries, &tangent * covariance * tangent.transpose())
+        }
+    }
+}
+
 pub(super) fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -170,25 +204,8 @@ pub(super) fn finish(
     let of_ends = covariance.view((count, count), (tau.len(), tau.len()));
     let ends = EndLoads::of(data, tau, of_ends * scale.level);
     let covariance = covariance.view((0, 0), (count, count)).into_owned();
-    let (covariance, degrees_of_freedom) = match scale.weights {
-        None => (covariance * scale.inflation, scale.degrees_of_freedom),
-        Some(weights) => {
-            let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
-            (covariance + weights.excess, fewest.max(1.0) as usize)
-        }
-    };
-    let covariance = match scale.pulses {
-        Some(excess) => covariance + excess,
-        None => covariance,
-    };
-    let (entries, covariance) = match Relations::of(unknowns) {
-        None => (independent.to_vec(), covariance),
-        Some(relations) => {
-            let tangent = relations.tangent(independent);
-            let entries = relations.entries(independent).as_slice().to_vec();
-            (entries, &tangent * covariance * tangent.transpose())
-        }
-    };
+    let (covariance, degrees_of_freedom) = scale.covariance(covariance);
+    let (entries, covariance) = of_entries(unknowns, independent, covariance);
     let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors

@@ -34,43 +34,70 @@ pub(super) fn excess(
     let covariance = |row: usize| noise.covariance(row).clone();
     let closed = data.without_transient(tau);
     let mut sensitivity = Whitened::of(&closed, unknowns, &values, covariance)?.sensitivity;
-    // Weighted responses to a force on each degree of freedom, 1 N on every line.
-    let of_force: Vec<DVector<f64>> = (0..n)
-        .map(|dof| {
-            Some(
-                Whitened::residual_of(&data.of_force(dof), unknowns, &values, covariance)?.residual,
-            )
-        })
-        .collect::<Option<_>>()?;
-    let turned = |rows: &Range<usize>, dof: usize, amplitude: &dyn Fn(usize) -> Complex<f64>| {
-        let mut turned = DVector::zeros(2 * n * rows.len());
+    let to_force = |dof: usize| {
+        let whitened = Whitened::residual_of(&data.of_force(dof), unknowns, &values, covariance)?;
+        Some(whitened.residual)
+    };
+    let responses = ForceResponses((0..n).map(to_force).collect::<Option<_>>()?);
+    for record in 0..data.transient().ncols() / 2 {
+        remove_transient(data, record, &responses, &mut sensitivity)?;
+    }
+    let (q, root) = orthonormal(sensitivity)?;
+    Some(&root * scatter(data, &responses, &q) * root.transpose())
+}
+
+/// Weighted responses to a force on each degree of freedom, 1 N on every line.
+struct ForceResponses(Vec<DVector<f64>>);
+
+impl ForceResponses {
+    /// Returns the weighted response of some rows to a force of this amplitude on degree of freedom `dof`.
+    fn to(
+        &self,
+        rows: &Range<usize>,
+        dof: usize,
+        amplitude: &dyn Fn(usize) -> Complex<f64>,
+    ) -> DVector<f64> {
+        let n = self.0.len();
+        let mut response = DVector::zeros(2 * n * rows.len());
         for row in rows.clone() {
             let factor = amplitude(row);
             for channel in 0..n {
                 let from = 2 * (n * row + channel);
-                let response = Complex::new(of_force[dof][from], of_force[dof][from + 1]) * factor;
+                let z = Complex::new(self.0[dof][from], self.0[dof][from + 1]) * factor;
                 let to = 2 * (n * (row - rows.start) + channel);
-                (turned[to], turned[to + 1]) = (response.re, response.im);
+                (response[to], response[to + 1]) = (z.re, z.im);
             }
         }
-        turned
-    };
-    for record in 0..data.transient().ncols() / 2 {
-        let rows = data.open_record(record)?.rows;
-        let loads: Vec<DVector<f64>> = (0..2 * 3 * n)
-            .map(|load| {
-                let (column, power, dof) = (2 * record + load / (3 * n), (load / n) % 3, load % n);
-                turned(&rows, dof, &|row| {
-                    data.transient()[(row, column)] * powers(data.omega()[row])[power]
-                })
-            })
-            .collect();
-        let scaled = loads.iter().map(|load| load / load.norm().max(f64::MIN_POSITIVE));
-        let q = DMatrix::from_columns(&scaled.collect::<Vec<_>>()).qr().q();
-        let mut part = sensitivity.rows_mut(2 * n * rows.start, 2 * n * rows.len());
-        let explained = q.tr_mul(&part);
-        part -= q * explained;
+        response
     }
+}
+
+/// Removes from the sensitivities what the loads of the transient of an open record explain.
+fn remove_transient(
+    data: &FrequencyData,
+    record: usize,
+    responses: &ForceResponses,
+    sensitivity: &mut DMatrix<f64>,
+) -> Option<()> {
+    let n = data.dof();
+    let rows = data.open_record(record)?.rows;
+    let scaled = (0..2 * 3 * n).map(|load| {
+        let (column, power, dof) = (2 * record + load / (3 * n), (load / n) % 3, load % n);
+        let response = responses.to(&rows, dof, &|row| {
+            data.transient()[(row, column)] * powers(data.omega()[row])[power]
+        });
+        let length = response.norm().max(f64::MIN_POSITIVE);
+        response / length
+    });
+    let q = DMatrix::from_columns(&scaled.collect::<Vec<_>>()).qr().q();
+    let mut part = sensitivity.rows_mut(2 * n * rows.start, 2 * n * rows.len());
+    let explained = q.tr_mul(&part);
+    part -= q * explained;
+    Some(())
+}
+
+/// Returns Q and R⁻¹ of the sensitivities J = Q R, `None` if J has dependent columns.
+fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let lengths: Vec<f64> = sensitivity.column_iter().map(|column| column.norm()).collect();
     for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
         if *length > 0.0 {
@@ -78,27 +105,33 @@ pub(super) fn excess(
         }
     }
     let (q, r) = sensitivity.qr().unpack();
-    let mut root = DMatrix::identity(count, count);
+    let mut root = DMatrix::identity(r.nrows(), r.ncols());
     r.solve_upper_triangular_mut(&mut root).then_some(())?;
     root.row_iter_mut().zip(&lengths).for_each(|(mut row, length)| row.unscale_mut(*length));
+    Some((q, root))
+}
+
+/// Returns the covariance of Qᵀr by the noise of all pulses, less what independent lines would have.
+fn scatter(data: &FrequencyData, responses: &ForceResponses, q: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, count) = (data.dof(), q.ncols());
     let mut excess = DMatrix::<f64>::zeros(count, count);
     for pulse in data.pulses() {
         let part = q.rows(2 * n * pulse.rows.start, 2 * n * pulse.rows.len());
         let power = pulse.deviation * pulse.deviation;
         for sample in pulse.samples.clone() {
             let impulse = |row: usize| pulse.impulse(sample, data.omega()[row]);
-            let effect = part.tr_mul(&turned(&pulse.rows, pulse.channel, &impulse));
+            let effect = part.tr_mul(&responses.to(&pulse.rows, pulse.channel, &impulse));
             excess.ger(power, &effect, &effect, 1.0);
         }
         for row in pulse.rows.clone() {
-            let one = row..row + 1;
             let part = q.rows(2 * n * row, 2 * n);
             let variance = 0.5 * data.force_variance()[(row, pulse.channel)];
             for phase in [Complex::new(1.0, 0.0), Complex::new(0.0, 1.0)] {
-                let effect = part.tr_mul(&turned(&one, pulse.channel, &|_| phase));
+                let one = row..row + 1;
+                let effect = part.tr_mul(&responses.to(&one, pulse.channel, &|_| phase));
                 excess.ger(-variance, &effect, &effect, 1.0);
             }
         }
     }
-    Some(&root * excess * root.transpose())
+    excess
 }
