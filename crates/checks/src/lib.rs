@@ -3,6 +3,19 @@
 //! Every check returns [`Finding`]s: values with named numbers, a [`Verdict`], a [`Subject`] and, from
 //! a statistical test, a p-value. Their [`Display`](std::fmt::Display) is one sentence. The limits
 //! that decide a verdict are in [`limits`].
+//!
+//! ```
+//! use mechid_checks::{Verdict, periodicity};
+//! use mechid_signal::{Record, Sampling};
+//!
+//! // A parabola is no whole period of anything.
+//! let sampling = Sampling::new(0.01, 100)?;
+//! let parabola = sampling.times().map(|t| t * t).collect();
+//! let finding = periodicity(&Record::from_channel(sampling, parabola)?);
+//! assert_eq!(finding.verdict(), Verdict::Bad);
+//! println!("{finding}");
+//! # Ok::<(), mechid_signal::SignalError>(())
+//! ```
 
 mod after;
 mod before;

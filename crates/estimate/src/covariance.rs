@@ -6,8 +6,9 @@ use nalgebra::{Complex, DMatrix, DVector};
 #[derive(Debug, Clone, PartialEq)]
 pub enum Covariance {
     /// Every entry.
+    /// In products of SI units.
     Full(DMatrix<f64>),
-    /// Of equations that were solved one by one: n equations of 3n unknowns each have (3n²)² covariances,
+    /// Products for equations that were solved one by one: n equations of 3n unknowns each have (3n²)² covariances,
     /// but not many more than (3n)² numbers in them.
     Product(Product),
 }
@@ -17,12 +18,14 @@ pub enum Covariance {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Product {
     /// S, equations × equations.
+    /// In products of SI units.
     pub residual: DMatrix<f64>,
     /// The different rows h, one below the other.
+    /// In inverse SI units of the regressors.
     pub rows: DMatrix<f64>,
     /// For every parameter the number of its equation, and that of its row h.
     pub places: Vec<(usize, usize)>,
-    /// Whether the data leave it open.
+    /// Flag of each parameter that the data leave open.
     pub open: Vec<bool>,
 }
 
@@ -34,6 +37,7 @@ impl From<DMatrix<f64>> for Covariance {
 
 impl Covariance {
     /// The variance of one parameter.
+    /// In the square of the SI unit.
     pub fn of(&self, at: usize) -> f64 {
         match self {
             Self::Product(product) if product.open[at] => f64::INFINITY,
@@ -42,6 +46,7 @@ impl Covariance {
     }
 
     /// The covariance of two parameters; NaN if the data leave one open.
+    /// In the product of both SI units.
     pub fn between(&self, p: usize, q: usize) -> f64 {
         match self {
             Self::Full(all) => all[(p, q)],
@@ -66,6 +71,7 @@ impl Covariance {
     }
 
     /// All entries, parameters × parameters.
+    /// In products of SI units.
     pub fn full(&self) -> DMatrix<f64> {
         match self {
             Self::Full(all) => all.clone(),
@@ -85,6 +91,10 @@ impl Covariance {
     }
 
     /// The covariance of sums f_i = Σ w_p θ_p over the parameters p of equation i: 2n×2n, real parts first.
+    /// One weight for each parameter, in any unit.
+    ///
+    /// # Source
+    /// The law of propagation of uncertainty.
     pub fn of_sums(&self, weights: &[Complex<f64>], equations: &[usize], n: usize) -> DMatrix<f64> {
         let parts = || weights.iter().map(|w| [w.re, w.im]).zip(equations).enumerate();
         match self {
@@ -123,6 +133,7 @@ impl Covariance {
     }
 
     /// gᵀ Σ g, the variance of gᵀθ.
+    /// The gradient has one entry per parameter, in inverse SI units.
     pub fn variance(&self, gradient: &DVector<f64>) -> f64 {
         match self {
             Self::Full(all) => gradient.dot(&(all * gradient)),

@@ -30,7 +30,7 @@ pub struct Estimate {
 
 /// Results from which an estimator makes an [`Estimate`]; values in the order of `unknowns.free()`.
 pub struct EstimateParts {
-    /// What was unknown.
+    /// Unknown entries of M, C and K.
     pub unknowns: Unknowns,
     /// Values, in the SI unit of each.
     pub values: Vec<f64>,
@@ -118,6 +118,10 @@ impl Estimate {
     }
 
     /// The same of a change of the parameters.
+    /// A change has one entry per parameter, in its SI unit; the length is a pure number.
+    ///
+    /// # Source
+    /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
     pub fn squared_length(&self, change: &DVector<f64>) -> Option<f64> {
         let errors = self.parameters().map(|p| p.standard_error);
         let scale = DVector::from_iterator(self.values.len(), errors);
@@ -133,6 +137,10 @@ impl Estimate {
     }
 
     /// The same fit at other values, in the order of [`Unknowns::free`], with another covariance.
+    /// Values have one entry per parameter, in its SI unit.
+    ///
+    /// # Errors
+    /// As [`Estimate::new`].
     pub fn moved(
         &self,
         values: Vec<f64>,

@@ -103,6 +103,10 @@ impl Relations {
     }
 
     /// θ(p).
+    /// In SI units.
+    ///
+    /// # Source
+    /// Rayleigh, *The Theory of Sound*, vol. 1 (1877), article 97 (proportional damping).
     pub fn entries(&self, unknowns: &[f64]) -> DVector<f64> {
         let value = |source: &Source| match source {
             Source::Shared(at) => unknowns[*at],
@@ -115,6 +119,10 @@ impl Relations {
     }
 
     /// ∂θ/∂p, entries × unknowns.
+    /// In SI units.
+    ///
+    /// # Source
+    /// As [`Relations::entries`].
     pub fn tangent(&self, unknowns: &[f64]) -> DMatrix<f64> {
         let mut tangent = DMatrix::zeros(self.entries.len(), self.count());
         for (row, source) in self.entries.iter().enumerate() {
@@ -135,6 +143,10 @@ impl Relations {
 
     /// p of entries that obey the relations; of others the means of those that should be one, and the α and
     /// β that come nearest.
+    /// In SI units.
+    ///
+    /// # Source
+    /// As [`Relations::entries`].
     pub fn unknowns(&self, entries: &[f64]) -> DVector<f64> {
         let mut unknowns = DVector::zeros(self.count());
         let mut counts = vec![0.0_f64; self.shared];
@@ -156,6 +168,10 @@ impl Relations {
 
     /// α and β with their gradients over the entries, which obey the relations; `None` without proportional
     /// damping.
+    /// In SI units.
+    ///
+    /// # Source
+    /// As [`Relations::entries`].
     pub fn damping_factors(&self, entries: &[f64]) -> Option<[(f64, DVector<f64>); 2]> {
         if !self.proportional {
             return None;

@@ -53,6 +53,7 @@ impl Cholesky {
     }
 
     /// A⁻¹b.
+    /// In the unit of b over that of A.
     pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         let mut solution = right.clone();
         self.lower.solve_lower_triangular_unchecked_mut(&mut solution);
@@ -61,6 +62,7 @@ impl Cholesky {
     }
 
     /// L⁻¹.
+    /// Rows × columns as A, in the root of the inverse unit of A.
     pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);

@@ -46,7 +46,7 @@ pub enum NumericsError {
         /// Root sum of squares of the column, in its unit; 0 where all squares vanish.
         norm: f64,
     },
-    /// There are fewer equations than unknowns.
+    /// Fewer equations than unknowns are given.
     #[error(
         "{} {} not determine {}: use a longer record or fewer unknowns",
         count(*rows, "equation"),
@@ -131,6 +131,7 @@ pub fn check_size(what: &'static str, expected: usize, got: usize) -> Result<(),
 }
 
 /// Returns an error that names the first value that is not finite, if there is one.
+/// Rows × columns, in any unit.
 ///
 /// # Errors
 /// [`NumericsError::NotFinite`].

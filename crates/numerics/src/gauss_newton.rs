@@ -57,6 +57,7 @@ pub trait SumOfSquares {
     type Linearisation: Linearisation;
 
     /// Returns the sum at `parameters`, `None` where it does not exist.
+    /// The parameters are a list in any units; the sum is in the square of the unit of the residuals.
     fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64>;
 
     /// Makes the parameters last tried those that everything else refers to.
@@ -67,6 +68,7 @@ pub trait SumOfSquares {
 
     /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the parameters;
     /// `None` if it is not known, and steps are straight.
+    /// The change is a list, one entry for each parameter, in its unit.
     fn curvature(
         &self,
         _linearisation: &Self::Linearisation,
@@ -80,8 +82,10 @@ pub trait SumOfSquares {
 #[derive(Debug, Clone)]
 pub struct Minimum {
     /// Parameters reached.
+    /// A list, each in its unit.
     pub parameters: DVector<f64>,
     /// Sum of squares there.
+    /// In the square of the unit of the residuals.
     pub cost: f64,
     /// Number of steps taken.
     pub steps: usize,
@@ -99,6 +103,7 @@ pub struct Minimum {
 ///
 /// and the step v + a is tried if a is small against v. The correction follows the curved valleys of parameters
 /// that the data determine badly, where straight steps have to be tiny.
+/// Parameters are a list in any units.
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for the damping;

@@ -54,8 +54,10 @@ pub struct Solution {
     /// The combinations of unknowns on which the data say nothing.
     pub undetermined: Vec<Direction>,
     /// A⁺ acting on the triangular factor's rows.
+    /// In inverse units of the regressors.
     pub inverse: DMatrix<f64>,
     /// Residuals of the triangular factor's rows.
+    /// In the units of the targets.
     pub residuals: DMatrix<f64>,
 }
 
@@ -114,6 +116,7 @@ impl LeastSquares {
     }
 
     /// The triangle of \[A | B\], which has the Gram matrix of all rows so far.
+    /// In the units of regressors and targets.
     pub fn triangle(&self) -> &DMatrix<f64> {
         self.factor.r()
     }
@@ -152,6 +155,13 @@ impl LeastSquares {
 }
 
 /// Least squares on rows that stand for `rows` original ones with the same Gram matrices.
+/// Units are those of [`Solution`].
+///
+/// # Errors
+/// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`], and what a decomposition refuses.
+///
+/// # Source
+/// As [`LeastSquares::solve`].
 pub fn solve_compressed(
     regressors: DMatrixView<'_, f64>,
     targets: DMatrixView<'_, f64>,

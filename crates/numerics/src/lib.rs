@@ -11,6 +11,15 @@
 //! | the logarithm of a matrix, its integral and their derivatives | [`logarithm`] |
 //! | the minimum of a function of a few variables, without derivatives | [`nelder_mead`] |
 //! | values with a standard error, and their intervals | [`Uncertain`] |
+//!
+//! ```
+//! use mechid_numerics::Uncertain;
+//!
+//! let stiffness = Uncertain { value: 5000.0, standard_error: 12.0, degrees_of_freedom: 30 };
+//! let [low, high] = stiffness.interval(0.95)?;
+//! assert!(low < 4980.0 && high > 5020.0);
+//! # Ok::<(), mechid_numerics::NumericsError>(())
+//! ```
 
 pub mod cholesky;
 mod error;

@@ -68,7 +68,7 @@ pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
 /// \[AΔt BΔt\] from \[Φ − I, Γ\], ready to be differentiated.
 #[derive(Debug, Clone)]
 pub struct Generator {
-    /// \[AΔt BΔt\]: states × (states + inputs).
+    /// \[AΔt BΔt\]: states × (states + inputs), dimensionless.
     pub value: DMatrix<f64>,
     /// Schur vectors of Φ.
     q: DMatrix<f64>,
@@ -83,6 +83,13 @@ pub struct Generator {
 
 impl Generator {
     /// `difference` is Φ − I (states × states), `input` is Γ (states × inputs).
+    /// Both are pure numbers.
+    ///
+    /// # Errors
+    /// [`NumericsError::NoLogarithm`], [`NumericsError::Eigenvalues`].
+    ///
+    /// # Source
+    /// As [`logarithm`].
     pub fn new(difference: &DMatrix<f64>, input: &DMatrix<f64>) -> Result<Self, NumericsError> {
         let (states, inputs) = input.shape();
         let RealSchur { q, t, mut blocks } = RealSchur::new(difference.clone())
@@ -109,7 +116,10 @@ impl Generator {
         Ok(generator)
     }
 
-    /// Returns the change of \[AΔt BΔt\] when \[Φ − I, Γ\] changes by `change` (states × (states + inputs)).
+    /// Returns the change of \[AΔt BΔt\] when \[Φ − I, Γ\] changes by `change` (states × (states + inputs)), dimensionless.
+    ///
+    /// # Errors
+    /// [`NumericsError::Eigenvalues`].
     ///
     /// # Source
     /// Al-Mohy, Higham & Relton (2013), SIAM J. Sci. Comput. 35, C394–C410.

@@ -28,6 +28,9 @@ pub fn bearing() -> SecondOrderSystem {
 }
 
 /// Amplitudes of unit size with Schroeder's phases, each channel with its own.
+///
+/// # Source
+/// Schroeder (1970), IEEE Transactions on Information Theory 16, 85–89.
 pub fn forces(lines: &[usize], channels: usize, amplitude: f64) -> ComplexMatrix {
     let count = lines.len() as f64;
     DMatrix::from_fn(lines.len(), channels, |l, c| {
@@ -37,6 +40,7 @@ pub fn forces(lines: &[usize], channels: usize, amplitude: f64) -> ComplexMatrix
 }
 
 /// Displacement amplitudes G(ω) F.
+/// Lines × degrees of freedom, in m.
 pub fn displacements(
     system: &SecondOrderSystem,
     omega: &[f64],
@@ -51,6 +55,9 @@ pub fn displacements(
 }
 
 /// Σ Re(A_n exp(i n ω0 t)) by its definition, times what makes another quantity of it.
+///
+/// # Source
+/// The definition of a Fourier series.
 pub fn synthesise(
     sampling: Sampling,
     lines: &[usize],
@@ -71,11 +78,13 @@ pub fn synthesise(
 }
 
 /// Largest deviation relative to the largest entry.
+/// Matrices of the same rows and columns; a pure number.
 pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     (found - expected).abs().max() / expected.abs().max()
 }
 
 /// All entries of M, C and K in the order of the unknowns when all are free.
+/// In SI units.
 pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
     let matrices = [system.mass(), system.damping(), system.stiffness()];
     DVector::from_iterator(

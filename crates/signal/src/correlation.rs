@@ -92,6 +92,7 @@ pub fn cross_correlation(
 
 /// Returns the correlation with an input of a residual that is correlated itself: `colour` has its coefficients
 /// at the lags 0, 1 … as far as they count.
+/// Residual and input have one value per sample, in any units; coefficients are pure numbers.
 ///
 /// # Errors
 /// As [`cross_correlation`].
@@ -168,8 +169,12 @@ pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     }
 }
 
-/// Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two
+/// Returns Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two
 /// autocorrelations given at 0, 1 … and zero beyond.
+/// Each is a list of pure numbers.
+///
+/// # Source
+/// Bartlett (1946), Supplement to the JRSS 8, 27–41.
 pub fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     let last = a.len() as isize - 1;
     let at = |of: &[f64], lag: isize| of.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
@@ -177,6 +182,7 @@ pub fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
 }
 
 /// Returns the coefficients of centred values at the lags 0 … `lags`, pure numbers.
+/// One value per sample.
 pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     let power = products(centred, centred);
     let at =
@@ -185,9 +191,13 @@ pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
 }
 
 /// Returns values less their mean, in units of a power of two.
+/// One value per sample.
 ///
 /// # Errors
 /// [`SignalError::TooShort`] unless there are `lags + span + 2` values, [`SignalError::NotFinite`].
+///
+/// # Source
+/// Ours.
 pub fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, SignalError> {
     let needed = lags.max(1).saturating_add(span).saturating_add(2);
     if lags == 0 || values.len() < needed {

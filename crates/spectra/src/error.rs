@@ -10,14 +10,14 @@ pub enum SpectraError {
     /// Two things that belong together have different sizes.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// What was counted.
+        /// Name of the items counted.
         what: &'static str,
         /// Number expected.
         expected: usize,
         /// Number found.
         got: usize,
     },
-    /// There is no spectral line in the band.
+    /// No spectral line lies in the band.
     #[error(
         "no spectral line lies between {from_hz} and {to_hz} Hz: the record has lines every {spacing_hz} Hz up to {highest_hz} Hz"
     )]
@@ -37,6 +37,7 @@ pub enum SpectraError {
         /// Row of the line, counted from 0.
         row: usize,
         /// The value.
+        /// In its unit.
         value: f64,
     },
     /// Segments that do not move on, or leave samples out.

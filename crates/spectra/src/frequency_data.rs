@@ -300,6 +300,7 @@ impl FrequencyData {
 
     /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
     /// on the rows of others.
+    /// In m.
     pub fn transient(&self) -> &DMatrix<Complex<f64>> {
         &self.transient
     }
@@ -428,9 +429,13 @@ fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatr
 }
 
 /// Returns an error unless two sets of frequencies (rad/s) are the same up to rounding.
+/// One per line of each set.
 ///
 /// # Errors
 /// [`NumericsError::Size`], [`SpectraError::FrequencyMismatch`].
+///
+/// # Source
+/// Ours.
 pub fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), SpectraError> {
     if left.len() != right.len() {
         let (got, expected) = (right.len(), left.len());

@@ -10,6 +10,19 @@
 //! | sinusoids of unknown frequency | [`sinusoids`] |
 //! | noise: spectrum, pooling, smooth spectra, level, pulses | [`noise`] |
 //! | frequency responses and coherence from averages | [`frf`] |
+//!
+//! ```
+//! use mechid_signal::{Record, Sampling};
+//! use mechid_spectra::Lines;
+//!
+//! // cos(3 ω₀ t) has the amplitude 1 on line 3.
+//! let sampling = Sampling::new(0.01, 64)?;
+//! let samples = sampling.times().map(|t| (3.0 * sampling.omega0() * t).cos()).collect();
+//! let record = Record::from_channel(sampling, samples)?;
+//! let amplitudes = Lines::new(sampling, [2, 3])?.read(&record)?;
+//! assert!((amplitudes[(1, 0)].re - 1.0).abs() < 1e-12 && amplitudes[(0, 0)].norm() < 1e-12);
+//! # Ok::<(), mechid_spectra::SpectraError>(())
+//! ```
 
 mod error;
 pub mod frequency_data;

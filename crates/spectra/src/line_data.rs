@@ -174,11 +174,13 @@ impl LineData {
     }
 
     /// Returns the inputs, lines × q.
+    /// In their units.
     pub fn inputs(&self) -> &DMatrix<Complex<f64>> {
         &self.inputs
     }
 
     /// Returns the outputs, lines × p.
+    /// In their units.
     pub fn outputs(&self) -> &DMatrix<Complex<f64>> {
         &self.outputs
     }

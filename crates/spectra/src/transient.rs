@@ -17,6 +17,7 @@ pub struct TransientLoad<'a> {
 
 impl<'a> TransientLoad<'a> {
     /// Returns the loads `tau` of the open records of `data`.
+    /// Loads are in N times powers of s.
     ///
     /// # Panics
     /// If there are not as many loads as [`len`] says.

@@ -12,12 +12,15 @@ use std::path::{Path, PathBuf};
 use items::{Item, Source};
 
 /// The crates whose every item others call.
-const LIBRARIES: [&str; 12] = [
+const LIBRARIES: [&str; 15] = [
     "signal",
+    "numerics",
     "model",
     "bearing",
     "integrate",
+    "spectra",
     "estimate",
+    "checks",
     "force",
     "io",
     "analysis",

@@ -9,7 +9,7 @@ use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};
 use crate::relations::Relations;
 
-/// How well equations of motion fit the lines of spectra, whatever the delay of the force.
+/// Fit of the equation of motion to the lines of spectra as a function of the delay of the force.
 ///
 /// A delay turns the forces alone: the motions with unknown entries are factored once.
 pub struct DelayedForce<'a> {
@@ -40,6 +40,10 @@ impl<'a> DelayedForce<'a> {
     }
 
     /// The same with a weight on each line.
+    /// Weights are a pure number for each line.
+    ///
+    /// # Source
+    /// Ours.
     pub fn weighted(
         data: &'a FrequencyData,
         weight: Vec<f64>,
@@ -69,6 +73,9 @@ impl<'a> DelayedForce<'a> {
     /// Residual power of the driven equations, each over the power of its right-hand side, with the force
     /// `delay` (s) later; of related equations that of all of them, times the number of forces. `None` if it
     /// is not finite.
+    ///
+    /// # Source
+    /// Ours.
     pub fn residual_power(&self, delay: f64) -> Option<f64> {
         let late = |row: usize| Complex::cis(-self.data.omega()[row] * delay);
         let force = real_rows(self.data.force(), |row, f| f * late(row) * self.weight[row]);

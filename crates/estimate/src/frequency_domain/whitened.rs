@@ -20,9 +20,11 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 /// likelihood in errors-in-variables.
 pub struct Whitened {
     /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
+    /// One entry for each real and imaginary part of each line and channel.
     pub residual: DVector<f64>,
     /// Derivative of −`residual` with respect to the free parameters, the independent ones where they are
     /// related, at the most likely force.
+    /// Residuals × parameters, in inverse SI units.
     pub sensitivity: DMatrix<f64>,
 }
 

@@ -158,6 +158,7 @@ impl Transitions {
     }
 
     /// Returns the condition number of the scaled regressors, and how many directions they leave open.
+    /// A pure number.
     ///
     /// # Errors
     /// What [`Transitions::fit`] refuses.

@@ -15,14 +15,17 @@ pub trait Residuals {
     }
 
     /// Writes the residuals at `parameters`; returns `false` where they do not exist.
+    /// Residuals are a list in any unit.
     fn residual(&mut self, parameters: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
 
     /// Writes their derivatives, residuals × parameters, where they were last evaluated.
+    /// Entries are in the unit of the residual over that of the parameter.
     fn jacobian(&self, jacobian: &mut DMatrix<f64>);
 }
 
 /// Searches the local minimum of the sum of squared residuals from `parameters` in at most `max_steps`, each
 /// linearisation by QR decomposition; `None` where the residuals do not exist at the start.
+/// Parameters are in any units, one for each column of the Jacobian.
 ///
 /// # Source
 /// As [`minimise`].

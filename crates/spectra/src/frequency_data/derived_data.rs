@@ -26,6 +26,9 @@ impl FrequencyData {
 
     /// Returns the lines as if all records were whole periods: the response of `system` to the load of the
     /// transients, the force less the `closed` one (N), is subtracted from the displacement (m).
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (the response as receptance times force).
     #[must_use]
     pub fn without_response_to_transient(
         &self,
@@ -117,6 +120,9 @@ impl FrequencyData {
     }
 
     /// Returns the same data with the force `delay` seconds later.
+    ///
+    /// # Source
+    /// The shift theorem of Fourier transforms.
     #[must_use]
     pub fn with_later_force(&self, delay: f64) -> Self {
         let mut later = self.clone();

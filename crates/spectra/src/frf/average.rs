@@ -266,6 +266,7 @@ impl FrfAverage {
     }
 
     /// Returns whether a response has something in common with a force, from so many independent averages.
+    /// Averages are a pure number.
     pub fn response_follows(&self, averages: f64) -> bool {
         let follows = |input: usize| {
             let each =

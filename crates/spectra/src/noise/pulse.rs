@@ -22,6 +22,9 @@ pub struct PulseNoise {
 
 impl PulseNoise {
     /// Returns the amplitude that a force of 1 N on a sample has on a line at `omega` (rad/s), in N.
+    ///
+    /// # Source
+    /// The shift theorem of Fourier transforms.
     pub fn impulse(&self, sample: usize, omega: f64) -> Complex<f64> {
         let turn = -omega * sample as f64 * self.sampling.dt();
         Complex::from_polar(2.0 / self.sampling.len() as f64, turn)

@@ -28,8 +28,10 @@ pub struct NoiseSpectrum {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothPart {
     /// Orthonormal columns, rows × terms.
+    /// Dimensionless.
     pub basis: DMatrix<f64>,
     /// Complex deviations that each sample covariance was made of.
+    /// A pure number.
     pub nu: f64,
 }
 
@@ -107,6 +109,9 @@ impl NoiseSpectrum {
 
     /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`; it may
     /// be smooth over the `relative` powers of the channels (rows × 2n) instead of being smooth itself.
+    ///
+    /// # Errors
+    /// As [`NoiseSpectrum::new`].
     pub fn of_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
@@ -130,6 +135,9 @@ impl NoiseSpectrum {
 
     /// The same noise and beside it white noise of these variances on the samples of each channel, 2n: motions in
     /// the square of the unit measured, forces in N².
+    ///
+    /// # Source
+    /// As [`NoiseSpectrum::white`].
     pub fn with_more(
         mut self,
         variance: &[f64],
@@ -170,6 +178,9 @@ impl NoiseSpectrum {
     }
 
     /// The noise of data whose force is `delay` seconds later.
+    ///
+    /// # Source
+    /// The shift theorem of Fourier transforms.
     pub fn with_later_force(&self, delay: f64) -> Self {
         let mut later = self.clone();
         for (c, omega) in later.covariance.iter_mut().zip(&self.omega) {
