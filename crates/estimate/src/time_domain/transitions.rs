@@ -163,10 +163,6 @@ impl Transitions {
     /// # Errors
     /// What [`Transitions::fit`] refuses.
     pub fn condition(&self, discretisation: Discretisation) -> Result<(f64, usize), EstimateError> {
-    pub fn condition(
-        &self,
-        discretisation: Discretisation,
-    ) -> Result<(f64, usize), EstimateError> {
         let solution = super::fit::regression(self, discretisation)?.solution;
         Ok((solution.condition, solution.undetermined.len()))
     }

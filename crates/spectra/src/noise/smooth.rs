@@ -106,8 +106,6 @@ pub struct Smooth {
 /// Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995), Journal of Time
 /// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
 pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
-    let group = omega.len().div_ceil(SEARCHED);
-pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let group = omega.len().div_ceil(SMOOTH_SEARCHED);
     if group <= 1 {
         return searched(omega, variances, nu);
