@@ -2,7 +2,8 @@
 
 use mechid_signal::message;
 
-/// An integration that cannot be set up or carried out; every variant carries the offending numbers.
+/// An integration that cannot be set up or carried out; every variant carries the offending
+/// numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IntegrateError {
@@ -56,7 +57,7 @@ pub enum IntegrateError {
         /// The degree of freedom, counted from 0.
         index: usize,
     },
-    /// The forces within the steps do not lie on the time axis of the force.
+    /// The forces within the steps have another time axis than the force.
     #[error(
         "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", message::count(*got, "sample"),
         got_dt = message::number(*got_dt), dt = message::number(*dt)
@@ -100,7 +101,7 @@ pub enum IntegrateError {
     SingularMass {
         /// Name of the scheme.
         scheme: &'static str,
-        /// Smallest pivot of its factorisation, rows divided by the size of their terms (pure number).
+        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
         smallest: f64,
     },
     /// The matrix the scheme has to solve with is singular.
@@ -113,10 +114,10 @@ pub enum IntegrateError {
         scheme: &'static str,
         /// Time step, in seconds.
         dt: f64,
-        /// Smallest pivot of its factorisation, rows divided by the size of their terms.
+        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
         smallest: f64,
     },
-    /// Factors of a matrix take more memory than they may.
+    /// The factors of a matrix need more memory than the limit.
     #[error(
         "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: a body in three \
          dimensions fills in. Use a coarser model, a scheme or a search that factors a diagonal matrix \
@@ -132,7 +133,7 @@ pub enum IntegrateError {
         /// Limit, in bytes.
         limit: u64,
     },
-    /// The matrix K + σC + σ²M, by which modes are searched for, is singular.
+    /// The matrix K + σC + σ²M of a search for modes is singular.
     #[error(
         "the dynamic stiffness of the {} at {omega} rad/s is singular (pivot {smallest:.1e} of its terms): \
          search for modes near another frequency",
@@ -141,7 +142,7 @@ pub enum IntegrateError {
     SingularShift {
         /// Im σ, in rad/s.
         omega: f64,
-        /// Smallest pivot of its factorisation, rows divided by the size of their terms (pure number).
+        /// Smallest pivot of its factorisation, relative to the terms of its row (pure number).
         smallest: f64,
         /// Degrees of freedom of the system.
         dof: usize,
@@ -194,7 +195,7 @@ pub enum IntegrateError {
         /// Largest stable step in seconds, if there is one.
         critical_step: Option<f64>,
     },
-    /// A start from rest was asked for, but the machine moves.
+    /// A start from rest was requested, but the initial velocity is not zero.
     #[error(
         "the start from rest needs zero initial velocity, component {component} is {velocity} m/s",
         velocity = message::number(*velocity)
@@ -205,7 +206,7 @@ pub enum IntegrateError {
         /// Velocity, in m/s.
         velocity: f64,
     },
-    /// No response repeats with the period of the force, or none that can be told from rounding.
+    /// No response repeats with the period of the force, or rounding hides it.
     #[error(
         "no unique response repeats every {period} s: the free motion repeats too \
          (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
@@ -219,7 +220,7 @@ pub enum IntegrateError {
         /// Change that rounding alone can make.
         rounding: f64,
     },
-    /// The response of a large linear system that repeats is not found in the space searched.
+    /// The periodic response of a large linear system was not found in the Krylov space.
     #[error(
         "the response that repeats every {period} s is not found to rounding: after {products} passes over the \
          period the best still changes by {missed:.1e} of its size in a period; much of the free motion \
@@ -229,12 +230,12 @@ pub enum IntegrateError {
     PeriodNotClosed {
         /// Period of the force, in seconds.
         period: f64,
-        /// Rest of the gap, relative to the largest displacement, velocity or acceleration.
+        /// Change over a period, relative to the largest displacement, velocity or acceleration.
         missed: f64,
-        /// Number of passes over the period that the search took.
+        /// Number of passes over the period.
         products: usize,
     },
-    /// Newton's method finds no response of a nonlinear system that repeats with the force.
+    /// Newton's method found no periodic response of a nonlinear system.
     #[error(
         "no response that repeats every {period} s is found from there: the best still changes by \
          {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
@@ -243,7 +244,7 @@ pub enum IntegrateError {
     NoOrbit {
         /// Period of the force, in seconds.
         period: f64,
-        /// Rest of the gap, relative to the largest displacement, velocity or acceleration.
+        /// Change over a period, relative to the largest displacement, velocity or acceleration.
         missed: f64,
     },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
@@ -255,10 +256,10 @@ pub enum IntegrateError {
     NotSolved {
         /// Instant, in seconds.
         time: f64,
-        /// Amount by which the accelerations miss their equation, in m/s².
+        /// Residual of the accelerations, in m/s².
         residual: f64,
     },
-    /// The system has nonlinear forces, which are not possible here.
+    /// The system has nonlinear forces, which this scheme or analysis does not support.
     #[error("{what} is for linear systems, and this one has nonlinear forces")]
     LinearOnly {
         /// Scheme or analysis.

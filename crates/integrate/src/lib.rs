@@ -30,73 +30,55 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `mechid-model` has the systems and `mechid-signal` the forces: a program that uses this crate depends
-//! on them, too.
+//! `mechid-model` has the systems and `mechid-signal` the forces: a program that uses this crate
+//! depends on them, too.
 //!
-//! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
-//! does once what depends on the system and the step and gives a [`Stepper`], whose steps do
-//! not allocate; a [`System`] is dense or sparse, and a [`SystemWithForces`] has forces besides. [`integrate()`] and [`integrate_periodic`] run
-//! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
-//! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
-//! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
+//! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`] does
+//! the work that depends on the system and the step once and returns a [`Stepper`], whose steps do
+//! not allocate. A [`System`] is dense or sparse; a [`SystemWithForces`] also has nonlinear forces.
+//! [`integrate()`] and [`integrate_periodic`] simulate a sampled force, [`integrate_function`] and
+//! [`integrate_periodic_function`] a function of time, [`integrate_selected`] some degrees of
+//! freedom of many. [`spectral_radius`], [`critical_step`] and [`accuracy()`] give the effect of a
+//! step on the motion.
 
-mod accuracy;
-mod arnoldi;
-mod bathe;
-mod central_difference;
-mod collocations;
-mod connection;
-mod driver;
-mod effective;
 mod error;
-mod fixed_size;
-mod force;
-mod free_growth;
-mod generalised_alpha;
-mod houbolt;
-mod matrix_exponential;
+mod krylov;
+mod limits;
 mod modes;
-mod newmark;
-mod newton;
 mod nonlinear;
-mod orbit;
-mod period;
 mod periodic;
-mod run;
-mod runge_kutta;
-mod scheme;
-mod shooting;
+mod schemes;
 mod sparse;
 mod stability;
-mod steady_state;
+mod stepping;
 mod system;
-mod term;
-mod transition;
-mod wilson_theta;
 
-pub use accuracy::{Accuracy, accuracy};
-pub use bathe::{Bathe, SubStepForce};
-pub use central_difference::{CentralDifference, CentralDifferenceStart};
-pub use connection::{Connection, NonlinearElement};
-pub use driver::{
-    SelectedDofs, integrate, integrate_displacement, integrate_function, integrate_selected,
-};
 pub use error::IntegrateError;
-pub use force::SampledForce;
-pub use free_growth::growth_per_period;
-pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
-pub use houbolt::{Houbolt, HouboltStart};
-pub use matrix_exponential::MatrixExponential;
 pub use modes::{ModeSearch, SparseMode, sparse_modes};
-pub use newmark::Newmark;
-pub use nonlinear::{ForceFunction, NonlinearForce, SystemWithForces, Tangents};
-pub use orbit::{PeriodicOrbit, periodic_orbit, periodic_orbit_selected};
-pub use periodic::{integrate_periodic, integrate_periodic_function, integrate_periodic_selected};
-pub use runge_kutta::{MidStepForce, RungeKutta4};
-pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};
+pub use nonlinear::force::{ForceFunction, NonlinearForce, SystemWithForces, Tangents};
+pub use nonlinear::term_forces::TermForces;
+pub use periodic::linear::{
+    integrate_periodic, integrate_periodic_function, integrate_periodic_selected,
+};
+pub use periodic::orbit::{PeriodicOrbit, periodic_orbit, periodic_orbit_selected};
+pub use periodic::sparse_steady_state::sparse_steady_state;
+pub use schemes::bathe::{Bathe, SubStepForce};
+pub use schemes::central_difference::{CentralDifference, CentralDifferenceStart};
+pub use schemes::generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
+pub use schemes::houbolt::{Houbolt, HouboltStart};
+pub use schemes::matrix_exponential::MatrixExponential;
+pub use schemes::newmark::Newmark;
+pub use schemes::runge_kutta::{MidStepForce, RungeKutta4};
+pub use schemes::scheme::{AllowUnstable, Convention, Scheme, StableSteps};
+pub use schemes::wilson_theta::{WilsonLoad, WilsonTheta};
+pub use stability::accuracy::{Accuracy, accuracy};
+pub use stability::free_growth::growth_per_period;
 pub use stability::{critical_step, critical_steps, spectral_radius};
-pub use steady_state::sparse_steady_state;
+pub use stepping::sampled_force::SampledForce;
+pub use stepping::selected_dofs::SelectedDofs;
+pub use stepping::stepper::{Instant, Loads, Stepper};
+pub use stepping::time_loop::{
+    integrate, integrate_displacement, integrate_function, integrate_selected,
+};
+pub use stepping::transition::Transition;
 pub use system::{Matrices, System};
-pub use term::TermForces;
-pub use transition::Transition;
-pub use wilson_theta::{WilsonLoad, WilsonTheta};

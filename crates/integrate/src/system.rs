@@ -1,4 +1,4 @@
-//! The systems a scheme can step through, whatever the storage of their matrices.
+//! Systems that a scheme can simulate, with dense or sparse matrices.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -6,7 +6,8 @@ use std::sync::Arc;
 use mechid_model::{Matrix, SecondOrderSystem, SparseSystem};
 use nalgebra_sparse::csr::CsrMatrix;
 
-use crate::NonlinearForce;
+use crate::limits;
+use crate::nonlinear::force::NonlinearForce;
 
 /// A system M ẍ + C ẋ + K x = F that schemes can be prepared for; with nonlinear forces
 /// M ẍ + C ẋ + K x + Σ g(x, ẋ, t) = F.
@@ -36,7 +37,7 @@ pub trait System: Sync {
     }
 }
 
-/// The matrices M (kg), C (N·s/m) and K (N/m), each n×n, in one of the storages there are.
+/// The matrices M (kg), C (N·s/m) and K (N/m), each n×n, dense or sparse.
 #[derive(Debug, Clone, Copy)]
 pub enum Matrices<'a> {
     /// All entries.
@@ -64,14 +65,8 @@ impl System for Matrices<'_> {
     }
 }
 
-/// Number of degrees of freedom up to which dense matrices are always taken as dense.
-const ALWAYS_DENSE: usize = 64;
-
-/// Fraction of non-zero entries below which larger dense matrices are taken as sparse.
-const SPARSE_BELOW: f64 = 0.1;
-
 impl<'a> Matrices<'a> {
-    /// One of the three matrices by its non-zero entries.
+    /// Returns one of the three matrices in sparse form.
     pub(crate) fn sparse(self, which: Matrix) -> Cow<'a, CsrMatrix<f64>> {
         match self {
             Matrices::Dense(system) => Cow::Owned(CsrMatrix::from(system.matrix(which))),
@@ -83,10 +78,10 @@ impl<'a> Matrices<'a> {
     pub(crate) fn dense(self) -> Option<&'a SecondOrderSystem> {
         let Matrices::Dense(system) = self else { return None };
         let n = system.dof();
-        if n <= ALWAYS_DENSE {
+        if n <= limits::DENSE_DOF {
             return Some(system);
         }
-        let most = (SPARSE_BELOW * (n * n) as f64) as usize;
+        let most = (limits::SPARSE_FRACTION * (n * n) as f64) as usize;
         let full = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
             .iter()
             .any(|which| system.matrix(*which).iter().filter(|v| **v != 0.0).count() > most);

@@ -57,7 +57,7 @@ fn a_step_of_a_large_system_allocates_nothing() {
             g[0] = 50.0 * (x[0] - x[1]).powi(3) + 3.0 * v[0] + t.sin();
             g[1] = -g[0];
         });
-        let gap = Connection::to_ground(2).gap(0.05, 3e3).unwrap();
+        let gap = TermForces::new(&"k: gap(x3, 0.05)".parse().unwrap(), &[3e3]).unwrap();
         let nonlinear = SystemWithForces::new(&linear).with(film).unwrap().with(gap).unwrap();
         for (system, scheme) in schemes()
             .iter()

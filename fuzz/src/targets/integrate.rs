@@ -1,12 +1,12 @@
 //! Calls of `mechid-integrate`.
 
 use mechid_integrate::{
-    AllowUnstable, Bathe, CentralDifference, Connection, GeneralisedAlpha, Houbolt,
-    MatrixExponential, Newmark, NonlinearElement, RungeKutta4, Scheme, SelectedDofs,
-    SystemWithForces, WilsonTheta, accuracy, critical_step, integrate, integrate_function,
-    integrate_periodic, integrate_selected, periodic_orbit, spectral_radius,
+    AllowUnstable, Bathe, CentralDifference, GeneralisedAlpha, Houbolt, MatrixExponential, Newmark,
+    RungeKutta4, Scheme, SelectedDofs, SystemWithForces, TermForces, WilsonTheta, accuracy,
+    critical_step, integrate, integrate_function, integrate_periodic, integrate_selected,
+    periodic_orbit, spectral_radius,
 };
-use mechid_model::{Response, ResponseQuantity, StateTransition};
+use mechid_model::{Response, ResponseQuantity, StateTransition, Terms};
 
 use super::draw::{Draw, finite, passed};
 
@@ -73,19 +73,22 @@ fn scheme(d: &mut Draw) -> Result<Option<Box<dyn Scheme>>, String> {
     }
 }
 
-fn element(d: &mut Draw) -> Result<Option<NonlinearElement>, String> {
-    let at = if d.one_in(2) {
-        Connection::to_ground(d.size())
+fn element(d: &mut Draw) -> Result<Option<TermForces>, String> {
+    let [i, j] = [0; 2].map(|_| 1 + d.below(3));
+    let (x, v) = if d.one_in(2) {
+        (format!("x{i}"), format!("v{i}"))
     } else {
-        Connection::between(d.below(3), d.below(3))
+        (format!("(x{i}-x{j})"), format!("(v{i}-v{j})"))
     };
     let [a, b] = [0; 2].map(|_| d.number());
-    match d.below(4) {
-        0 => passed(at.spring(&d.numbers(4))),
-        1 => passed(at.damper(&d.numbers(4))),
-        2 => passed(at.gap(a, b)),
-        _ => passed(at.friction(a, b)),
-    }
+    let text = match d.below(4) {
+        0 => format!("k2: {x}^2, k3: {x}^3"),
+        1 => format!("c2: |{v}| {v}, c3: {v}^3"),
+        2 => format!("k2: {x}^2, g: gap({x}, {a})"),
+        _ => format!("k2: {x}^2, f: tanh({v}/{a})"),
+    };
+    let Some(terms) = passed(text.parse::<Terms>())? else { return Ok(None) };
+    passed(TermForces::new(&terms, &[b, d.number()]))
 }
 
 fn motion<E: std::fmt::Display>(response: Result<Response, E>) -> Result<(), String> {

@@ -280,7 +280,7 @@ fn duffing_by_hand([m, c, k, cubic]: [f64; 4], force: &[f64]) -> [Vec<f64>; 3] {
 fn nonlinear(ratios: &mut Vec<Ratio>) {
     let one = |v: f64| DMatrix::from_element(1, 1, v);
     let linear = SecondOrderSystem::new(one(1.0), one(0.2), one(400.0)).expect("regular");
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1e5]).expect("finite");
+    let cubic = TermForces::new(&"k3: x1^3".parse().expect("a term"), &[1e5]).expect("finite");
     let duffing = SystemWithForces::new(&linear).with(cubic).expect("inside");
     let steps = if is_tried_only() { 100 } else { 200_000 };
     let (force_1, rest) = (force(steps), InitialState::rest(1));

@@ -6,28 +6,19 @@ use nalgebra_sparse::coo::CooMatrix;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
-use super::ModeSearch;
-use crate::IntegrateError;
+use crate::error::IntegrateError;
+use crate::krylov::start_vector::numbered_start_vector;
+use crate::limits;
+use crate::modes::ModeSearch;
 use crate::sparse::{GeneralLu, NotFactored, SparseLu, combination};
-use crate::stability::krylov::scattered_number;
 
-/// Shift of a machine that is free to drift, over the size of its highest natural frequency.
-pub(super) const FREE_SHIFT: f64 = 1e-3;
-
-/// Ratio of frequencies above which velocities are measured in another unit.
-const WIDE: f64 = 10.0;
-
-/// Steps by which the lowest natural frequency is guessed.
-const LOWEST_STEPS: usize = 3;
-
-/// Largest part of a shift that is imaginary of one that is taken as real.
-const NEARLY_REAL: f64 = 1e-6;
-
-/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ / s].
+/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ
+/// / s].
 pub(super) struct Inverse<'a> {
     system: &'a SparseSystem,
     pub(super) shift: Complex<f64>,
-    /// s, a frequency (rad/s) of the modes searched for: both halves of their z are then of one size.
+    /// s, a frequency (rad/s) near the modes searched for: both halves of z then have comparable
+    /// sizes.
     pub(super) scale: f64,
     factors: Factors,
 }
@@ -39,7 +30,10 @@ enum Factors {
 }
 
 impl<'a> Inverse<'a> {
-    pub(super) fn of(system: &'a SparseSystem, search: ModeSearch) -> Result<Self, IntegrateError> {
+    pub(super) fn new(
+        system: &'a SparseSystem,
+        search: ModeSearch,
+    ) -> Result<Self, IntegrateError> {
         match search {
             ModeSearch::Lowest => {
                 Self::real(system, 0.0).or_else(|error: IntegrateError| {
@@ -47,11 +41,11 @@ impl<'a> Inverse<'a> {
                         return Err(error);
                     }
                     // A machine that is free to drift.
-                    let omega = match fastest(system) {
+                    let omega = match highest_frequency(system) {
                         0.0 => 1.0,
                         omega => omega,
                     };
-                    Self::real(system, -FREE_SHIFT * omega)
+                    Self::real(system, -limits::FREE_SHIFT * omega)
                 })
             }
             ModeSearch::NearOmega(omega) => Self::complex(system, Complex::new(0.0, omega)),
@@ -63,12 +57,12 @@ impl<'a> Inverse<'a> {
         matches!(Self::real(system, 0.0), Err(IntegrateError::SingularShift { .. }))
     }
 
-    /// With a shift anywhere.
+    /// Creates the operator about any shift.
     pub(super) fn near(
         system: &'a SparseSystem,
         shift: Complex<f64>,
     ) -> Result<Self, IntegrateError> {
-        if shift.im.abs() > NEARLY_REAL * shift.norm() {
+        if shift.im.abs() > limits::REAL_SHIFT * shift.norm() {
             Self::complex(system, shift)
         } else {
             Self::real(system, shift.re)
@@ -95,13 +89,15 @@ impl<'a> Inverse<'a> {
         Ok(Self { system, shift, scale: shift.norm(), factors })
     }
 
-    /// Measures velocities in units of `omega` (rad/s) if the operator is about zero and they were measured in
-    /// far smaller ones; returns whether they were.
+    /// Measures velocities in units of `omega` (rad/s) if the operator is about zero and they were
+    /// measured in far smaller ones; returns whether they were.
     ///
-    /// Modes far above the unit have a numerical range about zero of the size of 1/unit, in which the values
-    /// that a space gives lie anywhere until the modes have converged.
+    /// Modes far above the unit have a numerical range of size 1/unit about zero. Until they
+    /// converge, the estimates of their eigenvalues lie anywhere in this range.
     pub(super) fn suits(&mut self, omega: f64) -> bool {
-        let is_far = self.shift == Complex::ZERO && omega > WIDE * self.scale && omega.is_finite();
+        let is_far = self.shift == Complex::ZERO
+            && omega > limits::VELOCITY_SCALE_RATIO * self.scale
+            && omega.is_finite();
         if is_far {
             self.scale = omega;
         }
@@ -112,9 +108,9 @@ impl<'a> Inverse<'a> {
     fn lowest(&mut self) -> f64 {
         let n = self.system.dof();
         let Factors::Real(factors) = &mut self.factors else { return 1.0 };
-        let mut x = scattered_number(n, 0);
+        let mut x = numbered_start_vector(n, 0);
         let mut growth = 1.0;
-        for _ in 0..LOWEST_STEPS {
+        for _ in 0..limits::LOWEST_FREQUENCY_STEPS {
             let mut next = vec![0.0; n];
             subtract(self.system.matrix(Matrix::Mass), x.as_slice(), 1.0, &mut next);
             factors.solve(&mut next);
@@ -128,7 +124,8 @@ impl<'a> Inverse<'a> {
         growth.sqrt().recip()
     }
 
-    /// With Q y = −(M v + (C + σM) x), w = x + σ y: the real parts of y and w, v and w in units of s.
+    /// Applies the operator. With Q y = −(M v + (C + σM) x) and w = x + σ y it returns the real
+    /// parts of y and w; v and w are in units of s.
     pub(super) fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         let (x, v) = z.as_slice().split_at(n);
@@ -158,8 +155,8 @@ impl<'a> Inverse<'a> {
         image
     }
 
-    /// The eigenvalue of the system that belongs to `theta` of the operator: of two the nearer one to
-    /// `about`.
+    /// Returns the eigenvalue of the system for `theta` of the operator; of two candidates the one
+    /// nearer to `about`.
     pub(super) fn eigenvalue(&self, theta: Complex<f64>, about: Complex<f64>) -> Complex<f64> {
         let omega = self.shift.im;
         if omega == 0.0 {
@@ -219,7 +216,7 @@ pub(crate) fn dynamic_stiffness(
 }
 
 /// √(‖K‖ / ‖M‖) (rad/s), the size of the highest natural frequency.
-pub(super) fn fastest(system: &SparseSystem) -> f64 {
+pub(super) fn highest_frequency(system: &SparseSystem) -> f64 {
     let [mass, stiffness] =
         [Matrix::Mass, Matrix::Stiffness].map(|which| largest_row(system.matrix(which)));
     (stiffness / mass).sqrt()

@@ -1,22 +1,13 @@
-//! Shifts at which the search for modes begins again: near those that have not converged, and how far about
-//! one all have.
+//! Shifts at which the search for modes begins again, and the radius within which all modes have
+//! converged.
 
 use nalgebra::Complex;
 
-use super::{Found, ModeSearch};
-
-/// Part of an eigenvalue by which a shift misses the one it was moved to: the matrix is not to be singular.
-const OFFSET: f64 = 1e-6;
-
-/// Difference of two converged eigenvalues, relative to their modulus, that makes one of those found from two
-/// shifts.
-const SAME: f64 = 3e-8;
-
-/// Largest residual of a mode that a shift is moved to: others need not be near any.
-const ROUGH: f64 = 1e-2;
+use crate::limits;
+use crate::modes::{Candidate, ModeSearch};
 
 impl ModeSearch {
-    /// What the search puts eigenvalues in order by.
+    /// Returns the distance by which the search orders eigenvalues.
     pub(super) fn distance(self, value: Complex<f64>) -> f64 {
         match self {
             Self::Lowest => value.norm(),
@@ -25,7 +16,7 @@ impl ModeSearch {
     }
 }
 
-/// How far about a shift all modes have converged.
+/// Radius about a shift within which all modes have converged.
 pub(super) struct Reach {
     shift: Complex<f64>,
     /// Distance from the shift (rad/s).
@@ -33,23 +24,23 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    pub(super) fn of(found: &[Found], shift: Complex<f64>) -> Self {
+    pub(super) fn new(modes: &[Candidate], shift: Complex<f64>) -> Self {
         let mut distances: Vec<(f64, bool)> =
-            found.iter().map(|f| ((f.value() - shift).norm(), f.converged)).collect();
+            modes.iter().map(|f| ((f.value() - shift).norm(), f.converged)).collect();
         distances.sort_by(|a, b| a.0.total_cmp(&b.0));
         let converged = distances.iter().take_while(|(_, converged)| *converged);
         Self { shift, radius: converged.last().map_or(0.0, |(distance, _)| *distance) }
     }
 
-    /// The first of the modes within it: those beyond were found from another shift.
-    fn first(&self, modes: &[Found]) -> Option<Complex<f64>> {
+    /// Returns the first of the modes within the radius; the others were found from another shift.
+    fn first(&self, modes: &[Candidate]) -> Option<Complex<f64>> {
         let within = |value: &Complex<f64>| (value - self.shift).norm() <= self.radius;
-        modes.iter().map(Found::value).find(within)
+        modes.iter().map(Candidate::value).find(within)
     }
 
-    /// Returns whether the first of the modes in the order of the search can be told from the edge of what
-    /// has converged, beyond which others may come before them.
-    pub(super) fn covers(&self, modes: &[Found], search: ModeSearch) -> bool {
+    /// Returns whether the first of the modes in the order of the search is well inside the radius;
+    /// outside it unknown modes may precede them.
+    pub(super) fn covers(&self, modes: &[Candidate], search: ModeSearch) -> bool {
         let (Some(first), Some(last)) = (self.first(modes), modes.last()) else { return true };
         let last = last.value();
         let gap = (first - self.shift).norm();
@@ -57,46 +48,55 @@ impl Reach {
             ModeSearch::Lowest => {
                 search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
             }
-            // On the other side of the first there may be as many as on that of the last.
+            // Unknown modes may be on the other side of the first, at the distance of the last.
             ModeSearch::NearOmega(_) => {
-                gap + (last - first).norm() <= self.radius * (1.0 + SAME) + gap * SAME
+                gap + (last - first).norm()
+                    <= self.radius * (1.0 + limits::SAME_EIGENVALUE) + gap * limits::SAME_EIGENVALUE
             }
         }
     }
 }
 
-/// The modes found from this shift and, of those known from others, which it has not found again, in the order
-/// of the search.
-pub(super) fn joined(own: Vec<Found>, known: &[Found], search: ModeSearch) -> Vec<Found> {
-    let same = |one: &Found, other: &Found| {
+/// Returns the modes found from this shift and those known from other shifts, without duplicates,
+/// in the order of the search.
+pub(super) fn merge(
+    new: Vec<Candidate>,
+    known: &[Candidate],
+    search: ModeSearch,
+) -> Vec<Candidate> {
+    let same = |one: &Candidate, other: &Candidate| {
         let gap = (one.value() - other.value()).norm();
-        gap <= SAME * other.value().norm() || (one.mode.is_rigid_body && other.mode.is_rigid_body)
+        gap <= limits::SAME_EIGENVALUE * other.value().norm()
+            || (one.mode.is_rigid_body && other.mode.is_rigid_body)
     };
-    let again = |other: &&Found| own.iter().any(|one| one.converged && same(one, other));
-    let others: Vec<Found> = known.iter().filter(|other| !again(other)).cloned().collect();
-    let mut found = own;
-    found.extend(others);
-    found.sort_by(|a, b| search.distance(a.value()).total_cmp(&search.distance(b.value())));
-    found
+    let again = |other: &&Candidate| new.iter().any(|one| one.converged && same(one, other));
+    let unknown_here: Vec<Candidate> =
+        known.iter().filter(|other| !again(other)).cloned().collect();
+    let mut modes = new;
+    modes.extend(unknown_here);
+    modes.sort_by(|a, b| search.distance(a.value()).total_cmp(&search.distance(b.value())));
+    modes
 }
 
-/// The next shift after one from which the modes wanted have not all converged, or `all_converged` do not
-/// reach far enough.
+/// Returns the next shift, if not all modes wanted have converged from this one, or if they have
+/// (`all_converged`) but the radius is too small.
 pub(super) fn next_shift(
-    found: &[Found],
+    found: &[Candidate],
     reach: &Reach,
     search: ModeSearch,
     all_converged: bool,
 ) -> Option<Complex<f64>> {
     if !all_converged {
         let open = || found.iter().filter(|found| !found.converged && !found.mode.is_rigid_body);
-        let rough = open().find(|found| found.mode.residual <= ROUGH);
-        return rough.or_else(|| open().next()).map(|found| found.value() * (1.0 - OFFSET));
+        let rough = open().find(|found| found.mode.residual <= limits::SHIFT_RESIDUAL);
+        return rough
+            .or_else(|| open().next())
+            .map(|found| found.value() * (1.0 - limits::SHIFT_OFFSET));
     }
     let first = reach.first(found)?;
     match search {
-        // The floor may lie well beyond it.
+        // The first mode may be far above the lower end of the band.
         ModeSearch::Lowest => Some(first + (first - reach.shift) * 3.0),
-        ModeSearch::NearOmega(_) => Some(first * (1.0 - OFFSET)),
+        ModeSearch::NearOmega(_) => Some(first * (1.0 - limits::SHIFT_OFFSET)),
     }
 }

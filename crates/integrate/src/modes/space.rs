@@ -4,30 +4,12 @@ use mechid_model::{Matrix, Mode, SparseSystem};
 use mechid_numerics::RealSchur;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::inverse::{Inverse, largest_row};
-use super::{Found, SparseMode};
-use crate::IntegrateError;
-use crate::stability::krylov::{eigenvector, scattered_number};
-
-/// Number of vectors that the iteration starts from: modes that share an eigenvalue, such as those of a
-/// symmetric rotor in its two planes, are found up to this number.
-const START_VECTORS: usize = 4;
-
-/// Largest part of itself by which an eigenvalue of the inverted operator may miss its equation.
-const CONVERGED: f64 = 1e-8;
-
-/// Eigenvalues of the inverted operator below this part of the largest count as zero.
-const NEGLIGIBLE: f64 = 1e-14;
-
-/// Difference of two such eigenvalues, relative to their modulus, that rounding makes of one.
-const TWINS: f64 = 1e-9;
-
-/// Number of modes looked at beyond those wanted: the order of the operator's eigenvalues is not quite
-/// that of the search.
-const SPARE_MODES: usize = 8;
-
-/// Largest residual of a mode that is returned.
-const RESIDUAL: f64 = 1e-12;
+use crate::error::IntegrateError;
+use crate::krylov::eigenvector::eigenvector;
+use crate::krylov::start_vector::numbered_start_vector;
+use crate::limits;
+use crate::modes::inverse::{Inverse, largest_row};
+use crate::modes::{Candidate, SparseMode};
 
 /// An orthonormal basis of the vectors reached so far, and the operator in it.
 pub(super) struct Space {
@@ -41,16 +23,16 @@ pub(super) struct Space {
 }
 
 impl Space {
-    pub(super) fn of(len: usize) -> Self {
+    pub(super) fn new(len: usize) -> Self {
         let mut space = Self { basis: vec![], columns: vec![], products: 0, added: 0 };
-        (0..START_VECTORS.min(len)).for_each(|_| space.add(len));
+        (0..limits::START_VECTORS.min(len)).for_each(|_| space.add(len));
         space
     }
 
-    /// Adds a vector without structure, if there is a direction left.
+    /// Adds a pseudo-random vector, if the space is not complete.
     fn add(&mut self, len: usize) {
         while self.basis.len() < len && self.added < 10 * len {
-            let mut vector = scattered_number(len, self.added);
+            let mut vector = numbered_start_vector(len, self.added);
             self.added += 1;
             let before = vector.norm();
             self.orthogonalise(&mut vector);
@@ -99,65 +81,98 @@ impl Space {
         system: &SparseSystem,
         inverse: &mut Inverse<'_>,
         count: usize,
-    ) -> Result<Vec<Found>, IntegrateError> {
-        let (m, n) = (self.products, system.dof());
+    ) -> Result<Vec<Candidate>, IntegrateError> {
+        let m = self.products;
         let overflow = || IntegrateError::ModesOverflow { vectors: m };
         let entry = |i: usize, j: usize| self.columns[j].get(i).copied().unwrap_or(0.0);
         let square = DMatrix::from_fn(m, m, entry);
         if square.iter().any(|v| !v.is_finite()) {
             return Err(overflow());
         }
-        let rest = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
+        let remainder = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
         // Column j ends with the vector that its image added.
         let below = self.columns.iter().enumerate().map(|(j, column)| column.len() - 1 - j);
         let below = below.max().unwrap_or(0);
-        let mut thetas = RealSchur::new(square.clone())?.eigenvalues();
-        thetas.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
-        let largest = thetas.first().map_or(0.0, |theta| theta.norm());
-        // Of zero θ the eigenvalue is infinite; a conjugate pair has one mode. The largest come first.
-        thetas.retain(|theta| theta.im >= 0.0 && theta.norm() > NEGLIGIBLE * largest);
-        thetas.truncate(count.saturating_add(SPARE_MODES));
-        let mut found: Vec<Found> = Vec::new();
+        let mut modes: Vec<Candidate> = Vec::new();
         let mut known: Vec<(Complex<f64>, DVector<Complex<f64>>)> = Vec::new();
-        for theta in thetas {
-            let twins = || known.iter().filter(|(t, _)| (t - theta).norm() <= TWINS * theta.norm());
-            let number = twins().count();
-            let Some(mut coordinates) = eigenvector(&square, below, theta, number) else {
-                return Err(overflow());
-            };
-            // Those of one eigenvalue may be any vectors of their space: independent ones, if it has them.
-            let mut apart = coordinates.clone();
-            for (_, twin) in twins() {
-                let part = twin.dotc(&apart);
-                apart.axpy(-part, twin, Complex::from(1.0));
-            }
-            if number > 0 && apart.norm() > 1e-6 {
-                coordinates = apart.normalize();
-            }
-            known.push((theta, coordinates.clone()));
-            let missed = (rest.map(Complex::from) * &coordinates).norm() / theta.norm();
-            let mut z = DVector::<Complex<f64>>::zeros(2 * n);
-            for (q, y) in self.basis.iter().zip(&coordinates) {
-                z.zip_apply(q, |z: &mut Complex<f64>, q| *z += y * q);
-            }
-            let mut shape = z.rows(0, n).into_owned();
-            let about = shape.dotc(&z.rows(n, n)) * inverse.scale / shape.norm_squared();
-            let mut value = inverse.eigenvalue(theta, about);
-            let mut residual = residual_of(system, value, &shape);
-            if missed <= CONVERGED && residual > RESIDUAL {
-                // Rounding of the space is of the size of its largest θ; one more product leaves the less of
-                // it in the directions of smaller θ.
-                let [re, im] = [z.map(|z| z.re), z.map(|z| z.im)].map(|part| inverse.apply(&part));
-                shape = re.rows(0, n).zip_map(&im.rows(0, n), Complex::new);
-                value -= newton_step(system, value, &shape);
-                residual = residual_of(system, value, &shape);
-            }
-            let Some(mode) = Mode::new(value, &shape) else { continue };
-            let mode = SparseMode::of(mode, system);
-            found.push(Found { mode, converged: missed <= CONVERGED && residual <= RESIDUAL });
+        for theta in largest_eigenvalues(&square, count.saturating_add(limits::SPARE_MODES))? {
+            let coordinates =
+                next_eigenvector(&square, below, theta, &known).ok_or_else(overflow)?;
+            let missed = (remainder.map(Complex::from) * &coordinates).norm() / theta.norm();
+            modes.extend(self.candidate(system, inverse, theta, &coordinates, missed));
+            known.push((theta, coordinates));
         }
-        Ok(found)
+        Ok(modes)
     }
+
+    /// Returns the mode of an eigenvalue of the operator with its eigenvector in the basis; its
+    /// relative residual in the space is `missed`.
+    fn candidate(
+        &self,
+        system: &SparseSystem,
+        inverse: &mut Inverse<'_>,
+        theta: Complex<f64>,
+        coordinates: &DVector<Complex<f64>>,
+        missed: f64,
+    ) -> Option<Candidate> {
+        let n = system.dof();
+        let mut z = DVector::<Complex<f64>>::zeros(2 * n);
+        for (q, y) in self.basis.iter().zip(coordinates) {
+            z.zip_apply(q, |z: &mut Complex<f64>, q| *z += y * q);
+        }
+        let mut shape = z.rows(0, n).into_owned();
+        let about = shape.dotc(&z.rows(n, n)) * inverse.scale / shape.norm_squared();
+        let mut value = inverse.eigenvalue(theta, about);
+        let mut residual = residual_of(system, value, &shape);
+        if missed <= limits::RITZ_RESIDUAL && residual > limits::MODE_RESIDUAL {
+            // Rounding in the space is relative to its largest θ; one more product reduces its
+            // share in the directions of smaller θ.
+            let [re, im] = [z.map(|z| z.re), z.map(|z| z.im)].map(|part| inverse.apply(&part));
+            shape = re.rows(0, n).zip_map(&im.rows(0, n), Complex::new);
+            value -= newton_step(system, value, &shape);
+            residual = residual_of(system, value, &shape);
+        }
+        let mode = SparseMode::new(Mode::new(value, &shape)?, system);
+        let converged = missed <= limits::RITZ_RESIDUAL && residual <= limits::MODE_RESIDUAL;
+        Some(Candidate { mode, converged })
+    }
+}
+
+/// Returns up to `most` eigenvalues of the operator in the space, the largest first; a conjugate
+/// pair has one mode, and θ = 0 would mean an infinite eigenvalue.
+fn largest_eigenvalues(
+    square: &DMatrix<f64>,
+    most: usize,
+) -> Result<Vec<Complex<f64>>, IntegrateError> {
+    let mut thetas = RealSchur::new(square.clone())?.eigenvalues();
+    thetas.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    let largest = thetas.first().map_or(0.0, |theta| theta.norm());
+    thetas
+        .retain(|theta| theta.im >= 0.0 && theta.norm() > limits::NEGLIGIBLE_EIGENVALUE * largest);
+    thetas.truncate(most);
+    Ok(thetas)
+}
+
+/// Returns an eigenvector to `theta` that is independent of those `known` to the same multiple
+/// eigenvalue, if its space has another; `None` if numbers overflow.
+fn next_eigenvector(
+    square: &DMatrix<f64>,
+    below: usize,
+    theta: Complex<f64>,
+    known: &[(Complex<f64>, DVector<Complex<f64>>)],
+) -> Option<DVector<Complex<f64>>> {
+    let same =
+        |other: Complex<f64>| (other - theta).norm() <= limits::MULTIPLE_EIGENVALUE * theta.norm();
+    let twins = || known.iter().filter(|(other, _)| same(*other));
+    let number = twins().count();
+    let coordinates = eigenvector(square, below, theta, number)?;
+    let mut apart = coordinates.clone();
+    for (_, twin) in twins() {
+        let part = twin.dotc(&apart);
+        apart.axpy(-part, twin, Complex::from(1.0));
+    }
+    let is_independent = number > 0 && apart.norm() > limits::INDEPENDENT_EIGENVECTOR;
+    Some(if is_independent { apart.normalize() } else { coordinates })
 }
 
 /// ‖(λ²M + λC + K) φ‖ relative to the size of its terms.
@@ -179,8 +194,8 @@ pub(super) fn residual_of(
     sum.camax() / (size * shape.camax())
 }
 
-/// φᴴQφ / φᴴQ′φ of Q(λ) = λ²M + λC + K, by which λ misses the one that suits φ best; zero where the latter
-/// vanishes.
+/// Returns φᴴQφ / φᴴQ′φ with Q(λ) = λ²M + λC + K, the Newton step of λ for the shape φ; zero if the
+/// denominator vanishes.
 fn newton_step(
     system: &SparseSystem,
     value: Complex<f64>,

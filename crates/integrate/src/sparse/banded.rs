@@ -1,13 +1,10 @@
-//! LU factors of a matrix whose entries lie near the diagonal.
+//! LU factors of a matrix whose non-zero entries are near the diagonal.
 
 use nalgebra_sparse::csr::CsrMatrix;
 
-use super::ordering::Ordering;
-use super::tridiagonal::Tridiagonal;
-
-/// Part of the largest entry of its column that a diagonal entry must have to be the pivot: rows are
-/// exchanged only where that keeps rounding small, since every exchange widens the band.
-pub(super) const KEPT_DIAGONAL: f64 = 0.1;
+use crate::limits;
+use crate::sparse::ordering::Ordering;
+use crate::sparse::tridiagonal::Tridiagonal;
 
 /// P A = L U with L of unit diagonal, stored along the columns of the band.
 ///
@@ -30,7 +27,7 @@ pub(crate) struct BandedLu {
     tridiagonal: Option<Box<Tridiagonal>>,
 }
 
-/// A band with room for the entries that exchanges of rows bring above it, column by column.
+/// A band stored by columns, with space for the entries above it that exchanges of rows create.
 struct Band {
     n: usize,
     lower: usize,
@@ -39,7 +36,7 @@ struct Band {
 }
 
 impl Band {
-    fn of(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Self {
+    fn from_matrix(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Self {
         let n = matrix.nrows();
         let places = ordering.places(n);
         let (mut lower, mut upper) = (0, 0);
@@ -61,16 +58,16 @@ impl Band {
         j * (2 * self.lower + self.upper + 1) + self.lower + self.upper + i - j
     }
 
-    /// Rows of column `j` from the diagonal down that can differ from zero.
+    /// Returns the number of rows below the diagonal of column `j` that can be non-zero.
     fn below(&self, j: usize) -> usize {
         self.lower.min(self.n - 1 - j)
     }
 
-    /// Returns the number of rows below the diagonal from which the pivot of column `j` is taken.
+    /// Returns the row of the pivot of column `j`, counted from the diagonal.
     fn pivot(&self, j: usize) -> usize {
         let top = self.at(j, j);
         let column = &self.entries[top..=top + self.below(j)];
-        let (mut at, mut most) = (0, column[0].abs() / KEPT_DIAGONAL);
+        let (mut at, mut most) = (0, column[0].abs() / limits::PIVOT_FRACTION);
         for (k, value) in column.iter().enumerate().skip(1) {
             if value.abs() > most {
                 (at, most) = (k, value.abs());
@@ -86,7 +83,7 @@ impl Band {
         }
     }
 
-    /// Eliminates what is below the diagonal in column `j` from the columns up to `last`.
+    /// Eliminates the entries below the diagonal of column `j` from the columns up to `last`.
     fn eliminate(&mut self, j: usize, last: usize) {
         let (top, below) = (self.at(j, j), self.below(j));
         let reciprocal = self.entries[top].recip();
@@ -110,7 +107,7 @@ impl BandedLu {
         ordering: &Ordering,
         sizes: &[f64],
     ) -> Result<Self, f64> {
-        let mut band = Band::of(matrix, ordering);
+        let mut band = Band::from_matrix(matrix, ordering);
         let n = band.n;
         let mut row_sizes = vec![0.0; n];
         ordering.gather(sizes, &mut row_sizes);
@@ -140,13 +137,13 @@ impl BandedLu {
         }
         let is_tridiagonal = (band.lower, widest) == (1, 1);
         let tridiagonal =
-            if is_tridiagonal { Tridiagonal::of(matrix, ordering).map(Box::new) } else { None };
+            if is_tridiagonal { Tridiagonal::factor(matrix, ordering).map(Box::new) } else { None };
         Ok(Self { tridiagonal, ..Self::packed(&band, widest, exchanges) })
     }
 
     /// Returns whether elimination without exchanges meets positive pivots only.
     pub(crate) fn has_positive_pivots(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> bool {
-        let mut band = Band::of(matrix, ordering);
+        let mut band = Band::from_matrix(matrix, ordering);
         (0..band.n).all(|j| {
             let positive = band.entries[band.at(j, j)] > 0.0;
             if positive {

@@ -1,20 +1,21 @@
-//! The number of entries that the factors of a sparse matrix have.
+//! Number of entries in the factors of a sparse matrix.
 
 use nalgebra_sparse::pattern::SparsityPattern;
 
-use super::ordering::Graph;
+use crate::sparse::ordering::Graph;
 
-/// Number of entries of L and U of a matrix with this pattern, eliminated in the order `old[new]` without
-/// exchanges of rows: two Cholesky factors of the pattern of A + Aᵀ. Exchanges add to it.
+/// Returns the number of entries of L and U of a matrix with this pattern, eliminated in the order
+/// `old[new]` without exchanges of rows: two Cholesky factors of the pattern of A + Aᵀ. Exchanges
+/// add to it.
 ///
-/// Row i of the factor has the nodes on the ways from its entries up the elimination tree.
+/// Row i of the factor has the nodes on the paths from its entries up the elimination tree.
 ///
 /// # Source
 /// Davis, *Direct Methods for Sparse Linear Systems* (2006), sections 4.1 and 4.2.
 pub(super) fn entries(pattern: &SparsityPattern, old: &[usize]) -> u64 {
     const NONE: u32 = u32::MAX;
     let n = old.len();
-    let graph = Graph::of(pattern);
+    let graph = Graph::from_pattern(pattern);
     let mut new = vec![0_u32; n];
     old.iter().enumerate().for_each(|(place, &old)| new[old] = place as u32);
     let (mut parent, mut visited) = (vec![NONE; n], vec![NONE; n]);

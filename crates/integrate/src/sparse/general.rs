@@ -7,17 +7,16 @@ use faer::{Conj, MatMut, Par, Side};
 use nalgebra::ComplexField;
 use nalgebra_sparse::csc::CscMatrix;
 
-use super::{NotFactored, fill, scattered};
+use crate::krylov::start_vector::pseudo_random;
+use crate::limits;
+use crate::sparse::{NotFactored, fill};
 
-/// Solutions from which the smallest singular value is judged.
-const INVERSE_STEPS: usize = 4;
-
-/// Factors of a matrix whose columns are put in the order of little fill-in (COLAMD) and whose rows, scaled
-/// by the sizes of their terms, are exchanged for stability.
+/// Factors of a matrix with columns in an order of little fill-in (COLAMD) and rows scaled by the
+/// sizes of their terms and exchanged for stability.
 pub(crate) struct GeneralLu<T> {
     symbolic: SymbolicLu<usize>,
     numeric: NumericLu<usize, T>,
-    /// 1 / the size of each row's terms.
+    /// 1 / the size of the terms of each row.
     scales: Vec<f64>,
     scratch: MemBuffer,
 }
@@ -26,7 +25,7 @@ impl<T> GeneralLu<T>
 where
     T: ComplexField<RealField = f64> + faer::traits::ComplexField,
 {
-    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors take
+    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
     /// more than `limit` bytes.
     pub(crate) fn new(
         mut matrix: CscMatrix<T>,
@@ -88,15 +87,15 @@ where
     }
 }
 
-/// Smallest shrinking of a vector by a scaled matrix, whose largest entry is 1 at most, that some inverse
-/// iteration with `solve` finds.
+/// Smallest shrinking of a vector by a scaled matrix, whose largest entry is 1 at most, that some
+/// inverse iteration with `solve` finds.
 pub(super) fn reciprocal_condition<T>(n: usize, mut solve: impl FnMut(&mut [T])) -> f64
 where
     T: ComplexField<RealField = f64>,
 {
-    let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
+    let mut vector: Vec<T> = pseudo_random(0).take(n).map(T::from_real).collect();
     let mut growth = 0.0_f64;
-    for _ in 0..INVERSE_STEPS {
+    for _ in 0..limits::CONDITION_STEPS {
         let before = largest(&vector);
         vector.iter_mut().for_each(|v| *v /= T::from_real(before));
         solve(&mut vector);
@@ -119,7 +118,7 @@ pub(super) fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, u
     SymbolicSparseColMatRef::new_checked(matrix.nrows(), matrix.ncols(), offsets, None, rows)
 }
 
-/// Largest modulus; NaN if there is one.
+/// Returns the largest modulus; NaN if the vector has one.
 fn largest<T: ComplexField<RealField = f64>>(vector: &[T]) -> f64 {
     vector
         .iter()
@@ -134,11 +133,11 @@ mod tests {
     use nalgebra::{Complex, DMatrix, DVector};
     use nalgebra_sparse::csr::CsrMatrix;
 
-    use super::super::{Ordering, SparseLu, WIDEST_BAND, is_positive_definite};
     use super::*;
+    use crate::sparse::{Ordering, SparseLu, is_positive_definite};
 
-    /// Every degree of freedom bound to a few others far away, so that no order makes a narrow band; weak
-    /// diagonal entries ask for exchanges of rows.
+    /// Every degree of freedom bound to a few others far away, so that no order makes a narrow
+    /// band; weak diagonal entries ask for exchanges of rows.
     fn wide(n: usize, diagonal: f64, skew: f64) -> CsrMatrix<f64> {
         let links = (0..n).flat_map(|i| [(i, (i * i + 1) % n), (i, (7 * i + 3) % n)]);
         let entries = links.flat_map(|(i, j)| [(i, j, -1.0 - skew), (j, i, -1.0 + skew)]);
@@ -155,7 +154,7 @@ mod tests {
         for (diagonal, skew) in [(9.0, 0.0), (9.0, 0.4), (0.02, 0.4)] {
             let matrix = wide(700, diagonal, skew);
             let ordering = Ordering::narrowing(matrix.pattern());
-            assert!(ordering.diagonals(matrix.pattern()) > WIDEST_BAND);
+            assert!(ordering.diagonals(matrix.pattern()) > limits::BAND_DIAGONALS);
             let x = DVector::from_fn(700, |i, _| (i as f64).sin());
             let b = &DMatrix::from(&matrix) * &x;
             let mut found = b.clone();

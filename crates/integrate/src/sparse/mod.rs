@@ -1,6 +1,6 @@
-//! Sparse matrices: products, and factorisations by band or, where that is wide, by `faer`: of Cholesky for
-//! matrices that are found to be symmetric and positive definite, LU for any others, without exchanges of rows where
-//! the pattern is nearly symmetric and the pivots allow it.
+//! Sparse matrices: products and factorisations. Narrow bands are factored by band; otherwise
+//! `faer` factors symmetric positive definite matrices by Cholesky and others by LU, without
+//! exchanges of rows if the pattern is nearly symmetric and the pivots allow it.
 
 mod banded;
 mod fill;
@@ -15,33 +15,28 @@ mod unsymmetric;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
-use crate::IntegrateError;
+use crate::error::IntegrateError;
+use crate::limits;
 use banded::BandedLu;
 pub(crate) use general::GeneralLu;
 use ordering::Ordering;
 pub(crate) use product::Product;
-use symmetric::{CholeskyFactors, Plan};
+use symmetric::{CholeskyFactors, CholeskyPlan};
 use unsymmetric::{UnsymmetricFactors, UnsymmetricPlan};
-
-/// Most diagonals of a matrix that is factored by band: about where solutions with a grid in two dimensions
-/// take as long either way, 0.4 GB for 100,000 degrees of freedom.
-const WIDEST_BAND: usize = 256;
-
-/// Number of diagonals up to which no other factors are looked for.
-const NARROW_BAND: usize = 32;
 
 /// Reason why a matrix was not factored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum NotFactored {
-    /// The smallest pivot relative to the size of its row (or the reciprocal condition) is no more than
+    /// The smallest pivot relative to the terms of its row (or the reciprocal condition) is
     /// rounding.
     Singular(f64),
-    /// The factors take at least so many bytes, and may not.
+    /// The factors need at least this many bytes, more than the limit.
     TooLarge { bytes: u64, limit: u64 },
 }
 
 impl NotFactored {
-    /// The error of a system with `dof` degrees of freedom, that of a singular matrix being `singular`.
+    /// Returns the error of a system with `dof` degrees of freedom; `singular` gives that of a
+    /// singular matrix.
     pub(crate) fn or_singular(
         self,
         dof: usize,
@@ -56,7 +51,7 @@ impl NotFactored {
     }
 }
 
-/// A sparse matrix factored once for many solves.
+/// A sparse matrix, factored once for many solves.
 pub(crate) enum SparseLu {
     /// Factors after reordering to a narrow band.
     Banded {
@@ -69,15 +64,15 @@ pub(crate) enum SparseLu {
     },
     /// Factors of a matrix that is symmetric and positive definite.
     Symmetric(Box<CholeskyFactors>),
-    /// Factors of a matrix with a pattern that is nearly symmetric, and pivots that need no exchanges.
+    /// Factors of a matrix with a nearly symmetric pattern, and pivots without exchanges.
     Unsymmetric(Box<UnsymmetricFactors>),
     /// Factors of a matrix of any pattern.
     General(Box<GeneralLu<f64>>),
 }
 
 impl SparseLu {
-    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors
-    /// take more than `limit` bytes.
+    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
+    /// more than `limit` bytes.
     pub(crate) fn new(
         matrix: &CsrMatrix<f64>,
         sizes: &[f64],
@@ -85,24 +80,24 @@ impl SparseLu {
     ) -> Result<Self, NotFactored> {
         let ordering = Ordering::narrowing(matrix.pattern());
         let diagonals = ordering.diagonals(matrix.pattern());
-        if diagonals > NARROW_BAND
-            && let Some(plan) = Plan::of(matrix, sizes)
+        if diagonals > limits::NARROW_BAND_DIAGONALS
+            && let Some(plan) = CholeskyPlan::new(matrix, sizes)
             // An entry that is looked up takes about as long as two of a band.
-            && (diagonals > WIDEST_BAND || 2 * plan.work() < diagonals * matrix.nrows())
+            && (diagonals > limits::BAND_DIAGONALS || 2 * plan.work() < diagonals * matrix.nrows())
             && let Some(factors) = plan.factor(limit)?
         {
             return Ok(Self::Symmetric(Box::new(factors)));
         }
         let is_sized = sizes.iter().all(|size| *size > 0.0 && size.is_finite());
-        if diagonals > NARROW_BAND
+        if diagonals > limits::NARROW_BAND_DIAGONALS
             && is_sized
-            && let Some(plan) = UnsymmetricPlan::of(matrix)
-            && (diagonals > WIDEST_BAND || 2 * plan.work() < diagonals * matrix.nrows())
+            && let Some(plan) = UnsymmetricPlan::new(matrix)
+            && (diagonals > limits::BAND_DIAGONALS || 2 * plan.work() < diagonals * matrix.nrows())
             && let Some(factors) = plan.factor(matrix, sizes, limit)?
         {
             return Ok(Self::Unsymmetric(Box::new(factors)));
         }
-        if diagonals > WIDEST_BAND {
+        if diagonals > limits::BAND_DIAGONALS {
             let factors = GeneralLu::new(CscMatrix::from(matrix), sizes, limit)?;
             return Ok(Self::General(Box::new(factors)));
         }
@@ -169,22 +164,13 @@ pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, 
     (matrix, sizes)
 }
 
-/// Returns whether the symmetric `matrix` is positive definite: whether elimination without exchanges meets
-/// positive pivots only.
+/// Returns whether the symmetric `matrix` is positive definite: whether elimination without
+/// exchanges meets positive pivots only.
 pub(crate) fn is_positive_definite(matrix: &CsrMatrix<f64>) -> bool {
     let ordering = Ordering::narrowing(matrix.pattern());
-    match ordering.diagonals(matrix.pattern()) > WIDEST_BAND {
-        true => general::has_cholesky_factor(&CscMatrix::from(matrix)),
-        false => BandedLu::has_positive_pivots(matrix, &ordering),
+    if ordering.diagonals(matrix.pattern()) > limits::BAND_DIAGONALS {
+        general::has_cholesky_factor(&CscMatrix::from(matrix))
+    } else {
+        BandedLu::has_positive_pivots(matrix, &ordering)
     }
-}
-
-/// Numbers between −½ and ½ without structure, the same on every run; `number` chooses among many rows of
-/// them.
-pub(crate) fn scattered(number: usize) -> impl Iterator<Item = f64> {
-    let mut seed = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(2 * number as u64 + 1);
-    std::iter::repeat_with(move || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    })
 }

@@ -1,11 +1,11 @@
-//! The order of rows and columns that keeps the non-zero entries near the diagonal.
+//! Order of rows and columns that keeps the non-zero entries near the diagonal.
 
 use nalgebra_sparse::pattern::SparsityPattern;
 
-/// An order of the degrees of freedom, used for rows and columns alike.
+/// An order of the degrees of freedom, for rows and columns.
 #[derive(Debug)]
 pub(crate) struct Ordering {
-    /// `old[new]`, or nothing for the natural order.
+    /// `old[new]`, or none for the natural order.
     old: Option<Vec<u32>>,
 }
 
@@ -22,7 +22,7 @@ impl Ordering {
         if width <= 1 {
             return natural;
         }
-        let reordered = Self { old: Some(Graph::of(pattern).reverse_cuthill_mckee()) };
+        let reordered = Self { old: Some(Graph::from_pattern(pattern).reverse_cuthill_mckee()) };
         debug_assert_eq!(reordered.old.as_ref().map(Vec::len), Some(n));
         if reordered.width(pattern) < width { reordered } else { natural }
     }
@@ -63,7 +63,7 @@ impl Ordering {
         2 * self.width(pattern) + 1
     }
 
-    /// Largest distance of an entry from the diagonal.
+    /// Returns the largest distance of an entry from the diagonal.
     fn width(&self, pattern: &SparsityPattern) -> usize {
         let places = self.places(pattern.major_dim());
         let mut width = 0;
@@ -83,7 +83,7 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    pub(super) fn of(pattern: &SparsityPattern) -> Self {
+    pub(super) fn from_pattern(pattern: &SparsityPattern) -> Self {
         let n = pattern.major_dim();
         let mut lists = vec![Vec::new(); n];
         for i in 0..n {
@@ -110,13 +110,13 @@ impl Graph {
     fn reverse_cuthill_mckee(&self) -> Vec<u32> {
         let n = self.starts.len() - 1;
         let mut order = Vec::with_capacity(n);
-        let mut seen = vec![false; n];
+        let mut visited = vec![false; n];
         let mut by_degree: Vec<u32> = (0..n as u32).collect();
         by_degree.sort_by_key(|node| self.neighbours(*node).len());
         for start in by_degree {
-            if !seen[start as usize] {
+            if !visited[start as usize] {
                 let start = self.peripheral(start);
-                self.breadth_first(start, &mut order, &mut seen);
+                self.breadth_first(start, &mut order, &mut visited);
             }
         }
         order.reverse();
@@ -126,7 +126,7 @@ impl Graph {
     /// A node about as far from the others of its component as any.
     fn peripheral(&self, mut node: u32) -> u32 {
         let mut depth = 0;
-        // Each round but the last adds to the depth; a handful is what it takes.
+        // Each round but the last increases the depth; a few rounds are enough.
         for _ in 0..8 {
             let (mut order, mut seen) = (Vec::new(), vec![false; self.starts.len() - 1]);
             let levels = self.breadth_first(node, &mut order, &mut seen);

@@ -7,18 +7,21 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 /// Widths of panels, the widest first.
 const WIDTHS: [usize; 4] = [8, 4, 2, 1];
 
-/// A lower triangular factor L, such as that of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is
-/// looked up for a row serves all columns of the panel, whose entries stand side by side.
+/// A lower triangular factor L, such as that of L Lᵀ, in panels of neighbouring columns with nearly
+/// the same rows. One look-up of a row then serves all columns of a panel, whose entries are
+/// adjacent in memory.
 ///
 /// # Source
-/// Ng and Peyton (1993), SIAM Journal on Scientific Computing 14, 1034–1056; Ashcraft and Grimes (1989), ACM
-/// Transactions on Mathematical Software 15, 291–309, for the zeros that make rows the same.
+/// Ng and Peyton (1993), SIAM Journal on Scientific Computing 14, 1034–1056; Ashcraft and Grimes
+/// (1989), ACM Transactions on Mathematical Software 15, 291–309, on the zeros that equalise the
+/// rows.
 #[derive(Debug)]
 pub(super) struct Panels {
     panels: Vec<Panel>,
     /// Rows below each panel, panel by panel.
     rows: Vec<u32>,
-    /// Entries of each panel: the triangle, row by row with 1 / the diagonal, and the rows below it.
+    /// Entries of each panel: the triangle, row by row with 1 / the diagonal, and the rows below
+    /// it.
     values: Vec<f64>,
 }
 
@@ -34,12 +37,12 @@ struct Panel {
 pub(super) enum Columns<'a> {
     /// One by one.
     Single { symbolic: &'a SymbolicSimplicialCholesky<usize>, values: &'a [f64] },
-    /// Neighbours with the same rows together; of each column the number of them.
+    /// Neighbours with the same rows together, and the number of this group for each column.
     Joint { factor: SupernodalLltRef<'a, usize, f64>, of_column: Vec<usize> },
 }
 
 impl<'a> Columns<'a> {
-    pub(super) fn of(symbolic: &'a SymbolicCholesky<usize>, values: &'a [f64]) -> Self {
+    pub(super) fn new(symbolic: &'a SymbolicCholesky<usize>, values: &'a [f64]) -> Self {
         match symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(symbolic) => Self::Single { symbolic, values },
             SymbolicCholeskyRaw::Supernodal(symbolic) => {
@@ -98,7 +101,7 @@ impl Rows<'_> {
 }
 
 impl Panels {
-    pub(super) fn of(columns: &Columns<'_>) -> Self {
+    pub(super) fn from_columns(columns: &Columns<'_>) -> Self {
         let n = columns.len();
         let mut panels = Vec::new();
         let mut first = 0;
@@ -111,22 +114,22 @@ impl Panels {
         }
         let mut rows = Vec::with_capacity(panels.iter().map(|panel| panel.below as usize).sum());
         let mut values = vec![0.0; panels.iter().map(|panel| panel.entries()).sum()];
-        // Where in its panel a row stands.
-        let mut place = vec![0; n];
-        let mut rest = values.as_mut_slice();
+        // Index of a row in its panel.
+        let mut index = vec![0; n];
+        let mut free = values.as_mut_slice();
         for panel in &panels {
             let [first, width] = [panel.first, panel.width].map(|count| count as usize);
-            let own = first..first + width;
-            let (last, _) = columns.column(own.end - 1);
+            let panel_columns = first..first + width;
+            let (last, _) = columns.column(panel_columns.end - 1);
             let below = last.iter().skip(1);
             rows.extend(below.clone().map(|row| row as u32));
-            own.clone().chain(below).zip(0..).for_each(|(row, at)| place[row] = at);
+            panel_columns.clone().chain(below).zip(0..).for_each(|(row, at)| index[row] = at);
             let of_panel;
-            (of_panel, rest) = rest.split_at_mut(panel.entries());
-            for (c, j) in own.enumerate() {
+            (of_panel, free) = free.split_at_mut(panel.entries());
+            for (c, j) in panel_columns.enumerate() {
                 let (rows, values) = columns.column(j);
                 for (row, value) in rows.iter().zip(values) {
-                    of_panel[place[row] * width + c] = *value;
+                    of_panel[index[row] * width + c] = *value;
                 }
                 of_panel[c * width + c] = values[0].recip();
             }
@@ -176,7 +179,7 @@ impl Panels {
 }
 
 impl Panel {
-    /// Number of entries of the triangle, which is kept as a square, and the rows below it.
+    /// Returns the number of entries of the triangle, stored as a square, and of the rows below it.
     fn entries(self) -> usize {
         self.width as usize * (self.width + self.below) as usize
     }
@@ -184,8 +187,8 @@ impl Panel {
 
 /// Width of the panel from column `first` on for which a column costs least.
 fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
-    // The rows of a column but its diagonal are among those of the column that its second row names: where that is
-    // the next one, the last column of a panel has the rows of all.
+    // The rows of a column, except its diagonal, are among the rows of the column that its second
+    // row names. If this is the next column, the last column of a panel has the rows of all.
     let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
     let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
     // An entry costs one, a row and a panel some of them.
@@ -197,10 +200,10 @@ fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
     possible.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1)
 }
 
-/// Cost of what is done once for each row of a panel, in entries.
+/// Cost of each row of a panel, in entries.
 const PER_ROW: usize = 3;
 
-/// Cost of what is done once for each panel, in entries.
+/// Cost of each panel, in entries.
 const PER_PANEL: usize = 12;
 
 /// One panel of L x = b.
@@ -244,7 +247,7 @@ fn up<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64])
     b[first..first + W].copy_from_slice(&x);
 }
 
-/// Sum of a few numbers by halves, which depend less on one another than in a row.
+/// Returns the sum of a few numbers by halves, which shortens the chain of dependent additions.
 fn sum<const W: usize>(mut values: [f64; W]) -> f64 {
     let mut half = W / 2;
     while half > 0 {

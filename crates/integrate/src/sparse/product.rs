@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra_sparse::csr::CsrMatrix;
 
-/// A matrix in the form that multiplies fastest: by diagonals, or by rows.
+/// A matrix in the form with the fastest product: by diagonals, or by rows.
 #[derive(Debug)]
 pub(crate) enum Product {
     /// Values along diagonals: the column less the row, the first row, and the values.
@@ -20,19 +20,19 @@ pub(crate) struct Diagonal {
     values: Vec<f64>,
 }
 
-/// Number of rows that are worked on at a time, so that they stay in the cache.
+/// Number of rows in one block, so that they stay in the cache.
 const BLOCK: usize = 1024;
 
 impl Product {
-    pub(crate) fn of(matrix: &CsrMatrix<f64>) -> Self {
+    pub(crate) fn from_matrix(matrix: &CsrMatrix<f64>) -> Self {
         let n = matrix.nrows();
-        // By n − 1 plus column less row.
+        // Index: n − 1 + column − row.
         let mut counts = vec![0_usize; 2 * n - 1];
         for (i, j, value) in matrix.triplet_iter() {
             counts[n - 1 + j - i] += usize::from(*value != 0.0);
         }
         let used: Vec<usize> = (0..2 * n - 1).filter(|at| counts[*at] > 0).collect();
-        // Along diagonals two or more entries are taken at once and no column is looked up.
+        // Diagonals use vector instructions and need no column indices.
         if used.len() * n > 2 * matrix.nnz() + n {
             return Self::by_rows(matrix);
         }
@@ -43,10 +43,10 @@ impl Product {
                 Diagonal { row, column, values: vec![0.0; n - row - column] }
             })
             .collect();
-        let mut place = vec![0; 2 * n - 1];
-        used.iter().enumerate().for_each(|(k, at)| place[*at] = k);
+        let mut index = vec![0; 2 * n - 1];
+        used.iter().enumerate().for_each(|(k, at)| index[*at] = k);
         for (i, j, value) in matrix.triplet_iter().filter(|(_, _, value)| **value != 0.0) {
-            let diagonal = &mut diagonals[place[n - 1 + j - i]];
+            let diagonal = &mut diagonals[index[n - 1 + j - i]];
             diagonal.values[i - diagonal.row] = *value;
         }
         Self::Diagonals(diagonals)
@@ -90,10 +90,11 @@ impl Product {
     }
 }
 
-/// Subtracts three diagonals times `x` from the rows `first ..` of y, in their order: y is read and written once.
+/// Subtracts three diagonals times `x` from the rows `first ..` of y, which is read and written
+/// once.
 fn subtract_three(diagonals: &[Diagonal; 3], x: &[f64], first: usize, y: &mut [f64]) {
-    let all = first..first + y.len();
-    let rows = diagonals.iter().map(|diagonal| diagonal.rows(&all));
+    let rows_of_y = first..first + y.len();
+    let rows = diagonals.iter().map(|diagonal| diagonal.rows(&rows_of_y));
     let common = rows.reduce(|a, b| a.start.max(b.start)..a.end.min(b.end)).unwrap_or(0..0);
     if common.is_empty() {
         return diagonals.iter().for_each(|diagonal| diagonal.subtract(x, first, y));
@@ -104,20 +105,20 @@ fn subtract_three(diagonals: &[Diagonal; 3], x: &[f64], first: usize, y: &mut [f
         diagonal.subtract(x, first, above);
         diagonal.subtract(x, common.end, below);
     }
-    let [a, b, c] = diagonals.each_ref().map(|diagonal| diagonal.of_rows(&common, x));
+    let [a, b, c] = diagonals.each_ref().map(|diagonal| diagonal.in_rows(&common, x));
     for (i, y) in y.iter_mut().enumerate() {
         *y = *y - a.0[i] * a.1[i] - b.0[i] * b.1[i] - c.0[i] * c.1[i];
     }
 }
 
 impl Diagonal {
-    /// The rows of these in which it has an entry.
+    /// Returns the rows among `of` with an entry of the diagonal.
     fn rows(&self, of: &Range<usize>) -> Range<usize> {
         of.start.max(self.row)..of.end.min(self.row + self.values.len())
     }
 
-    /// The entries of some of its rows, and what of `x` they are multiplied by.
-    fn of_rows<'a>(&'a self, rows: &Range<usize>, x: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+    /// Returns the entries in some rows, and the entries of `x` that multiply them.
+    fn in_rows<'a>(&'a self, rows: &Range<usize>, x: &'a [f64]) -> (&'a [f64], &'a [f64]) {
         let values = rows.start - self.row..rows.end - self.row;
         let of_x = values.start + self.column..values.end + self.column;
         (&self.values[values], &x[of_x])
@@ -129,7 +130,7 @@ impl Diagonal {
         if rows.is_empty() {
             return;
         }
-        let (values, x) = self.of_rows(&rows, x);
+        let (values, x) = self.in_rows(&rows, x);
         for ((y, value), x) in y[rows.start - first..].iter_mut().zip(values).zip(x) {
             *y -= value * x;
         }
@@ -149,12 +150,12 @@ mod tests {
         let banded = band(n, &[(-40, 3.0), (-1, -0.5), (0, 2.0), (7, 1.25)]);
         let scattered = (0..n).flat_map(|i| [(i, i * 7 % n, 1.0 + i as f64), (i * 3 % n, i, -2.0)]);
         let scattered = triplets(n, scattered).unwrap();
-        assert!(matches!(Product::of(&banded), Product::Diagonals(_)));
-        assert!(matches!(Product::of(&scattered), Product::Rows { .. }));
+        assert!(matches!(Product::from_matrix(&banded), Product::Diagonals(_)));
+        assert!(matches!(Product::from_matrix(&scattered), Product::Rows { .. }));
         let x = DVector::from_fn(n, |i, _| (i as f64).sin());
         for matrix in [banded, scattered] {
             let mut y = vec![1.0; n];
-            Product::subtract(&[(&Product::of(&matrix), x.as_slice())], &mut y);
+            Product::subtract(&[(&Product::from_matrix(&matrix), x.as_slice())], &mut y);
             let expected = DVector::from_element(n, 1.0) - DMatrix::from(&matrix) * &x;
             let gap = (DVector::from_vec(y) - &expected).amax();
             assert!(gap <= 1e-15 * expected.amax(), "{gap:e}");

@@ -1,4 +1,4 @@
-//! Cholesky factors of matrices that are found to be symmetric and positive definite, by `faer`.
+//! Cholesky factors of symmetric positive definite matrices, by `faer`.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
@@ -10,31 +10,33 @@ use faer::{Par, Side};
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
-use super::NotFactored;
-use super::general::{pattern, reciprocal_condition};
-use super::panels::{Columns, Panels};
+use crate::sparse::NotFactored;
+use crate::sparse::general::{pattern, reciprocal_condition};
+use crate::sparse::panels::{Columns, Panels};
 
-/// Factors of a matrix in the order of minimum degree, its rows and columns scaled by the sizes of their
-/// terms. They have a fraction of the entries of a band, and of LU factors with exchanges of rows.
+/// Factors of a matrix in an order of minimum degree, with rows and columns scaled by the sizes of
+/// their terms. They have a fraction of the entries of a band or of LU factors with exchanges of
+/// rows.
 #[derive(Debug)]
 pub(crate) struct CholeskyFactors {
     panels: Panels,
-    /// Row of the matrix for each row of the factors, and 1 / the root of the size of its terms.
+    /// Row of the matrix for each row of the factors, and 1 / √(size of its terms).
     order: Vec<(u32, f64)>,
     /// The right-hand side in that order.
     scratch: Vec<f64>,
 }
 
 /// The order of a symmetric matrix, before it is factored.
-pub(crate) struct Plan {
+pub(crate) struct CholeskyPlan {
     matrix: CscMatrix<f64>,
     symbolic: SymbolicCholesky<usize>,
     scales: Vec<f64>,
 }
 
-impl Plan {
-    /// The order of `matrix`, the rows of which are sums of terms of the given `sizes`, if it is symmetric.
-    pub(crate) fn of(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Option<Self> {
+impl CholeskyPlan {
+    /// Returns the order of `matrix` if it is symmetric; its rows are sums of terms of the given
+    /// `sizes`.
+    pub(crate) fn new(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Option<Self> {
         let columns = CscMatrix::from(matrix);
         // The columns of a symmetric matrix are its rows.
         let symmetric =
@@ -54,13 +56,13 @@ impl Plan {
         Some(Self { matrix, symbolic, scales })
     }
 
-    /// Number of entries that a solution goes through.
+    /// Returns the number of entries that a solve reads.
     pub(crate) fn work(&self) -> usize {
         2 * self.symbolic.len_val()
     }
 
-    /// Factors the matrix, unless the factors take more than `limit` bytes; nothing if it is not positive
-    /// definite.
+    /// Factors the matrix, unless the factors need more than `limit` bytes; none if it is not
+    /// positive definite.
     pub(crate) fn factor(self, limit: u64) -> Result<Option<CholeskyFactors>, NotFactored> {
         let Self { matrix, symbolic, scales } = self;
         let bytes = (symbolic.len_val() as u64).saturating_mul(size_of::<f64>() as u64);
@@ -83,7 +85,7 @@ impl Plan {
             return Ok(None);
         }
         drop((matrix, workspace));
-        let panels = Panels::of(&Columns::of(&symbolic, &values));
+        let panels = Panels::from_columns(&Columns::new(&symbolic, &values));
         let order: Vec<u32> = match symbolic.perm() {
             Some(order) => order.arrays().0.iter().map(|row| *row as u32).collect(),
             None => (0..scales.len() as u32).collect(),
@@ -117,8 +119,8 @@ mod tests {
     use mechid_model::triplets;
     use nalgebra::{DMatrix, DVector};
 
-    use super::super::SparseLu;
     use super::*;
+    use crate::sparse::SparseLu;
 
     /// A grid of `side` × `side` × `layers`, each node bound to its neighbours.
     fn grid(side: usize, layers: usize, diagonal: f64) -> CsrMatrix<f64> {
@@ -149,7 +151,7 @@ mod tests {
         for (side, layers, joint) in [(24, 1, false), (20, 20, true)] {
             let matrix = grid(side, layers, 6.5);
             let n = matrix.nrows();
-            let plan = Plan::of(&matrix, &sizes(&matrix)).unwrap();
+            let plan = CholeskyPlan::new(&matrix, &sizes(&matrix)).unwrap();
             assert_eq!(matches!(plan.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)), joint);
             let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
             assert!(matches!(factors, SparseLu::Symmetric(_)), "{side}");

@@ -1,14 +1,16 @@
-//! Factors of a tridiagonal matrix that is eliminated from both ends at once.
+//! Factors of a tridiagonal matrix, eliminated from both ends at once.
 
 use nalgebra_sparse::csr::CsrMatrix;
 
-use super::banded::KEPT_DIAGONAL;
-use super::ordering::Ordering;
+use crate::limits;
+use crate::sparse::ordering::Ordering;
 
-/// Elimination from both ends to the middle: a row waits for the one before it, so that two ends wait half as long.
+/// Elimination from both ends to the middle: each row depends on the one before it, so that two
+/// independent chains take half the time.
 ///
 /// # Source
-/// Babuška (1972), SIAM Journal on Numerical Analysis 9, 53–77; van der Vorst (1987), Parallel Computing 5, 45–54.
+/// Babuška (1972), SIAM Journal on Numerical Analysis 9, 53–77; van der Vorst (1987), Parallel
+/// Computing 5, 45–54.
 #[derive(Debug)]
 pub(super) struct Tridiagonal {
     /// Parts of the row before, towards an end, that are subtracted from each row.
@@ -20,9 +22,9 @@ pub(super) struct Tridiagonal {
 }
 
 impl Tridiagonal {
-    /// Factors `matrix`, which is tridiagonal in the given order; `None` where rows would have to be exchanged, and of
-    /// fewer than four rows.
-    pub(super) fn of(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Option<Self> {
+    /// Factors `matrix`, which is tridiagonal in the given order; `None` if rows would have to be
+    /// exchanged, or for fewer than four rows.
+    pub(super) fn factor(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Option<Self> {
         let n = matrix.nrows();
         if n < 4 {
             return None;
@@ -39,26 +41,27 @@ impl Tridiagonal {
         }
         let half = n / 2;
         let mut multipliers = vec![0.0; n];
-        let kept =
-            |pivot: f64, entry: f64| pivot.abs() >= KEPT_DIAGONAL * entry.abs() && pivot != 0.0;
+        let is_pivot = |pivot: f64, entry: f64| {
+            pivot.abs() >= limits::PIVOT_FRACTION * entry.abs() && pivot != 0.0
+        };
         for i in 1..half {
-            kept(pivots[i - 1], below[i]).then_some(())?;
+            is_pivot(pivots[i - 1], below[i]).then_some(())?;
             multipliers[i] = below[i] / pivots[i - 1];
             pivots[i] -= multipliers[i] * above[i - 1];
         }
         for i in (half..n - 1).rev() {
-            kept(pivots[i + 1], above[i]).then_some(())?;
+            is_pivot(pivots[i + 1], above[i]).then_some(())?;
             multipliers[i] = above[i] / pivots[i + 1];
             pivots[i] -= multipliers[i] * below[i + 1];
         }
         // The upper half is eliminated from the first row of the lower, last of all.
-        kept(pivots[half - 1], below[half]).then_some(())?;
+        is_pivot(pivots[half - 1], below[half]).then_some(())?;
         let last = pivots[half];
         pivots[half] -= below[half] / pivots[half - 1] * above[half - 1];
-        kept(pivots[half], last).then_some(())?;
+        is_pivot(pivots[half], last).then_some(())?;
         let inward: Vec<f64> = (0..n)
             .map(|i| match i {
-                // Its row is the last, and has nothing but the pivot.
+                // The last row of the elimination has only its pivot.
                 i if i == half => below[half] / pivots[half - 1],
                 i if i < half => above[i] / pivots[i],
                 i => below[i] / pivots[i],
@@ -82,7 +85,7 @@ impl Tridiagonal {
             second = b[bottom] - m[bottom] * second;
             (b[top], b[bottom]) = (first, second);
         }
-        // Of an odd number of rows the one at the middle is left.
+        // An odd number of rows has one more row, in the middle.
         if n - half > half {
             b[half] -= m[half] * second;
         }

@@ -1,5 +1,5 @@
-//! LU factors without exchanges of matrices whose pattern is symmetric or nearly so, as that of gyroscopic forces and
-//! bearings.
+//! LU factors without exchanges, for matrices with a nearly symmetric pattern, such as those of
+//! gyroscopic forces and bearings.
 
 use faer::Side;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -10,44 +10,40 @@ use faer::sparse::linalg::cholesky::{
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
-use super::general::{pattern, reciprocal_condition};
-use super::panels::{Columns, Panels};
-use super::{NotFactored, combination, scattered};
+use crate::krylov::start_vector::pseudo_random;
+use crate::limits;
+use crate::sparse::general::{pattern, reciprocal_condition};
+use crate::sparse::panels::{Columns, Panels};
+use crate::sparse::{NotFactored, combination};
 
-/// Largest number of operations of a factorisation column by column; more are for blocks of columns.
-const MOST_OPERATIONS: f64 = 4e9;
-
-/// Largest error of a solution put back into the matrix, relative to the sizes of the terms of its rows, with which
-/// factors without exchanges stand.
-const BACKWARD_ERROR: f64 = 1e-13;
-
-/// Factors L U of a matrix in the order of minimum degree of its pattern and that of its transpose, rows and columns
-/// scaled by the sizes of their terms. Both have the pattern of a Cholesky factor, a fraction of the entries of a band,
-/// and of factors with exchanges of rows.
+/// Factors L U of a matrix in an order of minimum degree of the pattern of A + Aᵀ, with rows and
+/// columns scaled by the sizes of their terms. Both have the pattern of a Cholesky factor, a
+/// fraction of the entries of a band or of factors with exchanges of rows.
 ///
 /// # Source
-/// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5 (the columns that
-/// change the next one in lists); Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.4, on LU without
-/// exchanges where the symmetric part is definite.
+/// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5
+/// (the columns that change the next one in lists); Golub & Van Loan, *Matrix Computations*, 4th
+/// ed. (2013), section 4.3.4, on LU without exchanges where the symmetric part is definite.
 #[derive(Debug)]
 pub(crate) struct UnsymmetricFactors {
     /// L with the pivots, and Uᵀ of diagonal 1.
     lower: Panels,
     upper: Panels,
-    /// Row of the matrix for each row of the factors, and 1 / the root of the size of its terms.
+    /// Row of the matrix for each row of the factors, and 1 / √(size of its terms).
     order: Vec<(u32, f64)>,
     /// The right-hand side in that order.
     scratch: Vec<f64>,
 }
 
-/// The order of a matrix by its pattern, before it is factored.
+/// The order of a matrix by its pattern, before the factorisation.
 pub(crate) struct UnsymmetricPlan {
     symbolic: SymbolicCholesky<usize>,
 }
 
 impl UnsymmetricPlan {
-    /// The order of `matrix`; `None` where a factorisation column by column takes too long.
-    pub(crate) fn of(matrix: &CsrMatrix<f64>) -> Option<Self> {
+    /// Returns the order of `matrix`; `None` if a factorisation column by column would take too
+    /// long.
+    pub(crate) fn new(matrix: &CsrMatrix<f64>) -> Option<Self> {
         let both = combination(&[(1.0, matrix), (1.0, &matrix.transpose())]).0;
         let columns = CscMatrix::from(&both);
         let one_by_one = CholeskySymbolicParams {
@@ -65,15 +61,15 @@ impl UnsymmetricPlan {
         let (starts, _) = plan.columns()?;
         let operations =
             starts.windows(2).map(|ends| 2.0 * ((ends[1] - ends[0]) as f64).powi(2)).sum::<f64>();
-        (operations < MOST_OPERATIONS).then_some(plan)
+        (operations < limits::COLUMN_OPERATIONS).then_some(plan)
     }
 
-    /// Number of entries that a solution goes through.
+    /// Returns the number of entries that a solve reads.
     pub(crate) fn work(&self) -> usize {
         2 * self.symbolic.len_val()
     }
 
-    /// First entry of each column of the factors, and the rows of all.
+    /// Returns the first entry of each column of the factors, and the rows of all columns.
     fn columns(&self) -> Option<(&[usize], &[usize])> {
         match self.symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(symbolic) => {
@@ -83,8 +79,8 @@ impl UnsymmetricPlan {
         }
     }
 
-    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors take more than
-    /// `limit` bytes; nothing if it needs exchanges of rows.
+    /// Factors `matrix`, whose rows are sums of terms of the given `sizes`, unless the factors need
+    /// more than `limit` bytes; none if it needs exchanges of rows.
     pub(crate) fn factor(
         self,
         matrix: &CsrMatrix<f64>,
@@ -102,18 +98,18 @@ impl UnsymmetricPlan {
             Some(order) => order.arrays().0.to_vec(),
             None => (0..n).collect(),
         };
-        let mut place = vec![0; n];
-        order.iter().enumerate().for_each(|(at, row)| place[*row] = at);
+        let mut index = vec![0; n];
+        order.iter().enumerate().for_each(|(at, row)| index[*row] = at);
         let scaled = Scaled {
             matrix,
             columns: CscMatrix::from(matrix),
             scales: &scales,
             order: &order,
-            place: &place,
+            place: &index,
         };
         let Some([lower, upper]) = self.eliminated(&scaled) else { return Ok(None) };
-        let [lower, upper] =
-            [lower, upper].map(|values| Panels::of(&Columns::of(&self.symbolic, &values)));
+        let [lower, upper] = [lower, upper]
+            .map(|values| Panels::from_columns(&Columns::new(&self.symbolic, &values)));
         let order = order.iter().map(|row| (*row as u32, scales[*row])).collect();
         let mut factors = UnsymmetricFactors { lower, upper, order, scratch: vec![0.0; n] };
         let solve = |vector: &mut [f64]| {
@@ -122,24 +118,25 @@ impl UnsymmetricPlan {
         };
         let reciprocal = reciprocal_condition(n, solve);
         if reciprocal <= f64::EPSILON {
-            // With exchanges of rows it may be regular.
+            // The matrix may still be regular with exchanges of rows.
             return Ok(None);
         }
-        Ok((factors.backward_error(matrix, sizes) < BACKWARD_ERROR).then_some(factors))
+        Ok((factors.backward_error(matrix, sizes) < limits::BACKWARD_ERROR).then_some(factors))
     }
 
-    /// Entries of L and Uᵀ, column by column; `None` where a pivot is none.
+    /// Returns the entries of L and Uᵀ, column by column; `None` for a pivot of zero.
     fn eliminated(&self, matrix: &Scaled<'_>) -> Option<[Vec<f64>; 2]> {
         const NONE: usize = usize::MAX;
         let (starts, rows) = self.columns()?;
         let n = starts.len() - 1;
         let [mut lower, mut upper] = [(); 2].map(|()| vec![0.0; rows.len()]);
         let [mut column, mut row] = [(); 2].map(|()| vec![0.0; n]);
-        // The columns that change column k next, as a list, and where the rows from k on begin in each.
+        // The columns that change column k next, as a list, and where the rows from k on begin in
+        // each.
         let [mut first, mut next, mut at] = [vec![NONE; n], vec![NONE; n], vec![0; n]];
         for k in 0..n {
-            let own = starts[k]..starts[k + 1];
-            for i in &rows[own.clone()] {
+            let entries = starts[k]..starts[k + 1];
+            for i in &rows[entries.clone()] {
                 (column[*i], row[*i]) = (0.0, 0.0);
             }
             matrix.scatter(k, &mut column, &mut row);
@@ -164,13 +161,13 @@ impl UnsymmetricPlan {
             if !(pivot.abs() > 0.0 && pivot.is_finite()) {
                 return None;
             }
-            for p in own.clone() {
+            for p in entries.clone() {
                 lower[p] = column[rows[p]];
                 upper[p] = row[rows[p]] / pivot;
             }
-            upper[own.start] = 1.0;
-            at[k] = own.start + 1;
-            if at[k] < own.end {
+            upper[entries.start] = 1.0;
+            at[k] = entries.start + 1;
+            if at[k] < entries.end {
                 let i = rows[at[k]];
                 (next[k], first[i]) = (first[i], k);
             }
@@ -179,7 +176,7 @@ impl UnsymmetricPlan {
     }
 }
 
-/// A matrix in the order of its factors, its rows and columns scaled.
+/// A matrix in the order of its factors, with scaled rows and columns.
 struct Scaled<'a> {
     matrix: &'a CsrMatrix<f64>,
     columns: CscMatrix<f64>,
@@ -191,8 +188,8 @@ struct Scaled<'a> {
 impl Scaled<'_> {
     /// Writes the entries of column and row `k` from the diagonal on.
     fn scatter(&self, k: usize, column: &mut [f64], row: &mut [f64]) {
-        let own = self.order[k];
-        let (below, beside) = (self.columns.col(own), self.matrix.row(own));
+        let diagonal = self.order[k];
+        let (below, beside) = (self.columns.col(diagonal), self.matrix.row(diagonal));
         let lanes = [
             (below.row_indices(), below.values(), column),
             (beside.col_indices(), beside.values(), row),
@@ -201,7 +198,7 @@ impl Scaled<'_> {
             for (other, value) in others.iter().zip(values) {
                 let at = self.place[*other];
                 if at >= k {
-                    into[at] = value * self.scales[own] * self.scales[*other];
+                    into[at] = value * self.scales[diagonal] * self.scales[*other];
                 }
             }
         }
@@ -221,9 +218,10 @@ impl UnsymmetricFactors {
         }
     }
 
-    /// Largest error of one solution put back into the matrix, over the size of its row and the largest entry.
+    /// Returns the largest error of one solution put back into the matrix, relative to the size of
+    /// its row and the largest entry.
     fn backward_error(&mut self, matrix: &CsrMatrix<f64>, sizes: &[f64]) -> f64 {
-        let b: Vec<f64> = scattered(1)
+        let b: Vec<f64> = pseudo_random(1)
             .zip(sizes)
             .take(matrix.nrows())
             .map(|(number, size)| number * size)
@@ -247,10 +245,11 @@ mod tests {
     use mechid_model::triplets;
     use nalgebra::DVector;
 
-    use super::super::SparseLu;
     use super::*;
+    use crate::sparse::SparseLu;
 
-    /// A grid of `side` × `side` with forces that are not symmetric, and with weak `diagonal` entries if it says so.
+    /// A grid of `side` × `side` with forces that are not symmetric, and with weak `diagonal`
+    /// entries if it says so.
     fn grid(side: usize, diagonal: f64) -> CsrMatrix<f64> {
         let at = |i: usize, j: usize| i * side + j;
         let mut entries = vec![];

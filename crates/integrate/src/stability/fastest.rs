@@ -5,10 +5,12 @@ use std::cell::OnceCell;
 use mechid_model::{Matrix, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::krylov::{dominant, scattered};
-use super::passive;
-use crate::effective::Equations;
-use crate::{IntegrateError, System};
+use crate::error::IntegrateError;
+use crate::krylov::arnoldi::dominant;
+use crate::krylov::start_vector::start_vector;
+use crate::stability::passive;
+use crate::stepping::effective_matrix::Equations;
+use crate::system::System;
 
 /// The fastest motions of a system, found when they are asked for.
 pub(super) struct Fastest<'a> {
@@ -19,44 +21,43 @@ pub(super) struct Fastest<'a> {
 }
 
 impl<'a> Fastest<'a> {
-    pub(super) fn of(system: &'a dyn System) -> Self {
+    pub(super) fn new(system: &'a dyn System) -> Self {
         Self { system, rate: OnceCell::new(), passive: OnceCell::new() }
     }
 
-    /// The largest modulus among the eigenvalues, in 1/s, as far as Arnoldi's iteration finds it.
+    /// Returns the largest modulus among the eigenvalues, in 1/s, estimated by Arnoldi's iteration.
     pub(super) fn rate(&self) -> Result<f64, IntegrateError> {
         if let Some(rate) = self.rate.get() {
             return Ok(*rate);
         }
-        let rate = fastest(&Equations::of(self.system))?;
+        let rate = fastest(&Equations::from_system(self.system))?;
         Ok(*self.rate.get_or_init(|| rate))
     }
 
-    /// A single degree of freedom for each of these motions, not slower than it.
+    /// Returns a single degree of freedom for each of these motions, at least as fast.
     pub(super) fn motions(&self) -> Result<Option<&[SecondOrderSystem; 2]>, IntegrateError> {
-        if let Some(found) = self.passive.get() {
-            return Ok(found.as_ref());
+        if let Some(motions) = self.passive.get() {
+            return Ok(motions.as_ref());
         }
-        let found = match passive::is_passive(self.system) {
-            false => None,
-            true => {
-                let equations = Equations::of(self.system);
-                let motion = |which| {
-                    let top = passive::top(&equations, which)?;
-                    reduced_to(&equations, &top, which, top.above(self.system, which))
-                };
-                Some([motion(Matrix::Stiffness)?, motion(Matrix::Damping)?])
-            }
+        let motions = if passive::is_passive(self.system) {
+            let equations = Equations::from_system(self.system);
+            let motion = |which| {
+                let top = passive::top(&equations, which)?;
+                reduced_to(&equations, &top, which, top.above(self.system, which))
+            };
+            Some([motion(Matrix::Stiffness)?, motion(Matrix::Damping)?])
+        } else {
+            None
         };
-        Ok(self.passive.get_or_init(|| found).as_ref())
+        Ok(self.passive.get_or_init(|| motions).as_ref())
     }
 }
 
-/// The system that moves along `shape` alone, of mass x*Mx, damping x*Cx and stiffness x*Kx; its
-/// two degrees of freedom are the real and imaginary parts of one.
+/// Returns the system that moves only along `shape`, with mass x*Mx, damping x*Cx and stiffness
+/// x*Kx; its two degrees of freedom are the real and imaginary parts.
 ///
-/// Where `shape` belongs to an eigenvector of the amplification, its eigenvalue is one for this
-/// system, too.
+/// If `shape` belongs to an eigenvector of the amplification, its eigenvalue is also one of this
+/// system.
 pub(super) fn reduced(
     equations: &Equations,
     shape: &DVector<Complex<f64>>,
@@ -71,8 +72,8 @@ pub(super) fn reduced(
     Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
 }
 
-/// The system along the fastest motion found of a passive system, its eigenvalue of M⁻¹A, A being one of the matrices,
-/// raised to a `value`.
+/// Returns the system along the fastest motion of a passive system, with its eigenvalue of M⁻¹A (A
+/// is one of the matrices) raised to `value`.
 pub(super) fn reduced_to(
     equations: &Equations,
     top: &passive::Top,
@@ -86,21 +87,21 @@ pub(super) fn reduced_to(
     Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
 }
 
-/// The largest modulus among the eigenvalues of a system, in 1/s, as far as Arnoldi's iteration finds
-/// it.
+/// Returns the largest modulus among the eigenvalues of a system, in 1/s, estimated by Arnoldi's
+/// iteration.
 pub(super) fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
     let n = equations.dof();
     let mut mass = equations.mass_only("Arnoldi", 0.0)?;
-    // The unit of time that makes the two halves of the state comparable is found on the way.
+    // The iteration also finds the unit of time that makes the two halves of the state comparable.
     let mut unit = 1.0;
     for _ in 0..4 {
-        let largest = dominant(scattered(2 * n), |state, rate| {
+        let largest = dominant(start_vector(2 * n), |state, rate| {
             let (x, v) = state.split_at(n);
             let (dx, dv) = rate.split_at_mut(n);
             dx.copy_from_slice(v);
             let v: Vec<f64> = v.iter().map(|v| v / unit).collect();
             dv.fill(0.0);
-            // Of a linear system no solve fails.
+            // A solve of a linear system does not fail.
             let _ = mass.solve(0.0, &v, x, dv);
             dv.iter_mut().for_each(|a| *a *= unit * unit);
         });

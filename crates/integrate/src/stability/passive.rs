@@ -5,37 +5,24 @@ use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::csr::CsrMatrix;
 
-use crate::effective::Equations;
+use crate::error::IntegrateError;
+use crate::krylov::start_vector::start_vector;
+use crate::limits;
 use crate::sparse::{combination, is_positive_definite};
-use crate::{IntegrateError, System};
+use crate::stepping::effective_matrix::Equations;
+use crate::system::System;
 
-/// Asymmetry of two entries, relative to their size, that counts as rounding.
-const ASYMMETRY: f64 = 1e-12;
-
-/// A negative eigenvalue of C or K that counts as rounding, relative to the size of its rows: of K
-/// it lets the slowest motion grow by 3·10⁻⁷ of the highest frequency.
-const NEGATIVE: f64 = 1e-13;
-
-/// Largest number of Lanczos steps.
-const LANCZOS_STEPS: usize = 100;
-
-/// Precision to which the largest eigenvalue is enclosed, the part by which an upper end that is none is raised first,
-/// and the most times that it is raised, by twice as much each time, and that an interval is halved.
-const ENCLOSED: f64 = 1e-4;
-const RAISED: f64 = 0.01;
-const MOST_TIMES: usize = 64;
-
-/// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
-/// as far as diagonal dominance or factorisations without exchanges can prove it.
+/// Returns whether M is proved symmetric and positive definite, and C and K symmetric and positive
+/// semidefinite, by diagonal dominance or by factorisations without exchanges.
 pub(crate) fn is_passive(system: &dyn System) -> bool {
     let symmetric = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
-        .map(|which| Symmetric::of(system, which));
+        .map(|which| Symmetric::from_system(system, which));
     let [Some(mass), Some(damping), Some(stiffness)] = symmetric else { return false };
     mass.is_definite() && damping.is_semidefinite() && stiffness.is_semidefinite()
 }
 
-/// Returns whether all eigenvalues of M⁻¹A lie below `limit`, A being one of the symmetric matrices
-/// of a passive system.
+/// Returns whether all eigenvalues of M⁻¹A are below `limit`; A is one of the symmetric matrices of
+/// a passive system.
 pub(super) fn is_below(system: &dyn System, which: Matrix, limit: f64) -> bool {
     let matrices = system.matrices();
     let difference = match matrices.dense() {
@@ -55,9 +42,9 @@ enum Symmetric {
 }
 
 impl Symmetric {
-    fn of(system: &dyn System, which: Matrix) -> Option<Self> {
+    fn from_system(system: &dyn System, which: Matrix) -> Option<Self> {
         let matrices = system.matrices();
-        let close = |a: f64, b: f64| (a - b).abs() <= ASYMMETRY * (a.abs() + b.abs());
+        let close = |a: f64, b: f64| (a - b).abs() <= limits::ASYMMETRY * (a.abs() + b.abs());
         match matrices.dense() {
             Some(dense) => {
                 let matrix = dense.matrix(which);
@@ -70,11 +57,10 @@ impl Symmetric {
                 let matrix = matrices.sparse(which);
                 let transposed = matrix.transpose();
                 let difference = combination(&[(1.0, &matrix), (-1.0, &transposed)]);
-                // The sizes of the terms row by row are what the difference is measured by.
-                let symmetric =
-                    difference.0.row_iter().zip(&difference.1).all(|(row, size)| {
-                        row.values().iter().all(|v| v.abs() <= ASYMMETRY * size)
-                    });
+                // The difference is compared with the sizes of the terms, row by row.
+                let symmetric = difference.0.row_iter().zip(&difference.1).all(|(row, size)| {
+                    row.values().iter().all(|v| v.abs() <= limits::ASYMMETRY * size)
+                });
                 symmetric.then(|| Self::Sparse(matrix.into_owned()))
             }
         }
@@ -94,7 +80,8 @@ impl Symmetric {
         }
         let sizes = self.row_sums();
         let largest = sizes.iter().fold(0.0, |most, v| f64::max(most, *v));
-        let shift: Vec<f64> = sizes.iter().map(|size| NEGATIVE * (size + 1e-3 * largest)).collect();
+        let shift: Vec<f64> =
+            sizes.iter().map(|size| limits::SEMIDEFINITE_SHIFT * (size + 1e-3 * largest)).collect();
         let shifted = match self {
             Self::Dense(matrix) => {
                 let mut matrix = matrix.clone();
@@ -109,8 +96,8 @@ impl Symmetric {
         shifted.is_definite()
     }
 
-    /// Returns whether the diagonal entries are positive (or zero) and not (or hardly) less than the rest of
-    /// their rows, of which follows that the matrix is positive definite (or semidefinite).
+    /// Returns whether the diagonal entries are positive (or zero) and larger than (or equal to)
+    /// the sum of the rest of their rows. The matrix is then positive definite (or semidefinite).
     fn is_dominant(&self, strictly: bool) -> bool {
         let sums = self.row_sums();
         let diagonal = |i: usize| match self {
@@ -119,8 +106,12 @@ impl Symmetric {
         };
         sums.iter().enumerate().all(|(i, &sum)| {
             let pivot = diagonal(i);
-            let rest = sum - pivot.abs();
-            if strictly { pivot > rest * (1.0 + 1e-9) } else { pivot >= rest - NEGATIVE * sum }
+            let off_diagonal = sum - pivot.abs();
+            if strictly {
+                pivot > off_diagonal * (1.0 + 1e-9)
+            } else {
+                pivot >= off_diagonal - limits::SEMIDEFINITE_SHIFT * sum
+            }
         })
     }
 
@@ -141,7 +132,8 @@ impl Symmetric {
     }
 }
 
-/// The vector of norm 1 in the product by M that comes nearest to the largest eigenvalue of M⁻¹A.
+/// A vector, of norm 1 in the product by M, close to the eigenvector of the largest eigenvalue of
+/// M⁻¹A.
 pub(super) struct Top {
     pub(super) vector: DVector<f64>,
     /// Its Rayleigh quotient, in 1/s² or 1/s: at most the largest eigenvalue.
@@ -151,23 +143,24 @@ pub(super) struct Top {
 }
 
 impl Top {
-    /// Upper end of the largest eigenvalue, within a part of 10⁻⁴: by bisection, M σ − A being definite above it.
+    /// Returns an upper bound of the largest eigenvalue, to a part in 10⁴, by bisection: M σ − A is
+    /// definite above it.
     pub(super) fn above(&self, system: &dyn System, which: Matrix) -> f64 {
         let (mut low, mut high) = (self.value, self.value + self.residual);
         if high <= 0.0 {
             return 0.0;
         }
-        high *= 1.0 + ENCLOSED;
-        let mut raised = RAISED;
-        for _ in 0..MOST_TIMES {
+        high *= 1.0 + limits::ENCLOSURE_WIDTH;
+        let mut raised = limits::ENCLOSURE_STEP;
+        for _ in 0..limits::ENCLOSURE_FACTORISATIONS {
             if is_below(system, which, high) {
                 break;
             }
             (low, high) = (high, high * (1.0 + raised));
             raised *= 2.0;
         }
-        for _ in 0..MOST_TIMES {
-            if high - low <= ENCLOSED * low {
+        for _ in 0..limits::ENCLOSURE_FACTORISATIONS {
+            if high - low <= limits::ENCLOSURE_WIDTH * low {
                 break;
             }
             let middle = 0.5 * (low + high);
@@ -186,11 +179,11 @@ impl Top {
 pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, IntegrateError> {
     let n = equations.dof();
     let mut mass = equations.mass_only("Lanczos", 0.0)?;
-    let still = vec![0.0; n];
+    let zeros = vec![0.0; n];
     // Orthonormal in the product by M: qᵢ and M qᵢ.
     let (mut basis, mut weighted): (Vec<DVector<f64>>, Vec<DVector<f64>>) = (vec![], vec![]);
     let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (vec![], vec![]);
-    let mut next = super::krylov::scattered(n);
+    let mut next = start_vector(n);
     loop {
         let mut image = equations.times(Matrix::Mass, &next);
         let norm = next.dot(&image).max(0.0).sqrt();
@@ -199,7 +192,7 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         }
         let scale = diagonal.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
         let ended = !basis.is_empty() && norm <= 1e-14 * scale;
-        if basis.len() == LANCZOS_STEPS.min(n) || ended {
+        if basis.len() == limits::LANCZOS_STEPS.min(n) || ended {
             break;
         }
         next /= norm;
@@ -207,10 +200,10 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         basis.push(next.clone());
         weighted.push(image);
         // M⁻¹ A q, then orthogonal to all before: twice is enough.
-        let mut product = still.clone();
+        let mut product = zeros.clone();
         match which {
-            Matrix::Damping => mass.solve(0.0, next.as_slice(), &still, &mut product)?,
-            _ => mass.solve(0.0, &still, next.as_slice(), &mut product)?,
+            Matrix::Damping => mass.solve(0.0, next.as_slice(), &zeros, &mut product)?,
+            _ => mass.solve(0.0, &zeros, next.as_slice(), &mut product)?,
         }
         next = -DVector::from_vec(product);
         diagonal.push(0.0);

@@ -11,7 +11,7 @@ fn amplification(scheme: &dyn Scheme, zeta: f64, angle: f64) -> Matrix3<f64> {
     let dt = 0.01;
     let system = Sdof::from_modal(1.0, zeta, angle / dt).unwrap().system();
     let mut stepper = scheme.prepare_unchecked(&system, dt).unwrap();
-    let a = Transition::of(stepper.as_mut()).amplification();
+    let a = Transition::from_stepper(stepper.as_mut()).amplification();
     Matrix3::from_fn(|i, j| a[(i, j)] * f64::powi(dt, i as i32 - j as i32))
 }
 

@@ -34,6 +34,11 @@ pub fn schemes() -> Vec<Box<dyn Scheme>> {
     ]
 }
 
+/// Nonlinear terms as a force, degrees of freedom counted from 1: `terms("k3: x1^3", &[3.0])`.
+pub fn terms(text: &str, coefficients: &[f64]) -> TermForces {
+    TermForces::new(&text.parse().unwrap(), coefficients).unwrap()
+}
+
 /// A force without a sample at zero, with content on every channel: Σ of three sines, shifted.
 pub fn force_at(t: f64, f: &mut [f64]) {
     for (c, f) in f.iter_mut().enumerate() {

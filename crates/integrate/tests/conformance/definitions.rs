@@ -319,7 +319,7 @@ fn every_size_from_1_to_50_follows_its_transition() {
             .filter(|s| !s.conventions()[1..].iter().any(|c| c.choice.contains("at rest")))
         {
             let mut stepper = scheme.prepare(&system, DT).unwrap();
-            let transition = Transition::of(stepper.as_mut());
+            let transition = Transition::from_stepper(stepper.as_mut());
             let start = moving(dof);
             let response = integrate(scheme.as_ref(), &system, &force, &start).unwrap();
             // The last step once more, from the stored motion, by the explicit matrices. Houbolt

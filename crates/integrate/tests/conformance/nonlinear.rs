@@ -83,7 +83,7 @@ fn the_elliptic_functions_are_right() {
 #[test]
 fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
     let linear = oscillator(1.0, 0.0, 1.0);
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
+    let cubic = terms("k3: x1^3", &[3.0]);
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let end = 3.0;
     let truth = duffing(1.0, 3.0, 1.2, end);
@@ -135,7 +135,7 @@ fn backbone(k: f64, cubic: f64, amplitude: f64) -> f64 {
 fn an_orbit_whose_losses_are_made_up_for_lies_on_the_backbone() {
     let (k, cubic, c) = (1.0, 1.0, 1.0);
     let linear = oscillator(1.0, c, k);
-    let spring = Connection::to_ground(0).spring(&[0.0, 0.0, cubic]).unwrap();
+    let spring = terms("k3: x1^3", &[cubic]);
     let system = SystemWithForces::new(&linear).with(spring).unwrap();
     for amplitude in [0.2, 1.0, 3.0] {
         let omega = backbone(k, cubic, amplitude);
@@ -164,20 +164,15 @@ fn an_orbit_whose_losses_are_made_up_for_lies_on_the_backbone() {
 fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
     let n = 5;
     let linear = mechid_problems::random_stable(n, 3);
-    let on = Connection::between(1, 3);
+    let connection = terms(
+        "k2: (x2-x4)^2, k3: (x2-x4)^3, c3: (v2-v4)^3, f: tanh((v2-v4)/0.5)",
+        &[-30.0, 200.0, 1.5, 3.0],
+    );
     let driven = ForceFunction::new(vec![3, 0], |t, x, v, g| {
         g[0] = 20.0 * x[0] * x[1] * (3.0 * t).sin();
         g[1] = 5.0 * v[0] * v[1] + 2.0 * t.cos();
     });
-    let system = SystemWithForces::new(&linear)
-        .with(on.spring(&[40.0, -30.0, 200.0]).unwrap())
-        .unwrap()
-        .with(on.damper(&[2.0, 0.0, 1.5]).unwrap())
-        .unwrap()
-        .with(on.friction(3.0, 0.5).unwrap())
-        .unwrap()
-        .with(driven)
-        .unwrap();
+    let system = SystemWithForces::new(&linear).with(connection).unwrap().with(driven).unwrap();
     let chosen = |t: f64| -> [DVector<f64>; 3] {
         let angle = |i: usize| ((1.0 + 0.7 * i as f64) * t + i as f64, 1.0 + 0.7 * i as f64);
         let size = |i: usize| 0.5 - 0.1 * i as f64;
@@ -221,7 +216,7 @@ fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
     }
 }
 
-/// The same force as an element with its tangents, as a function without, and over more degrees of
+/// The same force as terms with their tangents, as a function without, and over more degrees of
 /// freedom than it needs; on dense and on sparse matrices.
 #[test]
 fn reduction_and_tangents_do_not_change_the_response() {
@@ -236,8 +231,8 @@ fn reduction_and_tangents_do_not_change_the_response() {
         matrix(mechid_model::Matrix::Stiffness),
     )
     .unwrap();
-    let law = |e: f64| 500.0 * e + 4e4 * e.powi(3);
-    let element = || Connection::between(20, 4).spring(&[500.0, 0.0, 4e4]).unwrap();
+    let law = |e: f64| 3e3 * e * e + 4e4 * e.powi(3);
+    let element = || terms("k2: (x21-x5)^2, k3: (x21-x5)^3", &[3e3, 4e4]);
     let function = ForceFunction::new(vec![4, 20], move |_, x, _, g| {
         g[1] = law(x[1] - x[0]);
         g[0] = -g[1];
@@ -248,7 +243,7 @@ fn reduction_and_tangents_do_not_change_the_response() {
         g[4] = -g[20];
     });
     let systems: [(&str, SystemWithForces<'_>); 4] = [
-        ("element", SystemWithForces::new(&sparse).with(element()).unwrap()),
+        ("terms", SystemWithForces::new(&sparse).with(element()).unwrap()),
         ("dense", SystemWithForces::new(&dense).with(element()).unwrap()),
         ("function", SystemWithForces::new(&sparse).with(function).unwrap()),
         ("wide", SystemWithForces::new(&dense).with(wide).unwrap()),
@@ -283,17 +278,16 @@ fn steps_of_fixed_size_are_those_of_the_scheme() {
         DMatrix::from_row_slice(2, 2, &[900.0, -300.0, -200.0, 700.0]),
     )
     .unwrap();
-    let on = Connection::to_ground(0);
     let follows = |t: f64, x: f64, v: f64| 3e6 * (x - 0.01 * (5.0 * t).sin()).powi(3) + v * v.abs();
     let systems = [
-        ("cubic", SystemWithForces::new(&one).with(on.spring(&[0.0, 0.0, 4e5]).unwrap()).unwrap()),
-        ("stop", SystemWithForces::new(&one).with(on.gap(0.002, 2e3).unwrap()).unwrap()),
+        ("cubic", SystemWithForces::new(&one).with(terms("k3: x1^3", &[4e5])).unwrap()),
+        ("stop", SystemWithForces::new(&one).with(terms("k: gap(x1, 0.002)", &[2e3])).unwrap()),
         (
             "friction and a spring",
             SystemWithForces::new(&two)
-                .with(on.friction(0.3, 0.05).unwrap())
+                .with(terms("f: tanh(v1/0.05)", &[0.3]))
                 .unwrap()
-                .with(on.spring(&[0.0, 2e4, 4e5]).unwrap())
+                .with(terms("k2: x1^2, k3: x1^3", &[2e4, 4e5]))
                 .unwrap(),
         ),
         (
@@ -333,12 +327,10 @@ fn steps_of_fixed_size_are_those_of_the_scheme() {
 fn a_linear_spring_is_a_part_of_the_stiffness() {
     let soft = Sdof::new(2.0, 0.3, 50.0).unwrap().system();
     let stiff = Sdof::new(2.0, 0.5, 80.0).unwrap().system();
-    let on = Connection::to_ground(0);
-    let system = SystemWithForces::new(&soft)
-        .with(on.spring(&[30.0]).unwrap())
-        .unwrap()
-        .with(on.damper(&[0.2]).unwrap())
-        .unwrap();
+    let spring_and_damper =
+        |_: f64, x: &[f64], v: &[f64], g: &mut [f64]| g[0] = 30.0 * x[0] + 0.2 * v[0];
+    let system =
+        SystemWithForces::new(&soft).with(ForceFunction::new(vec![0], spring_and_damper)).unwrap();
     let force = force(Sampling::new(0.02, 500).unwrap(), 1);
     for scheme in nonlinear_schemes() {
         let scheme = scheme.as_ref();
@@ -356,7 +348,7 @@ fn a_linear_spring_is_a_part_of_the_stiffness() {
 fn a_mass_between_stops_comes_back_in_time() {
     let (clearance, stiffness, speed) = (0.1, 400.0, 2.0);
     let free = oscillator(1.0, 0.0, 0.0);
-    let stops = Connection::to_ground(0).gap(clearance, stiffness).unwrap();
+    let stops = terms("k: gap(x1, 0.1)", &[stiffness]);
     let system = SystemWithForces::new(&free).with(stops).unwrap();
     let period = 4.0 * clearance / speed + 2.0 * std::f64::consts::PI / f64::sqrt(stiffness);
     let steps = 4000;
@@ -379,10 +371,9 @@ fn a_mass_between_stops_comes_back_in_time() {
 #[test]
 fn friction_and_drag_slow_a_mass_as_they_should() {
     let free = oscillator(2.0, 0.0, 0.0);
-    let on = Connection::to_ground(0);
-    let (limit, width, speed, end) = (0.8, 0.2, 1.5, 4.0);
-    let rubbed = SystemWithForces::new(&free).with(on.friction(limit, width).unwrap()).unwrap();
-    let dragged = SystemWithForces::new(&free).with(on.damper(&[0.0, 0.6]).unwrap()).unwrap();
+    let (limit, width, speed, end) = (0.8, 0.2_f64, 1.5, 4.0);
+    let rubbed = SystemWithForces::new(&free).with(terms("f: tanh(v1/0.2)", &[limit])).unwrap();
+    let dragged = SystemWithForces::new(&free).with(terms("c2: v1^2", &[0.6])).unwrap();
     let rubbing = width * ((speed / width).sinh() * (-limit * end / (2.0 * width)).exp()).asinh();
     let dragging = 1.0 / (1.0 / speed + 0.6 * end / 2.0);
     for scheme in nonlinear_schemes().iter().filter(|s| !is_at_rest(s.as_ref())) {
@@ -401,7 +392,7 @@ fn friction_and_drag_slow_a_mass_as_they_should() {
 #[test]
 fn the_energy_of_duffings_oscillator_does_not_drift() {
     let linear = oscillator(1.0, 0.0, 1.0);
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
+    let cubic = terms("k3: x1^3", &[3.0]);
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     // The period of amplitude 1.2 is about 2.9 s; 500 of them.
     let worst = |scheme: &dyn Scheme, dt: f64| {
@@ -458,17 +449,16 @@ fn what_newtons_method_cannot_solve_is_an_error() {
 #[test]
 fn what_is_for_linear_systems_refuses_others() {
     let linear = oscillator(1.0, 0.1, 1.0);
-    let on = Connection::to_ground(0);
-    let system = SystemWithForces::new(&linear).with(on.spring(&[1.0]).unwrap()).unwrap();
+    let system = SystemWithForces::new(&linear).with(terms("k3: x1^3", &[1.0])).unwrap();
     let refused = MatrixExponential::LINEAR.prepare(&system, 0.1).err();
     assert!(matches!(refused, Some(IntegrateError::LinearOnly { .. })));
     let force = still(0.1, 8, 1);
     let refused = integrate_periodic(&Newmark::AVERAGE_ACCELERATION, &system, &force);
     assert!(matches!(refused, Err(IntegrateError::LinearOnly { .. })));
-    let outside = Connection::between(0, 1).spring(&[1.0]).unwrap();
+    let outside = terms("k3: (x1-x2)^3", &[1.0]);
     let refused = SystemWithForces::new(&linear).with(outside).err();
     assert_eq!(refused, Some(IntegrateError::DofOutside { index: 1, dof: 1 }));
-    let twice = Connection::between(0, 0).spring(&[1.0]).unwrap();
+    let twice = ForceFunction::new(vec![0, 0], |_, x, _, g| g.copy_from_slice(x));
     let refused = SystemWithForces::new(&linear).with(twice).err();
     assert_eq!(refused, Some(IntegrateError::ForcedTwice { index: 0 }));
     // Stability is checked of the linear part.

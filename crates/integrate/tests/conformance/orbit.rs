@@ -30,7 +30,7 @@ fn one_period(omega: f64, len: usize, force: impl Fn(f64) -> f64) -> Record {
 fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
     let (c, omega) = (0.4, 2.0);
     let linear = oscillator(1.0, c, 1.0);
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0]).unwrap();
+    let cubic = terms("k3: x1^3", &[1.0]);
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let product = (-c * TAU / omega).exp();
     for scheme in schemes().iter().filter(|s| s.name() != "matrix exponential") {
@@ -89,7 +89,7 @@ fn the_three_orbits_of_a_folded_resonance_are_found() {
     }
     assert_eq!(amplitudes.len(), 3, "{amplitudes:?}");
     let linear = oscillator(1.0, c, 1.0);
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, k3]).unwrap();
+    let cubic = terms("k3: x1^3", &[k3]);
     let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let force = one_period(omega, 200, |t| f * (omega * t).cos());
     for (k, a) in amplitudes.into_iter().enumerate() {
@@ -157,7 +157,7 @@ fn a_chosen_response_of_many_masses_is_an_orbit() {
     let stiffness = band(dof, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]);
     let (mass, damping) = (band(dof, &[(0, 1.0)]), band(dof, &[(-1, -1.0), (0, 5.0), (1, -1.0)]));
     let chain = SparseSystem::new(mass, damping, stiffness).unwrap();
-    let cubic = Connection::to_ground(40).spring(&[0.0, 0.0, 4e3]).unwrap();
+    let cubic = terms("k3: x41^3", &[4e3]);
     let system = SystemWithForces::new(&chain).with(cubic).unwrap();
     // x_i = a_i cos ωt with the shape of the string, so that its neighbours pull it back by its curvature.
     let shape = |i: usize| (std::f64::consts::PI * (i as f64 + 1.0) / (dof as f64 + 1.0)).sin();
@@ -192,7 +192,7 @@ fn the_instability_of_one_mass_among_many_shows_in_the_largest_multiplier() {
     stiffness.values_mut()[0] = -1.0;
     let damping = band(dof, &[(0, 1.5)]);
     let masses = SparseSystem::new(band(dof, &[(0, 1.0)]), damping, stiffness).unwrap();
-    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0]).unwrap();
+    let cubic = terms("k3: x1^3", &[1.0]);
     let system = SystemWithForces::new(&masses).with(cubic).unwrap();
     let none = Record::from_channel(Sampling::new(0.01, 200).unwrap(), vec![0.0; 200]).unwrap();
     let dofs = SelectedDofs { forced: &[7], observed: &[0] };

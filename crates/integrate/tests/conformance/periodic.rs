@@ -16,7 +16,7 @@ fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> 
     let (len, n) = (force.len(), force.channels());
     let dt = force.sampling().dt();
     let mut stepper = scheme.prepare_unchecked(system, dt).unwrap();
-    let transition = Transition::of(stepper.as_mut());
+    let transition = Transition::from_stepper(stepper.as_mut());
     let states = transition.change.nrows();
     // Δt² of a displacement, Δt of a velocity: numbers of one size.
     let units = DVector::from_fn(states, |i, _| dt.powi(2 - (i / n).min(2) as i32));

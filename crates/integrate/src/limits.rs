@@ -1,0 +1,260 @@
+//! Limits of this crate: the numbers that decide how long to iterate, when to stop and which
+//! algorithm to use.
+
+// Matrices.
+
+/// Maximum number of degrees of freedom up to which dense matrices are never converted to sparse.
+pub(crate) const DENSE_DOF: usize = 64;
+
+/// Fraction of non-zero entries below which larger dense matrices are converted to sparse.
+pub(crate) const SPARSE_FRACTION: f64 = 0.1;
+
+/// Maximum number of diagonals of a matrix that is factored by band. At this width the solutions
+/// with a two-dimensional grid take about as long either way, and 100,000 degrees of freedom 0.4
+/// GB.
+pub(crate) const BAND_DIAGONALS: usize = 256;
+
+/// Number of diagonals up to which a band is always the fastest form, so that no other is tried.
+pub(crate) const NARROW_BAND_DIAGONALS: usize = 32;
+
+/// Smallest ratio of a diagonal entry to the largest entry of its column for which it is the
+/// pivot. Below it rows are exchanged, which keeps rounding small but widens the band.
+pub(crate) const PIVOT_FRACTION: f64 = 0.1;
+
+/// Maximum number of operations of an LU factorisation column by column; above it the blocks of
+/// columns of `faer` are faster.
+pub(crate) const COLUMN_OPERATIONS: f64 = 4e9;
+
+/// Largest backward error, relative to the terms of the rows, of an LU factorisation without
+/// exchanges of rows. Above it the matrix is factored again with exchanges.
+pub(crate) const BACKWARD_ERROR: f64 = 1e-13;
+
+/// Number of inverse iterations that estimate the reciprocal condition of a sparse matrix.
+pub(crate) const CONDITION_STEPS: usize = 4;
+
+// Stepping.
+
+/// Maximum number of degrees of freedom whose steps are matrix products of fixed size.
+pub(crate) const FIXED_SIZE_DOF: usize = 2;
+
+/// Maximum number of secant steps of a nonlinear force at fixed size; Newton's method, which has
+/// safeguards, takes the step after them.
+pub(crate) const SECANT_STEPS: usize = 12;
+
+/// Residual, in tolerances, above which a secant step updates the slope; below it the residual is
+/// mostly rounding.
+pub(crate) const SECANT_UPDATE: f64 = 1e3;
+
+/// Number of steps that the general stepper takes after a step of fixed size was not solved.
+pub(crate) const GENERAL_STEPS: usize = 16;
+
+/// Number of computed values between two log messages about the progress.
+pub(crate) const NUMBERS_PER_MESSAGE: usize = 1 << 20;
+
+// Nonlinear equation of a step.
+
+/// Residual of the accelerations, relative to the largest, at which Newton's method ends.
+pub(crate) const STEP_RESIDUAL: f64 = 1e-12;
+
+/// Residual accepted where no Newton step reduces it: a small extension between large
+/// displacements is rounded.
+pub(crate) const STEP_RESIDUAL_ROUNDING: f64 = 1e-9;
+
+/// Maximum number of Newton steps.
+pub(crate) const STEP_NEWTON_STEPS: usize = 50;
+
+/// Smallest fraction of a Newton step that is tried before the search ends.
+pub(crate) const STEP_NEWTON_FRACTION: f64 = 1e-4;
+
+/// Relative change of a displacement or velocity for a tangent by forward differences, about √ε.
+pub(crate) const TANGENT_DIFFERENCE: f64 = 1e-7;
+
+// Periodic responses.
+
+/// Maximum number of degrees of freedom for which the map over a period is formed as a matrix;
+/// above it the response is found in a Krylov space.
+pub(crate) const PERIOD_MAP_DOF: usize = 300;
+
+/// Change of the state over a period, relative to its size, at which a linear periodic response is
+/// accepted: a tenth of the accuracy promised.
+pub(crate) const PERIODIC_GAP: f64 = 1e-13;
+
+/// Relative residual of the equations of a linear periodic state in a Krylov space.
+pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
+
+/// Maximum number of Krylov searches, each for the residual of the one before.
+pub(crate) const PERIODIC_SEARCHES: usize = 8;
+
+/// Maximum number of passes over the period that correct a linear periodic state found by its
+/// matrix.
+pub(crate) const PERIODIC_PASSES: usize = 4;
+
+/// Ratio of successive corrections above which the remaining gap is rounding.
+pub(crate) const PERIODIC_PROGRESS: f64 = 0.1;
+
+/// Change of the state, relative to the largest displacement, velocity or acceleration, for a
+/// derivative by central differences, whose error is its square.
+pub(crate) const SHOOTING_DIFFERENCE: f64 = 1e-5;
+
+/// Maximum memory of the vectors of a Krylov space, in bytes.
+pub(crate) const SEARCH_BYTES: usize = 1 << 30;
+
+/// Maximum number of vectors of a Krylov space, each of which costs a pass over the period.
+pub(crate) const SEARCH_VECTORS: usize = 1000;
+
+/// Maximum number of degrees of freedom for which the derivative of a period is formed as a
+/// matrix; above it Newton steps are found in a Krylov space.
+pub(crate) const MONODROMY_DOF: usize = 64;
+
+/// Relative residual of a Newton step in a Krylov space: each step then reduces the gap by about
+/// this factor.
+pub(crate) const ORBIT_GMRES_RESIDUAL: f64 = 1e-4;
+
+/// Change of the state over a period, relative to the largest displacement, velocity or
+/// acceleration, at which Newton's method ends.
+pub(crate) const ORBIT_GAP: f64 = 1e-11;
+
+/// Change accepted where no Newton step reduces it.
+pub(crate) const ORBIT_GAP_ROUNDING: f64 = 1e-8;
+
+/// Maximum number of Newton steps to a periodic orbit.
+pub(crate) const ORBIT_NEWTON_STEPS: usize = 40;
+
+/// Smallest fraction of a Newton step that is tried before the search ends.
+pub(crate) const ORBIT_NEWTON_FRACTION: f64 = 1.0 / 64.0;
+
+/// Error of the Floquet multipliers of a derivative formed as a matrix, relative to the largest.
+pub(crate) const MONODROMY_ERROR: f64 = 1e-9;
+
+/// Residual of the largest Floquet multiplier, relative to it or, if it is below 1, absolute, at
+/// which Arnoldi's iteration ends.
+pub(crate) const MULTIPLIER_RESIDUAL: f64 = 1e-6;
+
+/// Maximum number of vectors of the search for the largest Floquet multiplier.
+pub(crate) const MULTIPLIER_VECTORS: usize = 200;
+
+/// Number of vectors between two evaluations of the largest multiplier.
+pub(crate) const MULTIPLIER_CHECK_INTERVAL: usize = 10;
+
+// Stability.
+
+/// Maximum number of degrees of freedom for which the step limit comes from the whole
+/// amplification matrix; above it the fastest motions decide.
+pub(crate) const AMPLIFICATION_DOF: usize = 20;
+
+/// Maximum number of degrees of freedom for which all eigenvalues of a dense matrix are computed;
+/// above it Krylov spaces give the largest.
+pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
+
+/// Growth per step that is not refused. Rounding turns the double eigenvalue 1 of a free body into
+/// 1 ± √ε, times a condition number, which is no instability; at this rate a motion needs a
+/// million steps to grow by a factor e.
+pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
+
+/// Growth per step beyond the critical step, unless the system has a free body. The rounding of
+/// two eigenvalues that are about to meet there is far smaller.
+pub(crate) const CRITICAL_GROWTH: f64 = 1e-9;
+
+/// Ratio to the limit of a scheme that is assumed for an eigenvalue not proven to be below the
+/// limit: its motion then grows by more than is tolerated.
+pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
+
+/// Relative difference of two entries up to which a matrix counts as symmetric.
+pub(crate) const ASYMMETRY: f64 = 1e-12;
+
+/// Negative eigenvalue of C or K, relative to the size of its rows, that counts as rounding. For K
+/// the slowest motion may then grow by 3·10⁻⁷ of the highest frequency.
+pub(crate) const SEMIDEFINITE_SHIFT: f64 = 1e-13;
+
+/// Maximum number of Lanczos steps to the highest frequency.
+pub(crate) const LANCZOS_STEPS: usize = 100;
+
+/// Relative width to which the highest eigenvalue is enclosed by factorisations.
+pub(crate) const ENCLOSURE_WIDTH: f64 = 1e-4;
+
+/// First relative step of the upper end of the enclosure; each later step is twice as large.
+pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
+
+/// Maximum number of factorisations for each end of the enclosure.
+pub(crate) const ENCLOSURE_FACTORISATIONS: usize = 64;
+
+/// Number of Arnoldi steps for the eigenvalue of largest modulus.
+pub(crate) const ARNOLDI_STEPS: usize = 32;
+
+/// Maximum number of vectors of the search for the fastest growing free motion.
+pub(crate) const GROWTH_VECTORS: usize = 40;
+
+/// Number of vectors between two evaluations of the growth.
+pub(crate) const GROWTH_CHECK_INTERVAL: usize = 5;
+
+/// Excess of a growth factor over 1 that counts as rounding, as for the double eigenvalue 1 of a
+/// free body.
+pub(crate) const GROWTH_ROUNDING: f64 = 1e-4;
+
+/// Norm of a motion after one period below which it has vanished; its square is still
+/// representable.
+pub(crate) const VANISHED_MOTION: f64 = 1e-150;
+
+/// Number of periods over which a motion is followed if the search leaves its growth undecided.
+pub(crate) const FOLLOWED_PERIODS: usize = 20;
+
+/// Energy ratio of the second half of these periods to the first above which the motion grows.
+pub(crate) const FOLLOWED_GROWTH: f64 = 2.0;
+
+// Modes of sparse systems.
+
+/// Maximum number of shifts. Close modes far from one shift converge from another shift among
+/// them.
+pub(crate) const SHIFTS: usize = 8;
+
+/// Number of rigid-body modes of a free structure in three dimensions.
+pub(crate) const RIGID_BODY_MODES: usize = 6;
+
+/// Shift for a free structure, relative to the highest natural frequency.
+pub(crate) const FREE_SHIFT: f64 = 1e-3;
+
+/// Ratio of the frequencies searched for to the unit of the velocities above which the unit is
+/// changed.
+pub(crate) const VELOCITY_SCALE_RATIO: f64 = 10.0;
+
+/// Number of inverse iterations that estimate the lowest natural frequency.
+pub(crate) const LOWEST_FREQUENCY_STEPS: usize = 3;
+
+/// Largest ratio of the imaginary part of a shift to its modulus for which real factors are used.
+pub(crate) const REAL_SHIFT: f64 = 1e-6;
+
+/// Relative distance of a shift from the eigenvalue it is placed at, so that the matrix is not
+/// singular.
+pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
+
+/// Relative difference up to which converged eigenvalues from two shifts are the same.
+pub(crate) const SAME_EIGENVALUE: f64 = 3e-8;
+
+/// Largest residual of a mode that is preferred for the next shift; a larger residual may belong
+/// to no mode.
+pub(crate) const SHIFT_RESIDUAL: f64 = 1e-2;
+
+/// Number of start vectors: multiple eigenvalues, such as those of a symmetric rotor in its two
+/// planes, are found up to this multiplicity.
+pub(crate) const START_VECTORS: usize = 4;
+
+/// Largest relative residual of a converged eigenvalue of the inverted operator.
+pub(crate) const RITZ_RESIDUAL: f64 = 1e-8;
+
+/// Modulus, relative to the largest, below which an eigenvalue of the inverted operator counts as
+/// zero.
+pub(crate) const NEGLIGIBLE_EIGENVALUE: f64 = 1e-14;
+
+/// Relative difference up to which eigenvalues of the inverted operator are a multiple one.
+pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
+
+/// Norm of a unit eigenvector without its parts along others of the same eigenvalue above which it
+/// is independent of them.
+pub(crate) const INDEPENDENT_EIGENVECTOR: f64 = 1e-6;
+
+/// Number of eigenvalues examined beyond the modes wanted, since the operator orders them a little
+/// differently.
+pub(crate) const SPARE_MODES: usize = 8;
+
+/// Largest residual of a mode that is returned.
+pub(crate) const MODE_RESIDUAL: f64 = 1e-12;

@@ -1,0 +1,5 @@
+//! Nonlinear forces, and the equation of a step that has them.
+
+pub(crate) mod force;
+pub(crate) mod local_newton;
+pub(crate) mod term_forces;

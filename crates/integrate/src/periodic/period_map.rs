@@ -1,0 +1,182 @@
+//! The map of a scheme over a whole period, and its periodic state.
+
+use mechid_signal::Sampling;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use crate::error::IntegrateError;
+use crate::stepping::transition::Transition;
+
+/// I − Φ, factored in balanced coordinates, for the independent part of the state.
+///
+/// After a free step most schemes satisfy M ẍ + C ẋ + K x = 0, so that ẍ = G y follows from the
+/// rest of the state, y, and y' = y + (D_yy + D_ya G) y. With forces ẍ = G y + e; e depends only on
+/// the forces of the last step and is the same at both ends of the period.
+pub(crate) struct PeriodMap {
+    /// I − Φ on y, or on the whole state.
+    factored: LU<f64, Dyn, Dyn>,
+    /// G, if the accelerations follow from y.
+    following: Option<DMatrix<f64>>,
+    /// Scales s of z = s ∘ (balanced z), which make the numbers comparable in any units.
+    scales: DVector<f64>,
+}
+
+impl PeriodMap {
+    /// Makes the map of a scheme in `dof` degrees of freedom, over as many steps as `sampling` has
+    /// samples.
+    pub(crate) fn new(
+        transition: &Transition,
+        dof: usize,
+        sampling: Sampling,
+    ) -> Result<Self, IntegrateError> {
+        let mut change = transition.change.clone();
+        let scales = Transition::balance(&mut change).ok_or(IntegrateError::NoPeriodicState {
+            period: sampling.duration(),
+            reciprocal_condition: 0.0,
+            rounding: f64::EPSILON,
+        })?;
+        let parts = Blocks::new(&change, dof);
+        let following = parts.following();
+        let change = match &following {
+            Some(following) => parts.rest_rest + parts.rest_acceleration * following,
+            None => change,
+        };
+        let steps = sampling.len();
+        let over_period = -power_less_identity(&change, steps);
+        // The error of each step's matrix is ε of its change, that of each product ε of its result.
+        let rounding = f64::EPSILON
+            * (steps as f64 * change.norm() + f64::from(steps.ilog2() + 1) * over_period.norm());
+        let size = over_period.norm().max(1.0);
+        let factored = over_period.lu();
+        let smallest = smallest_singular_value(&factored);
+        if !(smallest > 4.0 * rounding && rounding.is_finite()) {
+            return Err(IntegrateError::NoPeriodicState {
+                period: sampling.duration(),
+                reciprocal_condition: smallest / size,
+                rounding: 4.0 * rounding / size,
+            });
+        }
+        Ok(Self { factored, following, scales })
+    }
+
+    /// Returns the state at rest with the accelerations that the forces alone cause, taken from
+    /// `state`.
+    pub(crate) fn at_rest(&self, state: &[f64]) -> Vec<f64> {
+        self.map(state, |rest| rest.fill(0.0))
+    }
+
+    /// Returns the periodic state, if the state at rest under the same forces ends in `state`.
+    pub(crate) fn repeat(&self, state: &[f64]) -> Vec<f64> {
+        self.map(state, |rest| {
+            self.factored.solve_mut(rest);
+        })
+    }
+
+    /// Returns `state` with its y changed and, where ẍ follows from y, with the new ẍ.
+    fn map(&self, state: &[f64], change: impl FnOnce(&mut DVector<f64>)) -> Vec<f64> {
+        let mut balanced = DVector::from_column_slice(state).component_div(&self.scales);
+        match &self.following {
+            None => change(&mut balanced),
+            Some(following) => {
+                let dof = following.nrows();
+                let mut independent = balanced.clone().remove_rows(2 * dof, dof);
+                let before = independent.clone();
+                change(&mut independent);
+                let mut acceleration = balanced.rows_mut(2 * dof, dof);
+                acceleration.gemv(1.0, following, &(&independent - before), 1.0);
+                balanced.rows_mut(0, 2 * dof).copy_from(&independent.rows(0, 2 * dof));
+                let more = independent.len() - 2 * dof;
+                balanced.rows_mut(3 * dof, more).copy_from(&independent.rows(2 * dof, more));
+            }
+        }
+        balanced.component_mul(&self.scales).as_slice().to_vec()
+    }
+
+    /// Largest balanced entry.
+    pub(crate) fn norm(&self, state: &[f64]) -> f64 {
+        state.iter().zip(&self.scales).fold(0.0, |most, (z, s)| f64::max(most, (z / s).abs()))
+    }
+}
+
+/// D in blocks: the accelerations, and the rest of the state.
+struct Blocks {
+    rest_rest: DMatrix<f64>,
+    rest_acceleration: DMatrix<f64>,
+    acceleration_rest: DMatrix<f64>,
+    acceleration_acceleration: DMatrix<f64>,
+}
+
+impl Blocks {
+    fn new(change: &DMatrix<f64>, dof: usize) -> Self {
+        let rows = change.rows(2 * dof, dof);
+        let other_rows = change.clone().remove_rows(2 * dof, dof);
+        Self {
+            rest_acceleration: other_rows.columns(2 * dof, dof).into_owned(),
+            rest_rest: other_rows.remove_columns(2 * dof, dof),
+            acceleration_acceleration: rows.columns(2 * dof, dof).into_owned(),
+            acceleration_rest: rows.into_owned().remove_columns(2 * dof, dof),
+        }
+    }
+
+    /// Returns G with (rows of A at the accelerations) = G (rows of A at the rest), if it exists to
+    /// rounding.
+    fn following(&self) -> Option<DMatrix<f64>> {
+        let states = self.rest_rest.nrows();
+        let amplification = &self.rest_rest + DMatrix::identity(states, states);
+        let following =
+            amplification.transpose().lu().solve(&self.acceleration_rest.transpose())?.transpose();
+        let n = self.acceleration_acceleration.nrows();
+        // The diagonal block of A at the accelerations is I + D.
+        let acceleration = &self.acceleration_acceleration + DMatrix::identity(n, n);
+        let missed = &acceleration - &following * &self.rest_acceleration;
+        let size = 1.0 + following.norm() * self.rest_acceleration.norm();
+        (missed.norm() <= 16.0 * states as f64 * f64::EPSILON * size).then_some(following)
+    }
+}
+
+/// Returns (I + D)^`exponent` − I by repeated squaring; forming I + D would lose digits.
+fn power_less_identity(change: &DMatrix<f64>, exponent: usize) -> DMatrix<f64> {
+    let mut power = DMatrix::zeros(change.nrows(), change.ncols());
+    let mut square = change.clone();
+    let mut product = power.clone();
+    let mut remaining = exponent;
+    loop {
+        if remaining & 1 == 1 {
+            product.copy_from(&power);
+            product += &square;
+            product.gemm(1.0, &power, &square, 1.0);
+            std::mem::swap(&mut power, &mut product);
+        }
+        remaining >>= 1;
+        if remaining == 0 {
+            return power;
+        }
+        product.copy_from(&square);
+        product.gemm(1.0, &square, &square, 2.0);
+        std::mem::swap(&mut square, &mut product);
+    }
+}
+
+/// Estimates the smallest singular value by inverse iteration on the normal matrix; 0 for a zero
+/// pivot.
+fn smallest_singular_value(factored: &LU<f64, Dyn, Dyn>) -> f64 {
+    if !factored.is_invertible() {
+        return 0.0;
+    }
+    let (lower, upper) = (factored.l(), factored.u());
+    let mut direction = DVector::from_fn(lower.nrows(), |i, _| 1.0 + 0.37 * (i % 5) as f64);
+    let mut smallest = f64::INFINITY;
+    // Six iterations give the order of magnitude, which is enough.
+    for _ in 0..6 {
+        direction.normalize_mut();
+        // The transposed matrix is Uᵀ Lᵀ P.
+        let solved = upper.tr_solve_upper_triangular_mut(&mut direction)
+            && lower.tr_solve_lower_triangular_mut(&mut direction);
+        if !solved {
+            return 0.0;
+        }
+        factored.p().inv_permute_rows(&mut direction);
+        factored.solve_mut(&mut direction);
+        smallest = direction.norm().sqrt().recip();
+    }
+    smallest
+}
