@@ -108,7 +108,7 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
             let rig = RandomTest { system, sampling, quantity: QUANTITY, force: 100.0 };
             // The whole period closes, so that all of it can be late.
             let [force, response] = rig.period(seed)?;
-            let response = delay.of(&response, seed)?;
+            let response = delay.apply(&response, seed)?;
             let first = SAMPLES / 2 + 1;
             Ok([force.window(first, SAMPLES)?, response.window(first, SAMPLES)?])
         }
@@ -145,10 +145,10 @@ fn run(test: Test, fault: Option<&Fault>, on: On, seed: u64) -> Outcome<Run> {
     response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.005), seed + 1_000_000)?;
     if let Some(fault) = fault.filter(|fault| !matches!(fault, Fault::Delay { .. })) {
         if on != On::Response {
-            force = fault.of(&force, seed)?;
+            force = fault.apply(&force, seed)?;
         }
         if on != On::Force {
-            response = fault.of(&response, seed)?;
+            response = fault.apply(&response, seed)?;
         }
     }
     let record = Measurement::from_records(&force, &[(QUANTITY, &response)])?;

@@ -19,7 +19,7 @@ pub enum ProblemError {
         /// Smallest singular value of I − Φᴺ relative to 1 + ‖Φᴺ‖.
         reciprocal_condition: f64,
     },
-    /// The step is so long for the system that no digit of the response would be right.
+    /// The step is so long that rounding leaves no correct digit of the response.
     #[error("a step of {dt} s is too long for this system: (ω dt)² is about {scale:.1e}")]
     StepTooLong {
         /// Time step, in seconds.
@@ -30,7 +30,7 @@ pub enum ProblemError {
     /// The system or its frequency response cannot be evaluated.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The response is not finite: an unstable system outgrew double precision.
+    /// The response is not finite: an unstable system overflowed.
     #[error(transparent)]
     Signal(#[from] SignalError),
     /// A decomposition fails.

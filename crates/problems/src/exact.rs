@@ -1,6 +1,6 @@
 //! Responses to a sampled force without discretisation error: the reference solutions of the tests.
 //!
-//! A sampled force is a motion only once it is said what happens between the samples:
+//! A sampled force defines a motion only together with its course between the samples:
 //!
 //! | Functions | Between the samples the force is |
 //! |---|---|
@@ -8,17 +8,17 @@
 //! | [`exact_foh`], [`exact_foh_periodic`] | on the straight line from sample to sample |
 //! | [`exact_harmonic`], [`exact_harmonic_periodic`] | the sum of its spectral lines up to Nyquist |
 //!
-//! The periodic ones give the motion that repeats with the period `len · dt` of the force,
-//! the others start from a given state. x, ẋ and ẍ belong to the same instants. A held
-//! force jumps at every sample and the acceleration with it: ẍ is the limit from the right,
-//! under the force that begins there.
+//! The periodic functions return the motion that repeats with the period `len · dt` of the force,
+//! the others start from a given state. x, ẋ and ẍ belong to the same instants. A held force, and
+//! the acceleration with it, jumps at every sample: ẍ is the limit from the right, under the force
+//! that begins there.
 
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
 use mechid_numerics::linear_algebra::singular_values;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::ProblemError;
+use crate::error::ProblemError;
 use crate::transition::{Between, Transition};
 
 /// Response from `start` to a force held between samples (samples × dof, in N).
@@ -38,7 +38,7 @@ pub fn exact_zoh(
 /// Response from `start` to a force linear between samples (samples × dof, in N).
 ///
 /// # Errors
-/// As [`exact_zoh`].
+/// The errors of [`exact_zoh`].
 pub fn exact_foh(
     system: &SecondOrderSystem,
     force: &Record,
@@ -50,7 +50,8 @@ pub fn exact_foh(
 /// Periodic response to a force held between samples, one period (samples × dof, in N).
 ///
 /// # Errors
-/// [`ProblemError::NoPeriodicMotion`] if there is none or more than one, else as [`exact_zoh`].
+/// [`ProblemError::NoPeriodicMotion`] if there is none or more than one; otherwise the errors of
+/// [`exact_zoh`].
 pub fn exact_zoh_periodic(
     system: &SecondOrderSystem,
     force: &Record,
@@ -61,7 +62,7 @@ pub fn exact_zoh_periodic(
 /// Periodic response to a force linear between samples, one period (samples × dof, in N).
 ///
 /// # Errors
-/// As [`exact_zoh_periodic`].
+/// The errors of [`exact_zoh_periodic`].
 pub fn exact_foh_periodic(
     system: &SecondOrderSystem,
     force: &Record,
@@ -69,14 +70,15 @@ pub fn exact_foh_periodic(
     periodic(system, force, Between::Linear)
 }
 
-/// Periodic response to the band-limited force through the samples of one period:
-/// each line n of the response is receptance at n·ω0 times line n of the force.
+/// Periodic response to the band-limited force through the samples of one period: each line n of
+/// the response is the receptance at n·ω0 times line n of the force.
 ///
-/// At Nyquist (even length) the samples show only the cosine of the force; that is what acts.
+/// At Nyquist (even length) the samples contain only the cosine of the force, which is the force
+/// applied.
 ///
 /// # Errors
-/// [`ProblemError::Model`] if the force does not fit or a line of the period (driven or not)
-/// stands on an undamped resonance.
+/// [`ProblemError::Model`] if the force does not fit, or if a line of the period (driven or not) is
+/// an undamped resonance.
 ///
 /// # Source
 /// Clough & Penzien, *Dynamics of Structures*, the chapter on periodic loading (line by line).
@@ -107,10 +109,10 @@ pub fn exact_harmonic_periodic(
 /// the difference between `start` and it.
 ///
 /// # Errors
-/// As [`exact_harmonic_periodic`] and [`exact_zoh`].
+/// The errors of [`exact_harmonic_periodic`] and [`exact_zoh`].
 ///
 /// # Source
-/// Superposition: those of [`exact_harmonic_periodic`] and [`exact_zoh`].
+/// The sources of [`exact_harmonic_periodic`] and [`exact_zoh`], by superposition.
 pub fn exact_harmonic(
     system: &SecondOrderSystem,
     force: &Record,
@@ -153,19 +155,20 @@ fn periodic(
 ) -> Result<Response, ProblemError> {
     let transition = Transition::new(system, force.sampling().dt(), between)?;
     transition.check(force.channels())?;
-    // z(T) = Φᴺ z(0) + s, and s is where rest leads to: (I − Φᴺ) z(0) = s.
+    // z(T) = Φᴺ z(0) + s, with s the state after a period from rest: (I − Φᴺ) z(0) = s.
     let size = 2 * system.dof();
     let (_, from_rest) = run(&transition, force, DVector::zeros(size))?;
     let over_period = transition.phi.pow(u32::try_from(force.len()).expect("fits in memory"));
     let growth = over_period.norm();
     let closing = DMatrix::identity(size, size) - over_period;
     let mut reciprocal_condition = 0.0;
-    // An unstable system may overflow over the period; singular values of that do not exist.
+    // An unstable system may overflow over the period; a matrix with infinite entries has no
+    // singular values.
     if growth.is_finite() {
-        // Not the condition of I − Φᴺ: without damping it may vanish as a whole.
+        // The condition of I − Φᴺ would not do: without damping the whole matrix may vanish.
         reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
-    // N products of matrices leave rounding of about N ε in Φᴺ.
+    // N products of matrices add rounding of about N ε to Φᴺ.
     let resolved = reciprocal_condition > 4.0 * f64::EPSILON * force.len() as f64;
     let start = if resolved { closing.lu().solve(&from_rest) } else { None };
     let start = start.ok_or(ProblemError::NoPeriodicMotion {
@@ -175,7 +178,8 @@ fn periodic(
     Ok(run(&transition, force, start)?.0)
 }
 
-/// Response at every sample, and the state one step after the last sample, where the first force acts again.
+/// Returns the response at every sample, and the state one step after the last sample, where the
+/// first force acts again.
 fn run(
     transition: &Transition,
     force: &Record,
@@ -185,12 +189,12 @@ fn run(
     let samples = force.len();
     let mut motion = [(); 3].map(|()| DMatrix::zeros(forces.nrows(), samples));
     for k in 0..samples {
-        let left = forces.column(k).into_owned();
-        let right = forces.column((k + 1) % samples).into_owned();
-        for (quantity, values) in motion.iter_mut().zip(transition.motion(&state, &left)) {
+        let first = forces.column(k).into_owned();
+        let last = forces.column((k + 1) % samples).into_owned();
+        for (quantity, values) in motion.iter_mut().zip(transition.motion(&state, &first)) {
             quantity.set_column(k, &values);
         }
-        state = transition.step(&state, &left, &right);
+        state = transition.step(&state, &first, &last);
     }
     let record = |quantity: &DMatrix<f64>| Record::new(force.sampling(), quantity.transpose());
     let [x, v, a] = &motion;

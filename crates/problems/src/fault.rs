@@ -1,4 +1,4 @@
-//! Faults of measuring chains, put on records that were computed without any.
+//! Faults of measuring chains, added to ideal records.
 
 use std::f64::consts::TAU;
 
@@ -8,25 +8,26 @@ use nalgebra::{Complex, DMatrix};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::ProblemError;
+use crate::error::ProblemError;
 
 /// A fault of the sensors of one kind, with all of their channels.
 ///
-/// A level is a part of the RMS value of a channel unless it says otherwise, so that one fault suits a force and a
-/// displacement.
+/// A level is a fraction of the RMS value of a channel unless stated otherwise, so that one fault
+/// suits a force and a displacement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fault {
-    /// Every channel shows this part of each other one.
+    /// Every channel shows this fraction of each other one.
     Crosstalk {
-        /// Part, a ratio.
+        /// Fraction, a ratio.
         part: f64,
     },
-    /// The surface that the probes look at is not round: sines of the rotation and its multiples, with phases drawn
-    /// from the seed.
+    /// The surface under the probes is not round: sines of the rotation and its multiples, with
+    /// phases drawn from the seed.
     RunOut {
         /// Speed of rotation, in Hz.
         rotation_hz: f64,
-        /// Amplitudes over the RMS value of the channel (pure numbers), one for the rotation and each of its multiples.
+        /// Amplitudes over the RMS value of the channel (pure numbers), one for the rotation and
+        /// each of its multiples.
         amplitudes: Vec<f64>,
     },
     /// Gaussian noise.
@@ -36,42 +37,44 @@ pub enum Fault {
         /// Colour of the noise.
         colour: Colour,
     },
-    /// The zero moves along a straight line.
+    /// The zero drifts along a straight line.
     Drift {
-        /// Distance that it moves from the first sample to the last, over the RMS value of the channel (pure number).
+        /// Drift from the first sample to the last, over the RMS value of the channel (pure
+        /// number).
         end: f64,
     },
-    /// The channels are late against those without the fault.
+    /// The channels are delayed.
     ///
-    /// The record is taken as one period or several whole ones.
+    /// The record is assumed to be one or several whole periods.
     Delay {
-        /// Delay, in samples (pure number), which need not be a whole one.
+        /// Delay, in samples (pure number), possibly fractional.
         samples: f64,
     },
-    /// An amplifier cuts off whatever goes beyond a limit.
+    /// An amplifier clips at a limit.
     Clipping {
-        /// Limit as part of the largest magnitude of each channel.
+        /// Limit as a fraction of the largest magnitude of each channel.
         part: f64,
     },
-    /// Samples are missing and nothing stands for them: those behind them come too early, and the last are made up
-    /// for by what follows, as of a record of whole periods.
+    /// Samples are lost without a replacement: later samples come too early, and the samples at the
+    /// end continue a record of whole periods.
     Lost {
-        /// Number of samples that are missing, all at one place drawn from the seed.
+        /// Number of samples lost, all at one position drawn from the seed.
         samples: usize,
     },
-    /// A converter that has nothing new repeats its last value.
+    /// A converter repeats its last value.
     Held {
-        /// Number of gaps, at places drawn from the seed.
+        /// Number of gaps, at positions drawn from the seed.
         gaps: usize,
         /// Samples of a gap.
         samples: usize,
     },
-    /// The gain is another one, or its sign.
+    /// The gain, or its sign, is wrong.
     Gain {
         /// Values over those without the fault (pure number).
         factor: f64,
     },
-    /// A converter gives values in steps, of a range to either side half as large again as the largest magnitude.
+    /// A converter quantises the values; its range to either side is 1.5 times the largest
+    /// magnitude.
     Steps {
         /// Number of bits.
         bits: u8,
@@ -79,14 +82,14 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The record as a measuring chain with the fault shows it; draws from `seed`.
+    /// Returns the record with the fault; draws from `seed`.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if a level or a colour is out of range.
     ///
     /// # Source
     /// Ours.
-    pub fn of(&self, record: &Record, seed: u64) -> Result<Record, ProblemError> {
+    pub fn apply(&self, record: &Record, seed: u64) -> Result<Record, ProblemError> {
         let (sampling, len) = (record.sampling(), record.len());
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let rms = |channel: usize| mechid_signal::measures::rms(record.channel(channel));
@@ -100,14 +103,8 @@ impl Fault {
             }
             Self::RunOut { rotation_hz, amplitudes } => {
                 for (channel, mut column) in data.column_iter_mut().enumerate() {
-                    let unit = rms(channel);
-                    for (multiple, amplitude) in (1..).zip(amplitudes) {
-                        let omega = TAU * f64::from(multiple) * rotation_hz * sampling.dt();
-                        let phase = rng.random_range(0.0..TAU);
-                        for (k, value) in column.iter_mut().enumerate() {
-                            *value += amplitude * unit * (omega * k as f64 + phase).cos();
-                        }
-                    }
+                    let omega = |n: i32| TAU * f64::from(n) * rotation_hz * sampling.dt();
+                    add_run_out(column.as_mut_slice(), omega, amplitudes, rms(channel), rng);
                 }
             }
             Self::Noise { level, colour } => {
@@ -115,19 +112,13 @@ impl Fault {
             }
             Self::Drift { end } => {
                 for (channel, mut column) in data.column_iter_mut().enumerate() {
-                    let all = end * rms(channel);
+                    let drift = end * rms(channel);
                     for (k, value) in column.iter_mut().enumerate() {
-                        *value += all * k as f64 / (len - 1) as f64;
+                        *value += drift * k as f64 / (len - 1) as f64;
                     }
                 }
             }
-            Self::Delay { samples } => {
-                let mut lines = Spectrum::of(record).lines().clone();
-                for (n, mut line) in lines.row_iter_mut().enumerate() {
-                    line *= Complex::from_polar(1.0, -TAU * n as f64 * samples / len as f64);
-                }
-                return Ok(Spectrum::from_lines(sampling, lines)?.to_record()?);
-            }
+            Self::Delay { samples } => return delayed(record, *samples),
             Self::Clipping { part } => {
                 for mut column in data.column_iter_mut() {
                     let limit = part * column.amax();
@@ -141,11 +132,7 @@ impl Fault {
             }
             Self::Held { gaps, samples } => {
                 for _ in 0..*gaps {
-                    let first = rng.random_range(1..len);
-                    for k in first..(first + samples).min(len) {
-                        let last = data.row(first - 1).into_owned();
-                        data.set_row(k, &last);
-                    }
+                    hold(&mut data, rng.random_range(1..len), *samples);
                 }
             }
             Self::Gain { factor } => data *= *factor,
@@ -158,6 +145,41 @@ impl Fault {
             }
         }
         Ok(Record::new(sampling, data)?)
+    }
+}
+
+/// Adds sines at multiples n of the rotation, at `omega(n)` rad per sample, with amplitudes in
+/// parts of `unit`.
+fn add_run_out(
+    column: &mut [f64],
+    omega: impl Fn(i32) -> f64,
+    amplitudes: &[f64],
+    unit: f64,
+    rng: &mut ChaCha8Rng,
+) {
+    for (multiple, amplitude) in (1..).zip(amplitudes) {
+        let omega = omega(multiple);
+        let phase = rng.random_range(0.0..TAU);
+        for (k, value) in column.iter_mut().enumerate() {
+            *value += amplitude * unit * (omega * k as f64 + phase).cos();
+        }
+    }
+}
+
+/// Returns the record delayed by a possibly fractional number of samples.
+fn delayed(record: &Record, samples: f64) -> Result<Record, ProblemError> {
+    let mut lines = Spectrum::of(record).lines().clone();
+    for (n, mut line) in lines.row_iter_mut().enumerate() {
+        line *= Complex::from_polar(1.0, -TAU * n as f64 * samples / record.len() as f64);
+    }
+    Ok(Spectrum::from_lines(record.sampling(), lines)?.to_record()?)
+}
+
+/// Repeats the row before `first` for a number of samples.
+fn hold(data: &mut DMatrix<f64>, first: usize, samples: usize) {
+    for k in first..(first + samples).min(data.nrows()) {
+        let last = data.row(first - 1).into_owned();
+        data.set_row(k, &last);
     }
 }
 
@@ -183,47 +205,47 @@ mod tests {
         let line = |record: &Record, n: usize, c: usize| Spectrum::of(record).line(n, c);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
 
-        let crossed = Fault::Crosstalk { part: 0.1 }.of(&clean, 1).unwrap();
+        let crossed = Fault::Crosstalk { part: 0.1 }.apply(&clean, 1).unwrap();
         assert!(near(line(&crossed, 8, 0).norm(), 0.2) && near(line(&crossed, 5, 0).norm(), 2.0));
 
         let run_out = Fault::RunOut { rotation_hz: 20.0, amplitudes: vec![0.1, 0.05] };
-        let seen = run_out.of(&clean, 1).unwrap();
+        let seen = run_out.apply(&clean, 1).unwrap();
         let rms = 2.0_f64.sqrt();
         assert!(near(line(&seen, 20, 1).norm(), 0.1 * rms));
         assert!(near(line(&seen, 40, 0).norm(), 0.05 * rms));
-        assert_ne!(run_out.of(&clean, 2).unwrap(), seen);
-        assert_eq!(run_out.of(&clean, 1).unwrap(), seen);
+        assert_ne!(run_out.apply(&clean, 2).unwrap(), seen);
+        assert_eq!(run_out.apply(&clean, 1).unwrap(), seen);
 
-        let drifted = Fault::Drift { end: 0.5 }.of(&clean, 1).unwrap();
+        let drifted = Fault::Drift { end: 0.5 }.apply(&clean, 1).unwrap();
         let moved = drifted.data() - clean.data();
         assert!(near(moved[(0, 0)], 0.0) && near(moved[(999, 1)], 0.5 * rms));
 
-        let late = Fault::Delay { samples: 2.5 }.of(&clean, 1).unwrap();
+        let late = Fault::Delay { samples: 2.5 }.apply(&clean, 1).unwrap();
         let turned = line(&late, 8, 1) / line(&clean, 8, 1);
         assert!(near(turned.arg(), -TAU * 8.0 * 2.5 / 1000.0) && near(turned.norm(), 1.0));
 
-        let cut = Fault::Clipping { part: 0.9 }.of(&clean, 1).unwrap();
+        let cut = Fault::Clipping { part: 0.9 }.apply(&clean, 1).unwrap();
         assert!(near(cut.data().amax(), 0.9 * clean.data().amax()));
 
-        let lost = Fault::Lost { samples: 3 }.of(&clean, 1).unwrap();
+        let lost = Fault::Lost { samples: 3 }.apply(&clean, 1).unwrap();
         let first = (0..1000).find(|k| lost.data().row(*k) != clean.data().row(*k)).unwrap();
         assert!((first..997).all(|k| lost.data().row(k) == clean.data().row(k + 3)));
 
-        let held = Fault::Held { gaps: 1, samples: 4 }.of(&clean, 1).unwrap();
+        let held = Fault::Held { gaps: 1, samples: 4 }.apply(&clean, 1).unwrap();
         let other = (0..1000).filter(|k| held.data().row(*k) != clean.data().row(*k)).count();
         assert_eq!(other, 4);
 
-        let turned = Fault::Gain { factor: -2.0 }.of(&clean, 1).unwrap();
+        let turned = Fault::Gain { factor: -2.0 }.apply(&clean, 1).unwrap();
         assert_eq!(turned.data(), &(clean.data() * -2.0));
 
-        let stepped = Fault::Steps { bits: 6 }.of(&clean, 1).unwrap();
+        let stepped = Fault::Steps { bits: 6 }.apply(&clean, 1).unwrap();
         let step = 3.0 * clean.column(0).amax() / 64.0;
         let off = |k: usize| stepped.channel(0)[k] - clean.channel(0)[k];
         assert!((0..1000).all(|k| off(k).abs() <= 0.5 * step * (1.0 + 1e-12)));
         let steps = |k: usize| stepped.channel(0)[k] / step;
         assert!((0..1000).all(|k| near(steps(k), steps(k).round())));
 
-        let noise = Fault::Noise { level: 0.1, colour: Colour::White }.of(&clean, 1).unwrap();
+        let noise = Fault::Noise { level: 0.1, colour: Colour::White }.apply(&clean, 1).unwrap();
         let added = (noise.data() - clean.data()).column(0).norm() / 1000.0_f64.sqrt();
         assert!((added / (0.1 * rms) - 1.0).abs() < 0.1, "{added}");
     }

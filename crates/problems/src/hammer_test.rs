@@ -1,4 +1,4 @@
-//! A hammer test whose response is known in closed form.
+//! A hammer test with a response in closed form.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,12 +8,12 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::ProblemError;
+use crate::error::ProblemError;
 
-/// Hits of a hammer, half-sines of force, on a machine whose modes are given.
+/// Hits of a hammer, half-sines of force, on a structure with given modes.
 ///
-/// Each mode is an oscillator, whose response to a half-sine is known in closed form; they are summed eight times
-/// as often as the record has samples, behind the same anti-aliasing filter for force and response.
+/// Each mode is an oscillator, whose response to a half-sine has a closed form. The sum is computed
+/// at eight times the sampling rate, with the same anti-aliasing filter for force and response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HammerTest {
     /// Natural frequency of each mode, in Hz.
@@ -26,7 +26,7 @@ pub struct HammerTest {
     pub sampling: Sampling,
     /// Quantity of the response.
     pub quantity: ResponseQuantity,
-    /// Number of hits, at equal distances but for a part that is drawn.
+    /// Number of hits, at equal distances with a random part.
     pub hits: usize,
     /// Mean peak of the hits, in N.
     pub peak: f64,
@@ -36,7 +36,7 @@ pub struct HammerTest {
     pub force_noise: f64,
 }
 
-/// Fault of a hit that was made on purpose.
+/// Deliberate fault of a hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MadeFault {
     /// The hammer bounced.
@@ -48,7 +48,7 @@ pub enum MadeFault {
 /// A record of a [`HammerTest`].
 #[derive(Debug, Clone)]
 pub struct HammerRecord {
-    /// Force on the degree of freedom that is struck, in N.
+    /// Force on the degree of freedom of the hits, in N.
     pub force: Record,
     /// Response of all degrees of freedom, samples × degrees of freedom.
     pub response: Record,
@@ -65,12 +65,13 @@ struct Pulse {
 }
 
 impl HammerTest {
-    /// Samples that are computed for one of the record.
+    /// Number of computed samples for one of the record.
     const FINER: usize = 8;
-    /// Samples of the record to either side that the filter weighs.
+    /// Half length of the filter, in samples of the record.
     const SPAN: usize = 16;
 
-    /// The machine with these modes: M = Φ⁻ᵀ Φ⁻¹, C = Φ⁻ᵀ diag(2ζω) Φ⁻¹, K = Φ⁻ᵀ diag(ω²) Φ⁻¹.
+    /// Returns the system with these modes: M = Φ⁻ᵀ Φ⁻¹, C = Φ⁻ᵀ diag(2ζω) Φ⁻¹, K = Φ⁻ᵀ diag(ω²)
+    /// Φ⁻¹.
     ///
     /// # Errors
     /// [`ProblemError::Model`] if the shapes are not independent.
@@ -91,8 +92,8 @@ impl HammerTest {
         Ok(SecondOrderSystem::new(mass, damping, of(&|omega, _| omega * omega))?)
     }
 
-    /// A record of hits on degree of freedom `dof` (counted from 0), `faults` of which are double hits or
-    /// overloads; another one for every seed. The response has no noise.
+    /// Returns a record of hits on degree of freedom `dof` (counted from 0), with `faults` double
+    /// hits or overloads; each seed gives another one. The response has no noise.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if the record does not fit in memory.
@@ -101,7 +102,8 @@ impl HammerTest {
     /// If there is no such degree of freedom.
     ///
     /// # Source
-    /// Clough & Penzien, *Dynamics of Structures*, the chapters on impulsive loading and on modal superposition.
+    /// Clough & Penzien, *Dynamics of Structures*, the chapters on impulsive loading and on modal
+    /// superposition.
     pub fn measure(
         &self,
         dof: usize,
@@ -122,9 +124,8 @@ impl HammerTest {
                 Pulse { peak, start, duration: self.duration * rng.random_range(0.85..1.15) };
             pulses.push(pulse);
             let bad = order[..faults.min(self.hits)].contains(&number);
-            let fault = bad.then(|| match rng.random_bool(0.5) {
-                true => MadeFault::Double,
-                false => MadeFault::Overload,
+            let fault = bad.then(|| {
+                if rng.random_bool(0.5) { MadeFault::Double } else { MadeFault::Overload }
             });
             match fault {
                 Some(MadeFault::Double) => pulses.push(Pulse {
@@ -189,7 +190,7 @@ impl HammerTest {
     }
 }
 
-/// Weights of a low pass at half the rate that is left, under a Blackman window.
+/// Returns the weights of a low pass at half the final rate, under a Blackman window.
 fn low_pass(finer: usize, margin: usize) -> Vec<f64> {
     let weight = |k: usize| {
         let at = k as f64 - margin as f64;
@@ -217,7 +218,8 @@ struct Oscillator {
 }
 
 impl Oscillator {
-    /// Response from rest to a half-sine: a sine that begins with it, and another one that ends it.
+    /// Returns the response from rest to a half-sine: the sum of a sine that begins with it and a
+    /// second one half a period later.
     fn response(&self, pulse: &Pulse, t: f64, quantity: ResponseQuantity) -> f64 {
         let begun = self.to_sine(pulse, t - pulse.start);
         let ended = self.to_sine(pulse, t - pulse.start - pulse.duration);
@@ -231,7 +233,7 @@ impl Oscillator {
         }
     }
 
-    /// Displacement and velocity `t` seconds after a sine of force began at rest.
+    /// Returns displacement and velocity `t` seconds after a sine of force began at rest.
     fn to_sine(&self, pulse: &Pulse, t: f64) -> [f64; 2] {
         if t <= 0.0 {
             return [0.0; 2];
@@ -241,7 +243,7 @@ impl Oscillator {
         let receptance =
             Complex::new(omega * omega - drive * drive, 2.0 * decay * drive).inv() * pulse.peak;
         let steady = receptance * Complex::cis(drive * t);
-        // The free motion that makes displacement and velocity zero at the beginning.
+        // The free motion makes displacement and velocity zero at the beginning.
         let damped = omega * (1.0 - self.zeta * self.zeta).sqrt();
         let (x0, v0) = (-receptance.im, -drive * receptance.re);
         let sine = (v0 + decay * x0) / damped;

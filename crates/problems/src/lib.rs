@@ -1,7 +1,7 @@
 //! Named systems with known answers, and exact responses: the reference solutions of the tests.
 //!
-//! Nothing here is borrowed from an integrator or an estimator: a sampled force is answered
-//! through the matrix exponential or through the receptance, see [`exact`].
+//! The crate shares no code with an integrator or an estimator: the matrix exponential or the
+//! receptance gives the response to a sampled force, see [`exact`].
 //!
 //! ```
 //! use mechid_problems::{dissertation_sdof, exact_zoh_periodic};

@@ -1,5 +1,5 @@
-//! Seeded machines as test rigs have them, each with a steady multisine test: chains of masses that are
-//! held, softly suspended or free, driven at every mass or at one.
+//! Seeded machines like those on test rigs, each with a steady multisine test: chains of masses,
+//! fixed, softly suspended or free, driven at every mass or at one.
 
 use std::f64::consts::TAU;
 
@@ -9,12 +9,13 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{ProblemError, random_stable};
+use crate::error::ProblemError;
+use crate::random::random_stable;
 
 /// Support of a chain of masses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// Springs as stiff as those between the masses, at both ends.
+    /// Springs as stiff as between the masses, at both ends.
     Held,
     /// Springs at both ends of 1/500 of that stiffness.
     Soft,
@@ -22,10 +23,10 @@ pub enum Support {
     Free,
 }
 
-/// A chain of `dof` masses on springs and dampers, the same for the same seed.
+/// Returns a chain of `dof` masses on springs and dampers, the same for the same seed.
 ///
-/// The masses are 1 … 4 kg, the springs 5 … 20 kN/m. Damping is proportional to mass and stiffness, and
-/// the fastest mode has about the damping ratio `damping`.
+/// The masses are 1 … 4 kg, the springs 5 … 20 kN/m. Damping is proportional to mass and stiffness,
+/// and the fastest mode has about the damping ratio `damping`.
 ///
 /// # Panics
 /// If `dof` is 0.
@@ -44,7 +45,7 @@ pub fn chain(dof: usize, support: Support, damping: f64, seed: u64) -> SecondOrd
     for left in 0..=dof {
         let spring: f64 = rng.random_range(5e3..2e4);
         let spring = if left == 0 || left == dof { ends * spring } else { spring };
-        // The masses at both ends of the spring; beyond the last one is the support.
+        // The masses at both ends of the spring; the last one is followed by the support.
         for (i, sign) in [(left.checked_sub(1), 1.0), (Some(left), -1.0)] {
             for (j, other) in [(left.checked_sub(1), 1.0), (Some(left), -1.0)] {
                 if let (Some(i), Some(j)) = (i.filter(|i| *i < dof), j.filter(|j| *j < dof)) {
@@ -67,9 +68,9 @@ pub struct Test {
     pub name: &'static str,
     /// M, C and K.
     pub system: SecondOrderSystem,
-    /// Flag for M being known in the identification.
+    /// Whether M is known in the identification.
     pub mass_known: bool,
-    /// Lines driven, and above them as many again that are not.
+    /// Lines driven, and above them as many lines without force.
     pub lines: Vec<usize>,
     /// Force (N), samples × dof, one period.
     pub force: Record,
@@ -79,12 +80,13 @@ pub struct Test {
     pub acceleration: Record,
 }
 
-/// Machine `index` of a series of any length, each with its test: 1 to 10 degrees of freedom, damping
-/// ratios of 0.3 to 5 %, of five kinds by turns. The force has as many lines of 10 N with random phases
-/// as leave twenty for each degree of freedom, up to 1.3 times the fastest mode.
+/// Returns machine `index` of a series of any length, each with its test: 1 to 10 degrees of
+/// freedom, damping ratios of 0.3 to 5 %, five kinds in turn. The force has lines of 10 N with
+/// random phases up to 1.3 times the highest natural frequency, at least twenty for each degree of
+/// freedom.
 ///
 /// # Errors
-/// [`ProblemError::Model`] if a line stands on an undamped resonance.
+/// [`ProblemError::Model`] if a line is an undamped resonance.
 pub fn series(index: u64) -> Result<Test, ProblemError> {
     let rng = &mut ChaCha8Rng::seed_from_u64(1000 + index);
     let dof = 1 + (index % 10) as usize;
@@ -99,11 +101,12 @@ pub fn series(index: u64) -> Result<Test, ProblemError> {
     steady_test(name, system, one_force, 60 + 20 * dof, index)
 }
 
-/// A steady test of a machine: `count` lines of 10 N with random phases up to 1.3 times its fastest
-/// mode, at every degree of freedom or at the first alone, whose mass is then known.
+/// Returns a steady test of a machine: `count` lines of 10 N with random phases up to 1.3 times its
+/// highest natural frequency, at every degree of freedom or only at the first, whose mass is then
+/// known.
 ///
 /// # Errors
-/// [`ProblemError::Model`] if the modes cannot be found or a line stands on an undamped resonance.
+/// [`ProblemError::Model`] if the modes cannot be found or a line is an undamped resonance.
 pub fn steady_test(
     name: &'static str,
     system: SecondOrderSystem,
@@ -142,12 +145,13 @@ pub fn steady_test(
     })
 }
 
-/// A record of one period, `count` times one after the other.
+/// Returns a record of one period repeated `count` times.
 ///
 /// # Errors
 /// [`ProblemError::Signal`] if the record gets too long.
 pub fn repeated(period: &Record, count: usize) -> Result<Record, ProblemError> {
     let len = period.len();
-    let all = DMatrix::from_fn(len * count, period.channels(), |k, c| period.data()[(k % len, c)]);
-    Ok(Record::new(period.sampling().with_len(len * count)?, all)?)
+    let samples =
+        DMatrix::from_fn(len * count, period.channels(), |k, c| period.data()[(k % len, c)]);
+    Ok(Record::new(period.sampling().with_len(len * count)?, samples)?)
 }

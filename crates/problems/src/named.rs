@@ -12,10 +12,9 @@ pub fn dissertation_sdof() -> Sdof {
 
 /// The journal bearing of the dissertation: 14.8 kg in an oil film.
 ///
-/// Kxx 40, Kxy 50, Kyx 20, Kyy 60 N/m and Cxx 20, Cxy 10, Cyx 10, Cyy 30 N·s/m; the support
-/// springs are contained in Kxx and Kyy. Eigenvalues (rad/s):
-/// −0.08776 ± 1.63331i and −1.60143 ± 1.79925i with [`KyxSign::Minus`],
-/// largest imaginary part 2.04380 with [`KyxSign::Plus`].
+/// Kxx 40, Kxy 50, Kyx 20, Kyy 60 N/m and Cxx 20, Cxy 10, Cyx 10, Cyy 30 N·s/m; Kxx and Kyy include
+/// the support springs. Eigenvalues (rad/s): −0.08776 ± 1.63331i and −1.60143 ± 1.79925i with
+/// [`KyxSign::Minus`], largest imaginary part 2.04380 with [`KyxSign::Plus`].
 ///
 /// # Source
 /// Dissertation eqs. (4.2.2)–(4.2.3) and the parameters of chapter 5.

@@ -6,11 +6,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// A stable system of `dof` degrees of freedom, the same for the same seed.
+/// Returns a stable system of `dof` degrees of freedom, the same for the same seed.
 ///
-/// M is symmetric positive definite and full, C and K are full and non-symmetric, damping is
-/// not proportional. Of many degrees of freedom some motions creep instead of oscillating.
-/// With M = L Lᵀ the matrices are
+/// M is symmetric positive definite and full, C and K are full and non-symmetric, damping is not
+/// proportional. With many degrees of freedom some modes are overdamped. With M = L Lᵀ the matrices
+/// are
 ///
 /// ```text
 /// C = L (D + G) Lᵀ,      K = L (S + N) Lᵀ
@@ -62,7 +62,7 @@ fn mass_factor(dof: usize, rng: &mut ChaCha8Rng) -> DMatrix<f64> {
     })
 }
 
-/// A symmetric matrix of the given eigenvalues in random directions.
+/// Returns a symmetric matrix with the given eigenvalues in random directions.
 fn rotated(eigenvalues: &DVector<f64>, rng: &mut ChaCha8Rng) -> DMatrix<f64> {
     let q = gaussian(eigenvalues.len(), rng).qr().q();
     &q * DMatrix::from_diagonal(eigenvalues) * q.transpose()

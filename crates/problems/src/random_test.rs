@@ -1,34 +1,37 @@
-//! A random test whose response is known in closed form.
+//! A random test with a response in closed form.
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
 use nalgebra::Complex;
 
-use crate::{ProblemError, exact_harmonic_periodic};
+use crate::error::ProblemError;
+use crate::exact::exact_harmonic_periodic;
 
-/// A window cut out of the steady state under a Gaussian random force of a period four times as long.
+/// A window of the steady state under a Gaussian random force with a period four times as long.
 ///
-/// The force has its lines up to [`RandomTest::BAND`] of the sampling rate, as behind an anti-aliasing filter,
-/// and the response is exact at each of them; the window begins and ends in motion.
+/// The lines of the force reach up to [`RandomTest::BAND`] of the sampling rate, as behind an
+/// anti-aliasing filter, and the response is exact at each of them. The window begins and ends
+/// during the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RandomTest {
-    /// The machine, driven at every degree of freedom by forces of its own.
+    /// The machine, driven at every degree of freedom by an independent force.
     pub system: SecondOrderSystem,
     /// Time axis of the window.
     pub sampling: Sampling,
     /// Quantity of the response.
     pub quantity: ResponseQuantity,
-    /// Standard deviation of each force before the band is cut out, in N.
+    /// Standard deviation of each force before band limitation, in N.
     pub force: f64,
 }
 
 impl RandomTest {
-    /// Highest frequency of the force, as part of the sampling rate.
+    /// Highest frequency of the force, as a fraction of the sampling rate.
     pub const BAND: f64 = 0.35;
     /// Length of the period over that of the window.
     const LONGER: usize = 4;
 
-    /// The forces (N) and the responses in one window, samples × degrees of freedom; other ones for every seed.
+    /// Returns the forces (N) and the responses in one window, samples × degrees of freedom; each
+    /// seed gives others.
     ///
     /// # Errors
     /// [`ProblemError`] if the system has no receptance at a line.
@@ -38,15 +41,15 @@ impl RandomTest {
     pub fn measure(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
         let samples = self.sampling.len();
         let [force, response] = self.period(seed)?;
-        // Anywhere but at the ends of the period, where both would close.
+        // The window avoids the ends of the period, where it would close.
         let first = samples / 2 + 1;
         Ok([force.window(first, samples)?, response.window(first, samples)?])
     }
 
-    /// The same over the whole period.
+    /// Returns the forces and the responses over the whole period.
     ///
     /// # Errors
-    /// As [`RandomTest::measure`].
+    /// The errors of [`RandomTest::measure`].
     ///
     /// # Source
     /// Ours: the response is that of [`exact_harmonic_periodic`].

@@ -1,5 +1,4 @@
-//! A test rig for journal bearings, with what rigs add to the film: baseline, crosstalk, run-out and
-//! noise.
+//! A test rig for journal bearings with imperfections: baseline, crosstalk, run-out and noise.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +7,12 @@ use nalgebra::{Complex, DMatrix, Matrix2, Vector2};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::ProblemError;
+use crate::error::ProblemError;
 
-/// A housing that floats on the film of a shaft in rigid supports, with shakers in x and y.
+/// A housing on the oil film of a shaft in rigid supports, with shakers in x and y.
 ///
 /// The housing, of mass M_s, obeys −ω² M_s x + (H_film + H_baseline) x = f, and the shaft does not
-/// move: its run-out is seen by the probes alone.
+/// move: only the probes show its run-out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BearingRig {
     /// K (N/m), C (N·s/m) and M (kg) of the film, 2×2 each.
@@ -22,7 +21,7 @@ pub struct BearingRig {
     pub baseline: [Matrix2<f64>; 3],
     /// Mass of the housing, in kg.
     pub stator_mass: f64,
-    /// Part of the other direction that each sensor shows (crosstalk), a ratio.
+    /// Fraction of the other direction in each sensor (crosstalk), a ratio.
     pub crosstalk: f64,
     /// Speed of rotation, in Hz.
     pub rotation_hz: f64,
@@ -36,7 +35,7 @@ pub struct BearingRig {
     pub displacement_noise: f64,
 }
 
-/// Shakers that work.
+/// Shakers in operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shakers {
     /// Shaker in x.
@@ -59,7 +58,7 @@ pub struct RigTest {
 }
 
 impl BearingRig {
-    /// A rig without a film yet: 20 kg, 50 Hz, sensors of the usual quality, nothing wrong otherwise.
+    /// Returns a rig without a film: 20 kg, 50 Hz, typical sensors, no other imperfection.
     pub fn new(film: [Matrix2<f64>; 3]) -> Self {
         Self {
             film,
@@ -74,7 +73,7 @@ impl BearingRig {
         }
     }
 
-    /// The rig without the film and with the shaft at rest, for a baseline test.
+    /// Returns the rig without the film and with the shaft at rest, for a baseline test.
     #[must_use]
     pub fn dry(&self) -> Self {
         Self { film: [Matrix2::zeros(); 3], run_out: Vec::new(), ..self.clone() }
@@ -89,11 +88,11 @@ impl BearingRig {
         k.zip_zip_map(&c, &m, |k, c, m| Complex::new(k - omega * omega * m, omega * c))
     }
 
-    /// Returns one period without noise: `amplitude` (N) at each of the lines, with phases drawn from
-    /// `seed`.
+    /// Returns one period without noise: `amplitude` (N) at each of the lines, with phases drawn
+    /// from `seed`.
     ///
     /// # Source
-    /// That of [`BearingRig::dynamic_stiffness`].
+    /// The error of [`BearingRig::dynamic_stiffness`].
     ///
     /// # Errors
     /// [`ProblemError::Signal`] for a line beyond the Nyquist frequency.
@@ -131,10 +130,10 @@ impl BearingRig {
         }
         for (multiple, run_out) in (1..).zip(&self.run_out) {
             let line = f64::from(multiple) * self.rotation_hz / sampling.line_spacing_hz();
-            let seen = Complex::from_polar(*run_out, rng.random_range(0.0..TAU));
-            // The probes are a right angle apart.
-            displacement[(line.round() as usize, 0)] += seen;
-            displacement[(line.round() as usize, 1)] += seen * Complex::new(0.0, -1.0);
+            let phasor = Complex::from_polar(*run_out, rng.random_range(0.0..TAU));
+            // The probes are perpendicular.
+            displacement[(line.round() as usize, 0)] += phasor;
+            displacement[(line.round() as usize, 1)] += phasor * Complex::new(0.0, -1.0);
         }
         let record = |lines| -> Result<Record, ProblemError> {
             Ok(Spectrum::from_lines(sampling, lines)?.to_record()?)

@@ -4,7 +4,7 @@ use mechid_model::{ModelError, SecondOrderSystem};
 use mechid_numerics::linear_algebra::exponential;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use crate::ProblemError;
+use crate::error::ProblemError;
 
 /// Course of the force between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,8 +17,7 @@ pub(crate) enum Between {
 
 /// z(t+Δt) = Φ z(t) + Γ0 F(t) + Γ1 F(t+Δt) with z = [x; Δt ẋ], without discretisation error.
 ///
-/// Measuring time in steps keeps the exponential well scaled. All three come from one
-/// matrix exponential:
+/// Time in steps keeps the exponential well scaled. One matrix exponential gives all three:
 ///
 /// ```text
 ///     ┌ A  B  0 ┐   ┌ Φ  P1  P2 ┐

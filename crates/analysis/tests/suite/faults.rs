@@ -33,7 +33,7 @@ fn record(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Measurement {
     let mut response = noise::add_white(&exact, level, 1000 + seed).unwrap();
     if let Some(fault) = fault {
         for record in [&mut force, &mut response].into_iter().zip(on).filter(|of| of.1) {
-            *record.0 = fault.of(record.0, seed).unwrap();
+            *record.0 = fault.apply(record.0, seed).unwrap();
         }
     }
     let responses = [(ResponseQuantity::Displacement, &response)];

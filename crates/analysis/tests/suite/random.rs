@@ -107,7 +107,7 @@ fn run_out_is_taken_off_and_told_once() {
         .map(|seed| {
             let [force, response] = rig().measure(seed).unwrap();
             let run_out = Fault::RunOut { rotation_hz: 31.37, amplitudes: vec![0.1] };
-            measured([force, run_out.of(&response, seed).unwrap()], seed)
+            measured([force, run_out.apply(&response, seed).unwrap()], seed)
         })
         .collect();
     let found = identify(&tests, &Identify::default()).unwrap();
@@ -129,7 +129,7 @@ fn run_out_is_taken_off_and_told_once() {
 fn a_late_response_is_told_by_its_delay() {
     let late = |samples: f64, seed: u64| {
         let [force, response] = rig().period(seed).unwrap();
-        let response = Fault::Delay { samples }.of(&response, seed).unwrap();
+        let response = Fault::Delay { samples }.apply(&response, seed).unwrap();
         let [force, response] =
             [force, response].map(|all| all.window(SAMPLES / 2 + 1, SAMPLES).unwrap());
         measured([force, response], seed)

@@ -55,7 +55,7 @@ fn run_out_between_lines_does_no_harm() {
             let [force, response] = noisy(&rig, seed);
             let rotation_hz = 23.7 + 0.013 * seed as f64;
             let run_out = Fault::RunOut { rotation_hz, amplitudes: vec![0.1, 0.0, 0.05] };
-            let seen = run_out.of(&response, seed).unwrap();
+            let seen = run_out.apply(&response, seed).unwrap();
             let (without, with) = (fit(&rig, [&force, &response]), fit(&rig, [&force, &seen]));
             assert!(without.sinusoids.iter().all(Vec::is_empty), "{quantity} {seed}");
             let mut found = with.sinusoids[0].clone();
