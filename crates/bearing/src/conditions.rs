@@ -1,11 +1,11 @@
-//! Size, oil and speed of a bearing, which give dimensionless numbers their units.
+//! Size, oil and speed of a bearing: the units of the dimensionless numbers.
 
 use std::f64::consts::TAU;
 
 use mechid_model::OilFilm;
 
-use crate::error::require;
-use crate::{BearingError, Coefficients};
+use crate::equilibrium::Coefficients;
+use crate::error::{BearingError, require};
 
 /// Size, oil and speed of a bearing.
 ///
@@ -17,7 +17,8 @@ use crate::{BearingError, Coefficients};
 /// };
 /// let load = 1000.0;
 /// let sommerfeld = conditions.sommerfeld_number(load)?;
-/// let equilibrium = ShortBearing::new(conditions.length_over_diameter()?)?.equilibrium(sommerfeld)?;
+/// let bearing = ShortBearing::new(conditions.length_over_diameter()?)?;
+/// let equilibrium = bearing.equilibrium(sommerfeld)?;
 /// let film = conditions.film(equilibrium.coefficients(), load)?;
 /// assert!(film.kxy > 0.0 && film.kyx < 0.0);
 /// # Ok::<(), mechid_bearing::BearingError>(())
@@ -49,34 +50,35 @@ impl Conditions {
         Ok(self.length / self.diameter)
     }
 
-    /// Sommerfeld number S = μ N L D (R/c)² / W (dimensionless) of a static load (N), with N in
-    /// revolutions per second.
+    /// Returns the Sommerfeld number S = μ N L D (R/c)² / W (dimensionless) for a static load (N),
+    /// with N in revolutions per second.
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming what is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn sommerfeld_number(&self, load: f64) -> Result<f64, BearingError> {
         self.check()?;
         require("load", load, "positive and finite", load > 0.0)?;
         Ok(self.load_of_unit() / load)
     }
 
-    /// Static load W (N) that belongs to a Sommerfeld number (dimensionless).
+    /// Returns the static load W (N) of a Sommerfeld number (dimensionless).
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming what is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn load(&self, sommerfeld: f64) -> Result<f64, BearingError> {
         self.check()?;
         require("Sommerfeld number", sommerfeld, "positive and finite", sommerfeld > 0.0)?;
         Ok(self.load_of_unit() / sommerfeld)
     }
 
-    /// Coefficients with their units, k = K W / c and c = C W / (c Ω), under a load W (N).
+    /// Returns the coefficients with their units, k = K W / c and c = C W / (c Ω), under a load W
+    /// (N).
     ///
     /// x is along the load, y across it in the direction of rotation; kyx is an entry of the
     /// stiffness matrix (`KyxSign::Plus`).
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming what is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn film(&self, coefficients: &Coefficients, load: f64) -> Result<OilFilm, BearingError> {
         let [stiffness, damping] = self.units(load)?;
         let [[kxx, kxy], [kyx, kyy]] = coefficients.stiffness.map(|row| row.map(|k| k * stiffness));
@@ -84,10 +86,11 @@ impl Conditions {
         Ok(OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy })
     }
 
-    /// Dimensionless coefficients of a film under a load (N), the inverse of [`film`](Self::film).
+    /// Returns the dimensionless coefficients of a film under a load (N), the inverse of
+    /// [`film`](Self::film).
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming what is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn coefficients(&self, film: &OilFilm, load: f64) -> Result<Coefficients, BearingError> {
         let [stiffness, damping] = self.units(load)?;
         let OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy } = *film;

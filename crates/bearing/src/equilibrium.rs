@@ -1,6 +1,6 @@
 //! Static equilibrium of a bearing under its load.
 
-/// The place of the journal under a static load, and the coefficients of the film there.
+/// The position of the journal under a static load, and the coefficients of the film there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equilibrium {
     sommerfeld: f64,
@@ -41,8 +41,9 @@ impl Equilibrium {
 
 /// Eight coefficients of a film, dimensionless: K = k c / W and C = c Ω c / W.
 ///
-/// Index 0 is along the load, 1 across it in the direction of rotation; the first index is that of
-/// the force, the second that of the motion. [`Conditions`](crate::Conditions) gives them units.
+/// Index 0 is along the load, 1 across it in the direction of rotation; the first index belongs to
+/// the force, the second to the motion. [`Conditions`](crate::Conditions) converts them to SI
+/// units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
     /// Stiffness, 2×2, a ratio each.

@@ -1,4 +1,4 @@
-//! Errors of bearings that cannot be described or have no solution.
+//! Errors of bearings: impossible parameters, and equations without a solution.
 
 use mechid_signal::message;
 
@@ -16,7 +16,7 @@ pub enum BearingError {
         /// Value given, in the unit of the quantity.
         value: f64,
     },
-    /// The journal touches the bore: no film is left.
+    /// The journal touches the bore, without a film between them.
     #[error(
         "the journal touches the bore: eccentricity {eccentricity} of the clearance",
         eccentricity = message::number(*eccentricity)
@@ -90,7 +90,7 @@ pub enum BearingError {
     },
 }
 
-/// `value` must be finite and satisfy `holds`, or it is named in an error.
+/// Returns `value` if it is finite and satisfies `holds`, otherwise an error with its name.
 pub(crate) fn require(
     name: &'static str,
     value: f64,

@@ -30,13 +30,15 @@
 //! | whirl frequency ratio, critical mass and their standard errors | [`Threshold`] |
 //!
 //! x is along the static load and y across it, such that the journal rotates from x to y.
-//! Eccentricities and coefficients are scaled by the clearance of a pad: of an elliptical bearing,
-//! the difference of the radii of a lobe and of the journal, not the assembled clearance.
+//! Eccentricities and coefficients are scaled by the clearance of a pad. For an elliptical bearing
+//! this is the difference between the radii of a lobe and of the journal, not the assembled
+//! clearance.
 
 mod conditions;
 mod equilibrium;
 mod error;
 mod finite;
+mod limits;
 mod short;
 mod stability;
 

@@ -3,8 +3,7 @@
 use mechid_model::OilFilm;
 use nalgebra::{DMatrix, SVector};
 
-use crate::BearingError;
-use crate::error::require;
+use crate::error::{BearingError, require};
 
 /// Whirl at the threshold of instability of a rigid rotor, from eight coefficients.
 ///
@@ -24,7 +23,7 @@ use crate::error::require;
 ///
 /// // A lightly loaded short bearing whirls at half the speed of rotation.
 /// let equilibrium = ShortBearing::new(0.25)?.at_eccentricity(0.01)?;
-/// let threshold = Threshold::of_coefficients(equilibrium.coefficients())?;
+/// let threshold = Threshold::from_coefficients(equilibrium.coefficients())?;
 /// assert!((threshold.whirl_frequency_ratio().unwrap() - 0.5).abs() < 1e-3);
 /// # Ok::<(), mechid_bearing::BearingError>(())
 /// ```
@@ -47,7 +46,7 @@ struct Gradient {
     whirl_squared: SVector<f64, 8>,
 }
 
-/// Standard errors of what a [`Threshold`] tells, to first order in those of the coefficients.
+/// Standard errors of the values of a [`Threshold`], to first order in the errors of the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThresholdErrors {
     /// Standard error of the equivalent stiffness, in N/m.
@@ -59,12 +58,12 @@ pub struct ThresholdErrors {
 }
 
 impl Threshold {
-    /// The threshold of a film (N/m, N·s/m, kyx an entry of the stiffness matrix) at a speed of
-    /// rotation (rad/s).
+    /// Returns the threshold of a film (N/m, N·s/m, kyx an entry of the stiffness matrix) at a
+    /// speed of rotation (rad/s).
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] if the speed is not positive, a coefficient is not finite, or the
-    /// damping matrix has no positive trace and determinant.
+    /// [`BearingError::Parameter`] if the speed is not positive, a coefficient is not finite, or
+    /// the damping matrix has no positive trace and determinant.
     pub fn new(film: &OilFilm, omega: f64) -> Result<Self, BearingError> {
         require("speed of rotation", omega, "positive and finite", omega > 0.0)?;
         let OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy } = *film;
@@ -82,7 +81,7 @@ impl Threshold {
         let whirl_squared = (x * y - kxy * kyx) / determinant;
 
         let by_equivalent = SVector::from([cyy, -cyx, -cxy, cxx, -y, -kyx, -kxy, -x]) / trace;
-        // x y − kxy kyx − ω_w² det C = 0, differentiated.
+        // The derivatives of x y − kxy kyx − ω_w² det C = 0.
         let apart = SVector::from([
             -y,
             -kyx,
@@ -100,12 +99,12 @@ impl Threshold {
         Ok(Self { omega, equivalent_stiffness: equivalent, whirl_squared, gradient })
     }
 
-    /// The threshold in dimensionless form: stiffness over W / c, mass over W / (c Ω²), so that the
-    /// critical mass is c Ω² m / W.
+    /// Returns the threshold in dimensionless form: stiffness over W / c, mass over W / (c Ω²), so
+    /// that the critical mass is c Ω² m / W.
     ///
     /// # Errors
-    /// As for [`Threshold::new`].
-    pub fn of_coefficients(coefficients: &crate::Coefficients) -> Result<Self, BearingError> {
+    /// The errors of [`Threshold::new`].
+    pub fn from_coefficients(coefficients: &crate::Coefficients) -> Result<Self, BearingError> {
         let [[kxx, kxy], [kyx, kyy]] = coefficients.stiffness;
         let [[cxx, cxy], [cyx, cyy]] = coefficients.damping;
         Self::new(&OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy }, 1.0)
@@ -132,8 +131,8 @@ impl Threshold {
         exists.then(|| self.equivalent_stiffness / self.whirl_squared)
     }
 
-    /// Speed (rad/s) at which a rotor of `mass` (kg) per bearing becomes unstable, at the same load
-    /// and Sommerfeld number; `None` if there is no critical mass.
+    /// Returns the speed (rad/s) at which a rotor of `mass` (kg) per bearing becomes unstable, at
+    /// the same load and Sommerfeld number; `None` if there is no critical mass.
     ///
     /// At a constant Sommerfeld number neither k nor ω_w / Ω depends on the speed. The relative
     /// standard error of this speed is half that of the critical mass.
@@ -145,8 +144,8 @@ impl Threshold {
         Ok(self.critical_mass().map(|critical| self.omega * (critical / mass).sqrt()))
     }
 
-    /// Standard errors from the covariance of the coefficients, 8×8 in the order kxx, kxy, kyx,
-    /// kyy, cxx, cxy, cyx, cyy (products of N/m and N·s/m), by the delta method.
+    /// Returns the standard errors from the covariance of the coefficients, 8×8 in the order kxx,
+    /// kxy, kyx, kyy, cxx, cxy, cyx, cyy (products of N/m and N·s/m), by the delta method.
     ///
     /// # Errors
     /// [`BearingError::CovarianceShape`] if it is not 8×8, [`BearingError::CovarianceEntry`] if it

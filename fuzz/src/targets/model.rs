@@ -191,7 +191,7 @@ fn bearings(d: &mut Draw) -> Result<(), String> {
     passed(conditions.load(kxx))?;
     if let Some(coefficients) = passed(conditions.coefficients(&film, kyy))? {
         passed(conditions.film(&coefficients, kyy))?;
-        passed(Threshold::of_coefficients(&coefficients))?;
+        passed(Threshold::from_coefficients(&coefficients))?;
     }
     if let Some(film) = passed(ShortFilm::new(conditions))? {
         passed(film.force([kxx, kxy], [cxx, cxy]))?;

@@ -6,9 +6,9 @@
 //! ∂/∂θ(H³ ∂P/∂θ) + ∂/∂ζ(H³ ∂P/∂ζ) = ∂H/∂θ + 2 ∂H/∂τ ,   H = 1 − X cos θ − Y sin θ
 //! ```
 //!
-//! Galerkin's equations with bilinear pressure, ∫ H³ ∇P·∇N + (∂H/∂θ + 2 ∂H/∂τ) N = 0, say at a node
-//! inside that the flow balances, and at a node on the end of the film that the pressure has no
-//! slope there. The latter determine where the film ends.
+//! Galerkin's equations with bilinear pressure, ∫ H³ ∇P·∇N + (∂H/∂θ + 2 ∂H/∂τ) N = 0, balance the
+//! flow at an inner node. At a node on the end of the film they make the slope of the pressure
+//! zero, which determines the position of the end.
 
 use nalgebra::{DMatrix, Vector2};
 
@@ -21,11 +21,12 @@ pub(super) const SIDES: usize = 5;
 
 /// The equations of a film, linear in small changes of pressure, fronts and journal.
 ///
-/// Nodes are numbered column by column; those of the first and the last column are on the fronts.
+/// Nodes are numbered column by column; the first and the last column are on the fronts.
 pub(super) struct Assembly {
     /// Derivatives with respect to the pressure.
     pub(super) matrix: Banded,
-    /// Right-hand sides, node by node: derivatives with respect to the free fronts, then [`SIDES`] entries.
+    /// Right-hand sides, node by node: derivatives with respect to the free fronts, then [`SIDES`]
+    /// entries.
     pub(super) right: Vec<f64>,
     /// ∫ P (cos θ, sin θ) dθ dζ over both halves of the bearing.
     pub(super) load: Vector2<f64>,
@@ -53,8 +54,8 @@ struct Element {
 }
 
 impl Assembly {
-    /// The equations with the journal at `position`, with derivatives with respect to the fronts
-    /// in `unknown` (side and row).
+    /// Assembles the equations with the journal at `position` and the derivatives with respect to
+    /// the fronts in `unknown` (side and row).
     pub(super) fn new(film: &Film, position: Vector2<f64>, unknown: &[(usize, usize)]) -> Self {
         let (rows, columns) = (film.rows(), film.columns.len());
         let mut number = [vec![None; rows], vec![None; rows]];
@@ -62,7 +63,7 @@ impl Assembly {
             number[side][row] = Some(index);
         }
         let nodes = rows * columns;
-        let mut all = Self {
+        let mut equations = Self {
             matrix: Banded::zeros(nodes, rows + 1),
             right: vec![0.0; nodes * (unknown.len() + SIDES)],
             load: Vector2::zeros(),
@@ -73,10 +74,10 @@ impl Assembly {
         for column in 0..columns - 1 {
             for row in 0..rows {
                 let element = Element::new(film, relative, column, row);
-                all.add(&element, &number, column, row);
+                equations.add(&element, &number, column, row);
             }
         }
-        all
+        equations
     }
 
     fn add(
@@ -127,7 +128,8 @@ impl Assembly {
 impl Element {
     fn new(film: &Film, relative: Vector2<f64>, column: usize, row: usize) -> Self {
         let rows = film.rows();
-        // The front of the last row is that of the row before: there is no pressure to place it.
+        // The front of the last row follows that of the row before: without pressure it has no
+        // equation.
         let next = (row + 1).min(rows - 1);
         let [start, end] = &film.fronts;
         let fronts = [start[row], end[row], start[next], end[next]];

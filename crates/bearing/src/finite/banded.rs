@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-/// A symmetric matrix whose entries vanish further than `band` from the diagonal.
+/// A symmetric matrix with zeros at distances above `band` from the diagonal.
 ///
-/// A row holds its entries from `band` before the diagonal up to it.
+/// A row stores its entries from `band` before the diagonal up to the diagonal.
 pub(super) struct Banded {
     band: usize,
     entries: Vec<f64>,
@@ -15,7 +15,7 @@ impl Banded {
         Self { band, entries: vec![0.0; size * (band + 1)] }
     }
 
-    /// The entry that rows `i` and `j` share, which are within the band of one another.
+    /// Returns the entry of rows `i` and `j`, whose distance is at most `band`.
     pub(super) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = (i.max(j), i.min(j));
         self.entries[i * (self.band + 1) + self.band + j - i]
@@ -32,8 +32,8 @@ impl Banded {
         &self.entries[start + from..start + to]
     }
 
-    /// Solves the equations of some unknowns, the others being zero: overwrites their part of the
-    /// matrix by its Cholesky factor and their rows of `right`, of `sides` entries each, by the
+    /// Solves the equations of some unknowns, with zeros for the others: overwrites their part of
+    /// the matrix by its Cholesky factor and their rows of `right`, of `sides` entries each, by the
     /// solution. `None` if the matrix is not positive definite.
     pub(super) fn solve(
         &mut self,
@@ -47,11 +47,13 @@ impl Banded {
             for j in first..=i {
                 let from = first.max(j.saturating_sub(self.band));
                 let pairs = self.row(i, from, j).iter().zip(self.row(j, from, j));
-                let rest = self.row(i, j, j + 1)[0] - pairs.map(|(a, b)| a * b).sum::<f64>();
-                *self.at(i, j) = match j == i {
-                    true if rest > 0.0 && rest.is_finite() => rest.sqrt(),
-                    true => return None,
-                    false => rest / self.row(j, j, j + 1)[0],
+                let pivot = self.row(i, j, j + 1)[0] - pairs.map(|(a, b)| a * b).sum::<f64>();
+                *self.at(i, j) = if j < i {
+                    pivot / self.row(j, j, j + 1)[0]
+                } else if pivot > 0.0 && pivot.is_finite() {
+                    pivot.sqrt()
+                } else {
+                    return None;
                 };
             }
             let (before, here) = right.split_at_mut(i * sides);

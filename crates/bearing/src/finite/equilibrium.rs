@@ -8,22 +8,13 @@ use super::film::Film;
 use super::pad::Pad;
 use super::step::{Step, settle};
 use super::{FiniteBearing, Mesh};
-use crate::BearingError;
+use crate::error::BearingError;
+use crate::limits;
 
-/// Iterations allowed on each mesh, for the journal and for the fronts of a film.
-const ITERATIONS: usize = 60;
-/// Longest step of the journal, in clearances.
-const LONGEST: f64 = 0.1;
-/// Fraction of the thinnest film that a step of the journal keeps.
-const KEPT: f64 = 0.3;
-/// Steps below which each mesh has converged, from coarse to fine: of the journal relative to the
-/// thinnest film, and of the fronts in rad. Newton's method squares the last one.
-const TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-6];
-
-/// The journal and its films on the way to the equilibrium.
+/// The journal and its films during the search for the equilibrium.
 pub(super) struct Search<'a> {
     bearing: &'a FiniteBearing,
-    /// Load to carry over 6 μ Ω R² (R/c)².
+    /// Load over 6 μ Ω R² (R/c)².
     load: f64,
     pub(super) position: Vector2<f64>,
     films: Vec<Option<Film>>,
@@ -39,20 +30,20 @@ impl<'a> Search<'a> {
     /// Moves the journal to its equilibrium; returns the derivatives of the load there with respect
     /// to displacement and velocity.
     ///
-    /// From a coarse mesh, where Newton's method converges from afar, to the mesh of the bearing:
-    /// the finer the mesh, the closer the fronts have to be when it starts.
+    /// Starts on a coarse mesh, where Newton's method converges from far away, and ends on the mesh
+    /// of the bearing: the finer the mesh, the better the initial fronts must be.
     pub(super) fn equilibrium(&mut self) -> Result<Matrix2x4<f64>, BearingError> {
         let Mesh { along, across } = self.bearing.mesh;
         let [coarse, middle] = [4, 2].map(|by| Mesh { along: along / by, across: across / by });
-        self.approach(coarse, TOLERANCES[0])?;
-        self.converge(middle, TOLERANCES[1])?;
-        self.converge(self.bearing.mesh, TOLERANCES[2])
+        self.approach(coarse, limits::MESH_TOLERANCES[0])?;
+        self.converge(middle, limits::MESH_TOLERANCES[1])?;
+        self.converge(self.bearing.mesh, limits::MESH_TOLERANCES[2])
     }
 
-    /// Comes near the equilibrium, with films begun anew at every position.
+    /// Approaches the equilibrium, with new films at every position.
     fn approach(&mut self, mesh: Mesh, tolerance: f64) -> Result<(), BearingError> {
         let mut wanted = f64::NAN;
-        for _ in 0..ITERATIONS {
+        for _ in 0..limits::NEWTON_STEPS {
             let (mut load, mut tangent) = (Vector2::zeros(), Matrix2x4::zeros());
             self.films.clear();
             for &pad in self.bearing.bore.pads() {
@@ -74,14 +65,14 @@ impl<'a> Search<'a> {
         Err(self.lost(wanted))
     }
 
-    /// Converges on a mesh from the films of another.
+    /// Converges on a mesh, starting from the films of another mesh.
     fn converge(&mut self, mesh: Mesh, tolerance: f64) -> Result<Matrix2x4<f64>, BearingError> {
         for film in self.films.iter_mut().flatten() {
             *film = film.on(self.position, self.bearing.length_over_diameter, mesh);
             settle(film, self.position)?;
         }
         let mut wanted = f64::NAN;
-        for _ in 0..ITERATIONS {
+        for _ in 0..limits::NEWTON_STEPS {
             for (index, &pad) in self.bearing.bore.pads().iter().enumerate() {
                 if pad.converging(self.position).is_none() {
                     self.films[index] = None;
@@ -112,7 +103,7 @@ impl<'a> Search<'a> {
         Err(self.lost(wanted))
     }
 
-    /// A film that covers the converging part of a pad, with the pressure that belongs to it.
+    /// Returns a film over the converging part of a pad, with its pressure.
     fn begun(&self, pad: Pad, mesh: Mesh) -> Result<Option<Film>, BearingError> {
         let mut film = Film::new(pad, self.position, self.bearing.length_over_diameter, mesh);
         if let Some(film) = &mut film {
@@ -121,21 +112,23 @@ impl<'a> Search<'a> {
         Ok(film)
     }
 
-    /// Lets the fronts of a film come to rest with the journal held; returns the step from there.
+    /// Moves the fronts of a film to convergence with the journal fixed; returns the step from
+    /// there.
     fn relaxed(&self, film: &mut Film, tolerance: f64) -> Result<Step, BearingError> {
         let mut change = f64::NAN;
-        for _ in 0..ITERATIONS {
+        for _ in 0..limits::NEWTON_STEPS {
             let step = Step::new(film, self.position)?;
             change = step.apply(film, Vector2::zeros(), self.position)?;
             if change < tolerance {
                 return Ok(step);
             }
         }
-        let (iterations, position) = (ITERATIONS, self.position.into());
+        let (iterations, position) = (limits::NEWTON_STEPS, self.position.into());
         Err(BearingError::FilmNotConverged { iterations, change, position })
     }
 
-    /// The step of the journal towards the equilibrium, bounded, and its length before it was.
+    /// Returns the bounded step of the journal towards the equilibrium, and its length before the
+    /// bound.
     fn moved(
         &self,
         load: Vector2<f64>,
@@ -147,8 +140,8 @@ impl<'a> Search<'a> {
             .filter(|step| step.iter().all(|value| value.is_finite()))
             .ok_or(BearingError::SingularFilm { position: self.position.into() })?;
         let wanted = step.norm();
-        step *= (LONGEST / wanted).min(1.0);
-        let least = KEPT * self.bearing.bore.thinnest(self.position);
+        step *= (limits::JOURNAL_STEP / wanted).min(1.0);
+        let least = limits::STEP_FILM_FRACTION * self.bearing.bore.thinnest(self.position);
         while self.bearing.bore.thinnest(self.position + step) < least {
             step *= 0.5;
         }
@@ -157,14 +150,14 @@ impl<'a> Search<'a> {
 
     fn lost(&self, step: f64) -> BearingError {
         let sommerfeld = self.bearing.sommerfeld_number(self.load);
-        BearingError::EquilibriumNotConverged { sommerfeld, iterations: ITERATIONS, step }
+        BearingError::EquilibriumNotConverged { sommerfeld, iterations: limits::NEWTON_STEPS, step }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Bore;
+    use crate::finite::pad::Bore;
 
     fn found(bearing: &FiniteBearing, sommerfeld: f64) -> (Search<'_>, Matrix2x4<f64>) {
         let mut search = Search::new(bearing, bearing.sommerfeld_number(sommerfeld));

@@ -1,4 +1,4 @@
-//! The film on a pad: where it starts and ends, and its pressure.
+//! The film on a pad: its start and end, and its pressure.
 
 use std::f64::consts::TAU;
 
@@ -6,11 +6,9 @@ use nalgebra::{DMatrix, Vector2};
 
 use super::Mesh;
 use super::pad::Pad;
+use crate::limits;
 
-/// Largest eccentricity whose mesh gets denser where the film is thin.
-const LARGEST_GRADING: f64 = 0.99;
-
-/// The film on a pad, on a mesh that follows its start and its end.
+/// The film on a pad, on a mesh that moves with its start and its end.
 ///
 /// Row j of the mesh runs from the start to the end of the film at one axial coordinate; the film
 /// starts and ends where its pressure falls to zero without a slope (Swift and Stieber), or at an
@@ -31,7 +29,8 @@ pub(super) struct Film {
 }
 
 impl Film {
-    /// The film where it converges, without pressure; `None` if it converges nowhere on the pad.
+    /// Creates the film over the converging part, without pressure; `None` if no part of the pad
+    /// converges.
     pub(super) fn new(
         pad: Pad,
         position: Vector2<f64>,
@@ -70,7 +69,7 @@ impl Film {
         self.pressure.nrows()
     }
 
-    /// The film with these fronts on another mesh, without pressure.
+    /// Returns the film with the same fronts on another mesh, without pressure.
     pub(super) fn on(&self, position: Vector2<f64>, half_length: f64, mesh: Mesh) -> Self {
         let axial = axial_nodes(half_length, mesh.across);
         let last = self.rows() - 1;
@@ -88,8 +87,8 @@ impl Film {
     }
 }
 
-/// Rows from the middle to the end, denser towards the end of a long bearing, where the pressure
-/// falls within about a radius.
+/// Returns the rows from the middle to the end, denser towards the end of a long bearing, where the
+/// pressure falls within about a radius.
 fn axial_nodes(half_length: f64, rows: usize) -> Vec<f64> {
     let grading = half_length / (half_length + 2.0);
     (0..=rows)
@@ -100,11 +99,11 @@ fn axial_nodes(half_length: f64, rows: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Columns between two fronts, even in the angle of Sommerfeld's substitution: dense where the film
-/// is thin.
+/// Returns the columns between two fronts, equidistant in the angle of Sommerfeld's substitution:
+/// dense where the film is thin.
 fn column_nodes(relative: Vector2<f64>, fronts: [f64; 2], along: usize) -> Vec<f64> {
     let thinnest = relative[1].atan2(relative[0]);
-    let eccentricity = relative.norm().min(LARGEST_GRADING);
+    let eccentricity = relative.norm().min(limits::GRADED_ECCENTRICITY);
     let root = ((1.0 + eccentricity) / (1.0 - eccentricity)).sqrt();
     // tan(γ/2) = root tan(θ/2), turn by turn.
     let turned = |angle: f64, root: f64| {

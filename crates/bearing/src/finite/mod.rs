@@ -11,13 +11,13 @@ use std::f64::consts::PI;
 
 pub use pad::Bore;
 
-use crate::error::require;
-use crate::{BearingError, Coefficients, Equilibrium};
+use crate::equilibrium::{Coefficients, Equilibrium};
+use crate::error::{BearingError, require};
 use equilibrium::Search;
 
-/// Number of intervals of the mesh of a film.
+/// Numbers of intervals of the mesh of a film.
 ///
-/// The mesh follows the film from its start to its end. Errors fall with the square of the number
+/// The mesh moves with the start and the end of the film. Errors fall with the square of the number
 /// of intervals; with the default they are below a thousandth of the largest coefficient of each
 /// kind up to an eccentricity of 0.9.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,8 +38,8 @@ impl Default for Mesh {
 /// ambient pressure in the grooves and at the ends, and starts and ends where its pressure falls
 /// to zero without a slope.
 ///
-/// The coefficients are derivatives of the discrete equations, of the ends of the film too, not
-/// differences of forces.
+/// The coefficients are exact derivatives of the discrete equations, including those of the ends of
+/// the film, not differences of forces.
 ///
 /// ```
 /// use mechid_bearing::{Bore, FiniteBearing};
@@ -55,8 +55,8 @@ impl Default for Mesh {
 /// ```
 ///
 /// # Source
-/// Lund and Thomsen (1978), for the equations, the boundary condition and the scaling; the mesh
-/// that follows the film and its derivatives are our own.
+/// Lund and Thomsen (1978), for the equations, the boundary condition and the scaling; the moving
+/// mesh and its derivatives are ours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FiniteBearing {
     bore: Bore,
@@ -65,7 +65,7 @@ pub struct FiniteBearing {
 }
 
 impl FiniteBearing {
-    /// A bearing from its bore and the ratio of its length to its diameter.
+    /// Creates a bearing from its bore and the ratio of its length to its diameter.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the ratio is not positive and finite.
@@ -75,7 +75,7 @@ impl FiniteBearing {
         Ok(Self { bore, length_over_diameter, mesh: Mesh::default() })
     }
 
-    /// The same bearing on another mesh.
+    /// Returns the same bearing on another mesh.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] for fewer than 16 intervals along the film or 8 across.
@@ -86,17 +86,17 @@ impl FiniteBearing {
         Ok(Self { mesh, ..self })
     }
 
-    /// The equilibrium at a Sommerfeld number S = μ N L D (R/c)² / W (dimensionless, N in
+    /// Solves the equilibrium at a Sommerfeld number S = μ N L D (R/c)² / W (dimensionless, N in
     /// revolutions per second, c the clearance of a pad).
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] if S is not positive and finite,
+    /// [`BearingError::Parameter`] if S is not positive and finite;
     /// [`BearingError::EquilibriumNotConverged`], [`BearingError::FilmNotConverged`] or
-    /// [`BearingError::SingularFilm`] if no equilibrium is found: at extreme loads a finer mesh may
-    /// help.
+    /// [`BearingError::SingularFilm`] if no equilibrium is found (at extreme loads a finer mesh may
+    /// help).
     pub fn equilibrium(&self, sommerfeld: f64) -> Result<Equilibrium, BearingError> {
         require("Sommerfeld number", sommerfeld, "positive and finite", sommerfeld > 0.0)?;
-        // The same formula leads from S to the load and back.
+        // The same formula converts S to the load and back.
         let load = self.sommerfeld_number(sommerfeld);
         require("Sommerfeld number", sommerfeld, "within the range of a film", load.is_normal())?;
         let mut search = Search::new(self, load);
@@ -107,7 +107,7 @@ impl FiniteBearing {
         Ok(Equilibrium::new(sommerfeld, search.position.into(), coefficients))
     }
 
-    /// S of a load over 6 μ Ω R² (R/c)².
+    /// Returns S of a load over 6 μ Ω R² (R/c)².
     fn sommerfeld_number(&self, load: f64) -> f64 {
         self.length_over_diameter / (3.0 * PI * load)
     }

@@ -4,20 +4,19 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::Vector2;
 
-use crate::BearingError;
-use crate::error::require;
+use crate::error::{BearingError, require};
 
 /// The shape of a bore: a circle or two lobes, with or without axial grooves.
 ///
-/// Angles are counted from the static load in the direction of rotation.
-/// Oil of ambient pressure fills the grooves and surrounds the ends of the bearing.
+/// Angles are counted from the static load in the direction of rotation. Oil at ambient pressure
+/// fills the grooves and surrounds the ends of the bearing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bore {
     pads: Vec<Pad>,
 }
 
 impl Bore {
-    /// A circular bore without grooves, which takes its oil from the ends.
+    /// Returns a circular bore without grooves, with its oil supply at the ends.
     pub fn plain() -> Self {
         Self { pads: vec![Pad { edges: [f64::NEG_INFINITY, f64::INFINITY], centre: [0.0; 2] }] }
     }
@@ -80,17 +79,15 @@ impl Pad {
         let [x, y]: [f64; 2] = self.relative(position).into();
         let thickness = |angle: f64| 1.0 - x * angle.cos() - y * angle.sin();
         let [first, last] = self.edges;
-        let place = y.atan2(x);
-        let within = [place, place + TAU].iter().any(|angle| (first..=last).contains(angle));
-        match within {
-            true => 1.0 - x.hypot(y),
-            false => thickness(first).min(thickness(last)),
-        }
+        let angle = y.atan2(x);
+        let within = [angle, angle + TAU].iter().any(|angle| (first..=last).contains(angle));
+        if within { 1.0 - x.hypot(y) } else { thickness(first).min(thickness(last)) }
     }
 
-    /// Angles between which the film converges, in rad; `None` for less than a thousandth.
+    /// Returns the angles between which the film converges, in rad; `None` for less than a
+    /// thousandth.
     ///
-    /// There is one such arc on a pad of at most half the circumference, and one on a full bore.
+    /// A pad of at most half the circumference, or a full bore, has one such arc.
     pub(super) fn converging(&self, position: Vector2<f64>) -> Option<[f64; 2]> {
         let relative = self.relative(position);
         let thinnest = relative[1].atan2(relative[0]);

@@ -1,21 +1,15 @@
-//! One step of Newton's method on a film, and what its load does meanwhile.
+//! One step of Newton's method on a film, and the change of its load.
 
 use nalgebra::{DMatrix, Matrix2x4, SMatrix, Vector2};
 
 use super::assembly::{Assembly, SIDES};
 use super::film::Film;
-use crate::BearingError;
-
-/// Largest change of a front in one step, in rad.
-const FRONT_STEP: f64 = 0.3;
-/// Part of the converging arc that a film always keeps: without it, it could shrink to nothing.
-const KEPT: f64 = 0.6;
-/// A change of a front (rad) after which the pressure is computed anew.
-const ROUGH: f64 = 0.02;
+use crate::error::BearingError;
+use crate::limits;
 
 /// A film to first order: its load, and how pressure and fronts follow the journal.
 pub(super) struct Step {
-    /// Load that the film carries once it meets its equations, as far as the first order tells.
+    /// Load of the film once it satisfies its equations, to first order.
     pub(super) load: Vector2<f64>,
     /// Derivatives of the load with respect to displacement and velocity, along the static load
     /// and across.
@@ -30,7 +24,7 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// The step from where the film is, with the journal at `position`.
+    /// Returns the step from the present film, with the journal at `position`.
     ///
     /// # Errors
     /// [`BearingError::SingularFilm`] if the equations cannot be solved.
@@ -53,7 +47,7 @@ impl Step {
             Assembly::new(film, position, &unknown);
         let (rows, nodes) = (film.rows(), load_pressure.len());
         let (free, sides) = (unknown.len(), unknown.len() + SIDES);
-        // The pressure at the fronts is zero: their nodes have the equations of the fronts.
+        // The pressure at the fronts is zero: these nodes have the equations of the fronts.
         let inner = rows..nodes - rows;
         matrix.solve(inner.clone(), &mut right, sides)?;
 
@@ -96,7 +90,7 @@ impl Step {
         finite.then_some(Self { load, tangent, pressure, fronts, unknown, outflow })
     }
 
-    /// Changes the film to meet its equations with the journal moved by `moved` to `position`;
+    /// Changes the film to satisfy its equations with the journal moved by `moved` to `position`;
     /// returns the largest change of a front (rad).
     ///
     /// # Errors
@@ -110,22 +104,22 @@ impl Step {
         let Some(arc) = film.pad.converging(position) else { return Ok(0.0) };
         let by = |steps: [f64; 3]| steps[0] + steps[1] * moved[0] + steps[2] * moved[1];
         let mut largest: f64 = 0.0;
-        // A film whose pressure would fall below zero before the edge of the pad ends before it.
+        // The film ends where its pressure would fall below zero before the edge of the pad.
         for (side, converging) in arc.iter().enumerate() {
             let edge = film.pad.edges[side];
             for (free, outflow) in film.free[side].iter_mut().zip(&self.outflow[side]) {
                 if !*free && *outflow > 0.0 && *converging != edge {
                     *free = true;
-                    largest = FRONT_STEP;
+                    largest = limits::FRONT_STEP;
                 }
             }
         }
-        let slack = (1.0 - KEPT) / 2.0 * (arc[1] - arc[0]);
+        let slack = (1.0 - limits::FILM_FRACTION) / 2.0 * (arc[1] - arc[0]);
         for (index, &(side, row)) in self.unknown.iter().enumerate() {
             let change = by([0, 1, 2].map(|side| self.fronts[(index, side)]));
-            largest = largest.max(change.abs().min(FRONT_STEP));
+            largest = largest.max(change.abs().min(limits::FRONT_STEP));
             let front = &mut film.fronts[side][row];
-            *front += change.clamp(-FRONT_STEP, FRONT_STEP);
+            *front += change.clamp(-limits::FRONT_STEP, limits::FRONT_STEP);
             let edge = film.pad.edges[side];
             let beyond = match side {
                 0 => {
@@ -142,7 +136,7 @@ impl Step {
                 film.free[side][row] = false;
             }
         }
-        if largest > ROUGH {
+        if largest > limits::PRESSURE_UPDATE {
             settle(film, position)?;
         } else {
             for (pressure, steps) in film.pressure.iter_mut().zip(&self.pressure) {
@@ -153,7 +147,7 @@ impl Step {
     }
 }
 
-/// Gives a film the pressure that belongs to its fronts where they are.
+/// Computes the pressure of a film for its present fronts.
 ///
 /// # Errors
 /// [`BearingError::SingularFilm`] if the equations cannot be solved.

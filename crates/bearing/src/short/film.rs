@@ -3,13 +3,14 @@
 use mechid_model::OilFilm;
 
 use super::integrals::Integrals;
-use crate::{BearingError, Conditions};
+use crate::conditions::Conditions;
+use crate::error::BearingError;
 
 /// The film of a short bearing as a nonlinear force on the journal.
 ///
-/// Pressure stands where it is positive at this instant: half the circumference, which the velocity
-/// turns. Along each circumference line the film pushes with μ L³ (Ω/2 ∂h/∂θ + ∂h/∂t) / h³ per
-/// radian of its radius.
+/// The film has pressure where it is positive at this instant: half the circumference, whose
+/// position depends on the velocity. Along each circumferential line the film pushes with μ L³ (Ω/2
+/// ∂h/∂θ + ∂h/∂t) / h³ per radian of its radius.
 ///
 /// x and y are any two perpendicular directions such that the journal rotates from x to y.
 ///
@@ -35,7 +36,7 @@ pub struct ShortFilm {
     scale: f64,
 }
 
-/// The force of a film on the journal and how it changes.
+/// The force of a film on the journal and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmForce {
     /// Along x and y, in N.
@@ -48,7 +49,7 @@ impl ShortFilm {
     /// The film of a bearing.
     ///
     /// # Errors
-    /// [`BearingError::Parameter`] naming what is not positive and finite.
+    /// [`BearingError::Parameter`] naming the value that is not positive and finite.
     pub fn new(conditions: Conditions) -> Result<Self, BearingError> {
         conditions.check()?;
         let Conditions { diameter, length, clearance, viscosity, omega } = conditions;
@@ -61,7 +62,7 @@ impl ShortFilm {
         self.clearance
     }
 
-    /// The force on the journal at a position (m) and velocity (m/s), along x and y each.
+    /// Returns the force on the journal at a position (m) and velocity (m/s), along x and y each.
     ///
     /// # Errors
     /// [`BearingError::Contact`] if the journal touches the bore or its state is not finite.
@@ -85,8 +86,8 @@ impl ShortFilm {
     }
 }
 
-/// Force over μ R L³ / c² and its derivatives, for a position in clearances and a velocity in
-/// clearances per unit of time.
+/// Returns the force over μ R L³ / c² and its derivatives, for a position in clearances and a
+/// velocity in clearances per unit of time.
 pub(super) struct HalfFilm {
     pub(super) force: [f64; 2],
     pub(super) stiffness: [[f64; 2]; 2],
@@ -97,13 +98,11 @@ impl HalfFilm {
     /// ∫ G n / h³ dθ over the half where G < 0, with h = 1 − ε cos θ from the line of centres,
     /// n = (cos θ, sin θ) and G = Ω/2 ∂h/∂θ + ∂h/∂t = p sin θ − q cos θ.
     ///
-    /// G vanishes at both ends, so they add nothing to the derivatives.
+    /// G vanishes at both ends, which therefore do not contribute to the derivatives.
     pub(super) fn new(position: [f64; 2], velocity: [f64; 2], omega: f64) -> Self {
         let eccentricity = position[0].hypot(position[1]);
-        let [cos, sin] = match eccentricity > 0.0 {
-            true => position.map(|x| x / eccentricity),
-            false => [1.0, 0.0],
-        };
+        let [cos, sin] =
+            if eccentricity > 0.0 { position.map(|x| x / eccentricity) } else { [1.0, 0.0] };
         let half = omega / 2.0;
         let p = half * eccentricity - (cos * velocity[1] - sin * velocity[0]);
         let q = cos * velocity[0] + sin * velocity[1];
@@ -117,7 +116,7 @@ impl HalfFilm {
         let stiffness = [0, 1].map(|i| [0, 1].map(|k: usize| -(turn[i][k] + 3.0 * bend[i][k])));
         let damping = [[cc, cs], [cs, ss]];
 
-        // Back from the line of centres.
+        // Rotates back from the line of centres.
         let turned = |m: [[f64; 2]; 2]| {
             let rotation = [[cos, -sin], [sin, cos]];
             [0, 1].map(|i: usize| {

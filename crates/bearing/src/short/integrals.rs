@@ -1,12 +1,12 @@
-//! Integrals over the half of a short bearing that carries pressure, in closed form.
+//! Integrals over the pressurised half of a short bearing, in closed form.
 
 use std::f64::consts::TAU;
 
 /// ∫ cosᵇθ sinᵃθ / (1 − ε cos θ)ⁿ dθ from α − π to α, for n = 3, a + b = 2 and n = 4, a + b = 3.
 ///
 /// # Source
-/// Sommerfeld's substitution 1 − ε cos θ = (1 − ε²) / (1 + ε cos γ), after which they are
-/// trigonometric polynomials (Booker 1965).
+/// Sommerfeld's substitution 1 − ε cos θ = (1 − ε²) / (1 + ε cos γ) makes them trigonometric
+/// polynomials (Booker 1965).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Integrals {
     /// a = 0, 1, 2 with n = 3.

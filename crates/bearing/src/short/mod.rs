@@ -7,14 +7,15 @@ use std::f64::consts::PI;
 
 pub use film::{FilmForce, ShortFilm};
 
-use crate::error::require;
-use crate::{BearingError, Coefficients, Equilibrium};
+use crate::equilibrium::{Coefficients, Equilibrium};
+use crate::error::{BearingError, require};
 use film::HalfFilm;
 
-/// A short bearing: the oil flows axially, and pressure stands where the film converges.
+/// A short bearing: the oil flows axially, and the converging part of the film has pressure.
 ///
-/// The film of half the circumference (Gümbel's condition, which in a short bearing is also that of
-/// Swift and Stieber). Good for lengths of up to half the diameter at moderate eccentricity.
+/// The film covers half the circumference (Gümbel's condition, which for a short bearing is
+/// equivalent to that of Swift and Stieber). Good for lengths of up to half the diameter at
+/// moderate eccentricity.
 ///
 /// ```
 /// use mechid_bearing::ShortBearing;
@@ -35,7 +36,7 @@ pub struct ShortBearing {
 }
 
 impl ShortBearing {
-    /// A bearing from the ratio of its length to its diameter.
+    /// Creates a bearing from the ratio of its length to its diameter.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the ratio is not positive and finite.
@@ -45,7 +46,7 @@ impl ShortBearing {
         Ok(Self { length_over_diameter })
     }
 
-    /// The equilibrium at an eccentricity over the clearance (a ratio).
+    /// Returns the equilibrium at an eccentricity over the clearance (a ratio).
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the eccentricity is not between 0 and 1, or leads to no
@@ -68,17 +69,17 @@ impl ShortBearing {
         Ok(Equilibrium::new(sommerfeld, position, coefficients))
     }
 
-    /// The equilibrium at a Sommerfeld number S = μ N L D (R/c)² / W (dimensionless, N in
+    /// Returns the equilibrium at a Sommerfeld number S = μ N L D (R/c)² / W (dimensionless, N in
     /// revolutions per second), from S (L/D)² = (1 − ε²)² / (π ε √(π² (1 − ε²) + 16 ε²)).
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if S is not positive and finite, or so extreme that the journal
-    /// stands at the centre or touches the bore.
+    /// is at the centre or touches the bore.
     pub fn equilibrium(&self, sommerfeld: f64) -> Result<Equilibrium, BearingError> {
         require("Sommerfeld number", sommerfeld, "positive and finite", sommerfeld > 0.0)?;
         let wanted = 1.0 / (4.0 * PI * self.length_over_diameter.powi(2) * sommerfeld);
-        // The load rises with the eccentricity, so halving finds it: on a scale that resolves both
-        // ends of the interval from 0 to 1.
+        // The load increases with the eccentricity, so that bisection finds it, on a scale that
+        // resolves both ends of the interval from 0 to 1.
         let [mut low, mut high] = [-36.0_f64, 36.0];
         let at = |logit: f64| 1.0 / (1.0 + (-logit).exp());
         for _ in 0..64 {

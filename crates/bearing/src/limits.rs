@@ -1,0 +1,26 @@
+//! Limits of this crate: the numbers that decide how long to iterate and when to stop.
+
+/// Maximum number of Newton steps on each mesh, for the journal and for the fronts of a film.
+pub(crate) const NEWTON_STEPS: usize = 60;
+
+/// Longest step of the journal, in clearances; Newton's method may diverge with longer ones.
+pub(crate) const JOURNAL_STEP: f64 = 0.1;
+
+/// Smallest fraction of the thinnest film that remains after a step of the journal.
+pub(crate) const STEP_FILM_FRACTION: f64 = 0.3;
+
+/// Steps below which each mesh has converged, from coarse to fine: of the journal relative to the
+/// thinnest film, and of the fronts in rad. Newton's method squares the last one.
+pub(crate) const MESH_TOLERANCES: [f64; 3] = [1e-2, 1e-3, 1e-6];
+
+/// Largest eccentricity for which the mesh is graded towards thin films.
+pub(crate) const GRADED_ECCENTRICITY: f64 = 0.99;
+
+/// Largest change of a front in one step, in rad.
+pub(crate) const FRONT_STEP: f64 = 0.3;
+
+/// Smallest fraction of the converging arc that a film covers; a smaller film could vanish.
+pub(crate) const FILM_FRACTION: f64 = 0.6;
+
+/// Change of a front (rad) above which the pressure is computed anew.
+pub(crate) const PRESSURE_UPDATE: f64 = 0.02;
