@@ -127,7 +127,7 @@ impl Sdof {
 
     /// x and ẋ at `t` of the free response from `x0`, `v0`.
     pub(crate) fn free_motion(&self, t: f64, x0: f64, v0: f64) -> (f64, f64) {
-        // Of real roots the first is the fast one: these two sums do not cancel.
+        // The first real root is the fast one: these two sums do not cancel.
         let [fast, slow] = self.poles();
         let h = t * phi_divided(0, fast * t, slow * t);
         let h_dot = (fast * t).exp() + slow * h;
@@ -136,7 +136,7 @@ impl Sdof {
         (x0 * from_x0.re + v0 * h.re, v0 * h_dot.re - x0 * stiffness_ratio * h.re)
     }
 
-    /// x and ẋ at `t`, from rest under the complex force exp(μt): the divided difference of
+    /// Returns x and ẋ at `t`, from rest under the complex force exp(μt): the divided difference of
     /// exp(zt) over λ₁, λ₂ and μ, over m.
     fn forced_motion(&self, t: f64, mu: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
         let [p, q] = self.poles();
@@ -149,8 +149,8 @@ impl Sdof {
         (x / self.mass(), v / self.mass())
     }
 
-    /// A response from its displacement, velocity and the force at each instant;
-    /// the acceleration follows from the equation of motion.
+    /// Creates a response from its displacement, velocity and the force at each instant; the
+    /// acceleration follows from the equation of motion.
     fn respond(
         &self,
         sampling: Sampling,

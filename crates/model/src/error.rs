@@ -54,7 +54,7 @@ pub enum ModelError {
     /// A system needs at least one degree of freedom.
     #[error("a system needs at least one degree of freedom")]
     NoDof,
-    /// Displacement, velocity and acceleration do not belong together.
+    /// Displacement, velocity and acceleration have different sizes or instants.
     #[error("displacement has {}, {quantity} has {got}", message::count(*expected, "channel"))]
     Channels {
         /// `"velocity"` or `"acceleration"`.
@@ -134,7 +134,7 @@ pub enum ModelError {
         what: &'static str,
         /// The word given.
         name: String,
-        /// Words that are known, separated by commas.
+        /// Known words, separated by commas.
         known: &'static str,
     },
     /// An entry outside M, C and K.
@@ -192,7 +192,7 @@ pub enum ModelError {
         /// Name of the parameter concerned.
         parameter: String,
     },
-    /// A text is no nonlinear term, or the term does not belong to the system.
+    /// A text is not a nonlinear term, or the term does not belong to the system.
     #[error("`{text}` is not usable as a nonlinear term: {reason}")]
     Term {
         /// The text of the term.
@@ -219,7 +219,7 @@ pub enum ModelError {
     NoSuchMode {
         /// The one asked for, counted from 1.
         mode: usize,
-        /// Number of those there are.
+        /// Number of modes.
         modes: usize,
     },
     /// A signal is not usable.

@@ -28,7 +28,7 @@ impl KyxSign {
 
 /// The eight linearised coefficients of an oil film: stiffness in N/m, damping in N·s/m.
 ///
-/// The first index is the direction of the force, the second that of the motion.
+/// The first index is the direction of the force, the second the direction of the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OilFilm {
     /// Stiffness, force in x from displacement in x, in N/m.
@@ -56,9 +56,8 @@ pub struct OilFilm {
 /// M ÿ + Cyx ẋ + Cyy ẏ ±        Kyx x + (Kyy + Sy) y = Fy      (± is the KyxSign)
 /// ```
 ///
-/// Degree of freedom 0 is x, 1 is y. In the dissertation Kxx and Kyy already contain
-/// the support stiffness; [`with_support`](Self::with_support) is for film and support
-/// known apart.
+/// Degree of freedom 0 is x, 1 is y. In the dissertation Kxx and Kyy already include the support
+/// stiffness; [`with_support`](Self::with_support) is for a film and a support known separately.
 ///
 /// ```
 /// use mechid_model::{JournalBearing, KyxSign, OilFilm};
@@ -106,7 +105,7 @@ impl JournalBearing {
         Ok(Self { mass, film, kyx_sign, support: [0.0; 2] })
     }
 
-    /// The same shaft with support springs `sx`, `sy` (N/m) added to Kxx and Kyy.
+    /// Returns the same shaft with support springs `sx`, `sy` (N/m) added to Kxx and Kyy.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] if one of them, or its sum with the film's, is not finite.

@@ -44,6 +44,7 @@ mod error;
 mod frequency_response;
 mod initial_state;
 mod journal_bearing;
+mod limits;
 mod modes;
 mod nonlinear;
 mod parameter;

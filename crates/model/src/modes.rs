@@ -5,25 +5,11 @@ use mechid_signal::message;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
 
-/// Eigenvalues closer than this, relative to their modulus, count as one repeated eigenvalue:
-/// about √ε, what rounding makes of a defective pair.
-const REPEATED: f64 = 1e-7;
-
-/// Distance of the shift of inverse iteration from the eigenvalue, in units of its rounding: beyond what
-/// rounding couples equal eigenvalues by, so that each start gives a direction of its own.
-const SHIFT: f64 = 100.0;
-
-/// Steps of inverse iteration: the first leaves of other modes what rounding does, the second less.
-const STEPS: usize = 2;
-
-/// Part of a shape that is independent of those of the same eigenvalue if they are not one shape to
-/// rounding.
-const INDEPENDENT: f64 = 1e-3;
-
-/// Modulus of an eigenvalue over the largest that rounding makes of a double zero, such as that of a free
-/// machine: about √ε (pure number).
+/// Modulus of an eigenvalue, relative to the largest, up to which it may be the rounding of a
+/// double zero, such as that of a free structure: about √ε (pure number).
 pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
 /// A mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
@@ -37,16 +23,17 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// Makes a mode of λ, in rad/s, and any multiple of its shape, one entry per degree of freedom; of a
-    /// conjugate pair either. `None` unless all are finite and not all of the shape zero.
+    /// Makes a mode of λ, in rad/s, and any multiple of its shape, one entry per degree of freedom;
+    /// of a conjugate pair either. `None` unless all are finite and not all of the shape zero.
     pub fn new(eigenvalue: Complex<f64>, shape: &DVector<Complex<f64>>) -> Option<Self> {
         let largest = largest_entry(shape);
         let finite = |z: &Complex<f64>| z.re.is_finite() && z.im.is_finite();
         let sound = finite(&eigenvalue) && largest.norm() > 0.0;
         let shape = shape / largest;
-        let (eigenvalue, shape) = match eigenvalue.im < 0.0 {
-            true => (eigenvalue.conj(), shape.conjugate()),
-            false => (eigenvalue, shape),
+        let (eigenvalue, shape) = if eigenvalue.im < 0.0 {
+            (eigenvalue.conj(), shape.conjugate())
+        } else {
+            (eigenvalue, shape)
         };
         (sound && shape.iter().all(finite)).then_some(Self { eigenvalue, shape })
     }
@@ -125,7 +112,8 @@ impl Instability {
 }
 
 impl std::fmt::Display for Instability {
-    /// `pole 0.1 ± 6.28i rad/s: the free response at 1 Hz grows at 0.1 1/s and doubles every 6.93 s`.
+    /// `pole 0.1 ± 6.28i rad/s: the free response at 1 Hz grows at 0.1 1/s and doubles every 6.93
+    /// s`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let number = |value: f64| format!("{}", message::number(rounded(value)));
         write!(f, "pole {}", number(self.eigenvalue.re))?;
@@ -159,7 +147,7 @@ impl SecondOrderSystem {
     /// ```
     ///
     /// # Source
-    /// Dissertation eqs. (4.5.8) and (4.5.26), there in the order x, ẋ, y, ẏ.
+    /// Dissertation eqs. (4.5.8) and (4.5.26), with the order x, ẋ, y, ẏ there.
     pub fn state_matrix(&self) -> DMatrix<f64> {
         let n = self.dof();
         let mass = self.mass().clone().lu();
@@ -171,7 +159,8 @@ impl SecondOrderSystem {
         a
     }
 
-    /// All 2n eigenvalues (rad/s), by modulus, of a conjugate pair the one with Im λ > 0 first.
+    /// Computes all 2n eigenvalues (rad/s), sorted by modulus; in a conjugate pair the one with Im
+    /// λ > 0 comes first.
     ///
     /// # Errors
     /// [`ModelError::ModesNotConverged`] if the QR iteration does not converge,
@@ -194,7 +183,8 @@ impl SecondOrderSystem {
         Ok(Decomposition { size: schur.t.norm(), balance, schur })
     }
 
-    /// The fastest growing free response; `None` of a system all of whose free responses decay or persist.
+    /// The fastest growing free response; `None` of a system all of whose free responses decay or
+    /// persist.
     ///
     /// Growth within [`EIGENVALUE_ROUNDING`] of zero is rounding.
     ///
@@ -205,43 +195,46 @@ impl SecondOrderSystem {
         let largest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let fastest = eigenvalues.into_iter().max_by(|p, q| p.re.total_cmp(&q.re));
         let unstable = fastest.filter(|l| l.re > EIGENVALUE_ROUNDING * largest);
-        // Of a conjugate pair either may come last.
+        // Either eigenvalue of a conjugate pair may come last.
         Ok(unstable.map(|l| Instability { eigenvalue: Complex::new(l.re, l.im.abs()) }))
     }
 
-    /// The modes by rising natural frequency: one for each conjugate pair, one for each real eigenvalue.
+    /// Computes the modes in ascending order of natural frequency: one for each conjugate pair, one
+    /// for each real eigenvalue.
     ///
-    /// The n degrees of freedom have n modes if all of them oscillate, up to 2n otherwise.
-    /// A repeated eigenvalue with as many independent shapes gives orthonormal directions of
-    /// their space (each then scaled); if it has fewer (it is defective, like critical
-    /// damping) a shape is given more than once. Rounding splits a defective pair by about √ε:
-    /// the free motion of an unsupported body comes out as |λ| of 1e-7 rad/s or so, not as 0.
+    /// The n degrees of freedom have n modes if all of them oscillate, up to 2n otherwise. A
+    /// repeated eigenvalue with enough independent shapes gives orthonormal directions of their
+    /// space (each then scaled). If it has fewer (it is defective, like critical damping), a shape
+    /// is repeated. Rounding splits a defective pair by about √ε: the free motion of an unsupported
+    /// body has |λ| of about 1e-7 rad/s instead of 0.
     ///
-    /// The shapes come from the Schur form that has the eigenvalues, O(n²) each; where only frequencies
-    /// and damping are wanted [`eigenvalues`](Self::eigenvalues) takes a little less.
+    /// The shapes come from the Schur form that has the eigenvalues, O(n²) each; where only
+    /// frequencies and damping are wanted [`eigenvalues`](Self::eigenvalues) takes a little less.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
     ///
     /// # Source
-    /// Meirovitch (1975), the state form of a damped system; Dissertation, Appendix E. Golub & Van Loan,
-    /// *Matrix Computations*, 4th ed. (2013), section 7.6.1, for inverse iteration.
+    /// Meirovitch (1975), the state form of a damped system; Dissertation, Appendix E. Golub & Van
+    /// Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1, for inverse iteration.
     pub fn modes(&self) -> Result<Vec<Mode>, ModelError> {
         let decomposition = self.decomposition()?;
         let mut modes: Vec<Mode> = Vec::with_capacity(self.dof());
         for eigenvalue in decomposition.eigenvalues().into_iter().filter(|l| l.im >= 0.0) {
-            let near =
-                |m: &&Mode| (m.eigenvalue - eigenvalue).norm() <= REPEATED * eigenvalue.norm();
+            let near = |m: &&Mode| {
+                (m.eigenvalue - eigenvalue).norm()
+                    <= limits::MULTIPLE_EIGENVALUE * eigenvalue.norm()
+            };
             let twins: Vec<&Mode> = modes.iter().filter(near).collect();
-            let own = decomposition.shape(eigenvalue, twins.len());
-            let mut apart = own.clone();
-            // Twice, for what rounding leaves of the first time.
+            let shape = decomposition.shape(eigenvalue, twins.len());
+            let mut apart = shape.clone();
+            // The second pass removes the rounding of the first.
             for twin in twins.iter().chain(&twins) {
                 let along = twin.shape.dotc(&apart) / Complex::from(twin.shape.norm_squared());
                 apart.axpy(-along, &twin.shape, Complex::from(1.0));
             }
-            let independent = apart.norm() > INDEPENDENT * own.norm();
-            let shape = if independent { apart } else { own };
+            let independent = apart.norm() > limits::INDEPENDENT_SHAPE * shape.norm();
+            let shape = if independent { apart } else { shape };
             let shape = &shape / largest_entry(&shape);
             modes.push(Mode { eigenvalue, shape });
         }
@@ -259,7 +252,7 @@ struct Decomposition {
 }
 
 impl Decomposition {
-    /// By modulus, of a conjugate pair the one with Im λ > 0 first.
+    /// Sorts by modulus; in a conjugate pair the eigenvalue with Im λ > 0 comes first.
     fn eigenvalues(&self) -> Vec<Complex<f64>> {
         let mut eigenvalues = self.schur.eigenvalues();
         eigenvalues.sort_by(|p, q| {
@@ -268,13 +261,14 @@ impl Decomposition {
         eigenvalues
     }
 
-    /// A shape φ to the eigenvalue λ, of any length, by inverse iteration; of a repeated eigenvalue one for
-    /// each `copy`.
+    /// Returns a shape φ to the eigenvalue λ, of any length, by inverse iteration; for a repeated
+    /// eigenvalue each `copy` gives another one.
     fn shape(&self, eigenvalue: Complex<f64>, copy: usize) -> DVector<Complex<f64>> {
         let len = self.balance.len();
-        let shift = eigenvalue + SHIFT * f64::EPSILON * (len as f64).sqrt() * self.size;
+        let shift = eigenvalue
+            + limits::INVERSE_ITERATION_SHIFT * f64::EPSILON * (len as f64).sqrt() * self.size;
         let mut state = start_vector(len, copy);
-        for _ in 0..STEPS {
+        for _ in 0..limits::INVERSE_ITERATION_STEPS {
             self.solve(shift, &mut state);
             state /= Complex::from(state.norm());
         }
@@ -282,7 +276,7 @@ impl Decomposition {
         for (q, y) in self.schur.q.column_iter().zip(&state) {
             balanced.zip_apply(&q, |z: &mut Complex<f64>, q| *z += y * q);
         }
-        // Both [φ; λφ]: the half that has more digits.
+        // Of φ and λφ, the half with more digits.
         let n = len / 2;
         let first = if balanced.rows(0, n).norm() < balanced.rows(n, n).norm() { n } else { 0 };
         let half = balanced.rows(first, n).zip_map(&self.balance.rows(first, n), |z, b| z * b);
@@ -296,15 +290,15 @@ impl Decomposition {
         let pivot =
             |value: Complex<f64>| if value.norm() < smallest { smallest.into() } else { value };
         for &(at, width) in self.schur.blocks.iter().rev() {
-            let own = t[(at, at)] - shift;
+            let shifted = t[(at, at)] - shift;
             if width == 1 {
-                y[at] /= pivot(own);
+                y[at] /= pivot(shifted);
             } else {
                 let mut rows = [
-                    [own, t[(at, at + 1)].into(), y[at]],
+                    [shifted, t[(at, at + 1)].into(), y[at]],
                     [t[(at + 1, at)].into(), t[(at + 1, at + 1)] - shift, y[at + 1]],
                 ];
-                // By elimination: Cramer's rule would lose the direction of a nearly singular block.
+                // Elimination; Cramer's rule would lose the direction of a nearly singular block.
                 if rows[0][0].norm() < rows[1][0].norm() {
                     rows.swap(0, 1);
                 }
@@ -324,7 +318,7 @@ impl Decomposition {
     }
 }
 
-/// Entries without structure between −1 and 1, the same on every run: the fractions of multiples of the
+/// Pseudo-random entries between −1 and 1, the same on every run: the fractions of multiples of the
 /// square root of an integer.
 fn start_vector(len: usize, number: usize) -> DVector<Complex<f64>> {
     let step = ((number + 2) as f64 + 0.3).sqrt();
@@ -487,8 +481,8 @@ mod tests {
         }
     }
 
-    /// Judge: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes that know nothing of
-    /// one another each belongs to two modes.
+    /// Judge: a chain between walls has the shapes sin(r π i / (n + 1)); in two planes that know
+    /// nothing of one another each belongs to two modes.
     #[test]
     fn two_equal_chains_have_the_shapes_of_the_closed_form() {
         let n = 20;

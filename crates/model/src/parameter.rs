@@ -45,24 +45,24 @@ impl Parameter {
         })
     }
 
-    /// Entry of this name, such as `k12`, for `dof` degrees of freedom.
+    /// Returns the entry of this name, such as `k12`, for `dof` degrees of freedom.
     ///
     /// # Errors
-    /// [`ModelError::NoSuchParameter`] if the name is none of theirs.
+    /// [`ModelError::NoSuchParameter`] if the system has no parameter of this name.
     pub fn named(name: &str, dof: usize) -> Result<Self, ModelError> {
         Self::read(name, dof)
             .filter(|parameter| parameter.to_string() == name)
             .ok_or_else(|| ModelError::NoSuchParameter { name: name.to_owned(), dof })
     }
 
-    /// Entry that a name stands for, however its numbers are written.
+    /// Returns the entry of a name, for any way of writing its numbers.
     fn read(name: &str, dof: usize) -> Option<Self> {
         let matrix = Matrix::ALL.into_iter().find(|matrix| name.starts_with(matrix.letter()))?;
-        let place = &name[matrix.letter().len_utf8()..];
+        let numbers = &name[matrix.letter().len_utf8()..];
         let (row, column) = match dof {
             1 => ("1", "1"),
-            2..=9 => place.split_at_checked(1)?,
-            _ => place.split_once(',')?,
+            2..=9 => numbers.split_at_checked(1)?,
+            _ => numbers.split_once(',')?,
         };
         let index = |text: &str| text.parse::<usize>().ok()?.checked_sub(1);
         Self::new(matrix, index(row)?, index(column)?, dof).ok()
@@ -73,12 +73,12 @@ impl Parameter {
         self.matrix
     }
 
-    /// Row, counted from 0: the degree of freedom whose equation of motion it stands in.
+    /// Returns the row, counted from 0: the degree of freedom of the equation of motion.
     pub fn row(&self) -> usize {
         self.row
     }
 
-    /// Column, counted from 0: the degree of freedom whose response it multiplies.
+    /// Returns the column, counted from 0: the degree of freedom of the response.
     pub fn column(&self) -> usize {
         self.column
     }

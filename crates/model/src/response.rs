@@ -13,10 +13,11 @@ pub struct Response {
 }
 
 impl Response {
-    /// A response from its three records (m, m/s, m/s²), sampled at the same instants.
+    /// Creates a response from its three records (m, m/s, m/s²), sampled at the same instants.
     ///
     /// # Errors
-    /// [`ModelError::Channels`] or [`ModelError::Signal`] if they do not share channels and time axis.
+    /// [`ModelError::Channels`] or [`ModelError::Signal`] if they do not share channels and time
+    /// axis.
     pub fn new(
         displacement: Record,
         velocity: Record,
@@ -57,7 +58,8 @@ impl Response {
         }
     }
 
-    /// Returns the records of [`ResponseQuantity::ALL`], in m, m/s and m/s²: samples × degrees of freedom.
+    /// Returns the records of [`ResponseQuantity::ALL`], in m, m/s and m/s²: samples × degrees of
+    /// freedom.
     pub fn into_records(self) -> [Record; 3] {
         [self.displacement, self.velocity, self.acceleration]
     }

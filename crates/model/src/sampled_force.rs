@@ -59,8 +59,8 @@ impl Sdof {
     /// [`ModelError::Signal`] if an unstable response overflows.
     ///
     /// # Source
-    /// Nigam & Jennings (1969), Bull. Seismological Society of America 59(2), 909–922, with the force
-    /// held instead of linear.
+    /// Nigam & Jennings (1969), Bull. Seismological Society of America 59(2), 909–922, with the
+    /// force held instead of linear.
     pub fn held_force_response(
         &self,
         force: &Record,
@@ -87,7 +87,8 @@ impl Sdof {
         self.sampled(force, x0, v0, |_, right| right)
     }
 
-    /// `end` gives the value of the force at the end of a step from its samples on the left and right.
+    /// `end` gives the value of the force at the end of a step from its samples on the left and
+    /// right.
     fn sampled(
         &self,
         force: &Record,

@@ -9,7 +9,7 @@ use crate::error::require;
 
 /// One period of `len` samples that holds `npi` cycles of the natural frequency `omega_n` (rad/s).
 ///
-/// NPI = ωn/ω0 is the line of the spectrum on which the natural frequency falls, so
+/// NPI = ωn/ω0 is the line of the spectrum at the natural frequency, so
 ///
 /// ```text
 /// Δt = 2π NPI / (Nt ωn),      ω0 = 2π / (Nt Δt) = ωn / NPI

@@ -117,7 +117,7 @@ impl Sdof {
         Complex::new(self.stiffness - omega * omega * self.mass, omega * self.damping)
     }
 
-    /// The same system in matrices of size 1×1.
+    /// Returns the same system in matrices of size 1×1.
     pub fn system(&self) -> SecondOrderSystem {
         let (m, c, k) = (dmatrix![self.mass], dmatrix![self.damping], dmatrix![self.stiffness]);
         SecondOrderSystem::new(m, c, k).expect("finite, and the mass is positive")

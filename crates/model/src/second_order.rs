@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
+use crate::limits;
 use crate::{ModelError, Parameter};
 use mechid_numerics::linear_algebra::singular_values;
 
@@ -53,9 +54,6 @@ impl fmt::Display for Matrix {
     }
 }
 
-/// Number of degrees of freedom up to which all singular values of M are computed.
-const ALL_SINGULAR_VALUES: usize = 64;
-
 /// M ẍ + C ẋ + K x = F with n degrees of freedom; M invertible, C and K of any symmetry.
 ///
 /// ```text
@@ -83,8 +81,8 @@ impl SecondOrderSystem {
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
-    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades (beyond 64
-    /// degrees of freedom their largest and smallest are estimated by iteration).
+    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades (beyond
+    /// 64 degrees of freedom their largest and smallest are estimated by iteration).
     pub fn new(
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
@@ -129,11 +127,11 @@ impl SecondOrderSystem {
         &self.stiffness
     }
 
-    /// The same system with one entry larger by `by` (kg, N·s/m or N/m).
+    /// Returns the same system with one entry larger by `by` (kg, N·s/m or N/m).
     ///
     /// # Errors
-    /// [`ModelError::NoSuchParameter`] if the entry belongs to a system of other size; otherwise as
-    /// [`SecondOrderSystem::new`].
+    /// [`ModelError::NoSuchParameter`] if the entry belongs to a system of another size; otherwise
+    /// the errors of [`SecondOrderSystem::new`].
     pub fn changed(&self, entry: Parameter, by: f64) -> Result<Self, ModelError> {
         if entry.dof() != self.dof() {
             let (name, dof) = (entry.to_string(), self.dof());
@@ -162,7 +160,7 @@ impl SecondOrderSystem {
 /// Ratio of the smallest to the largest singular value of M.
 fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f64 {
     let n = mass.nrows();
-    if n <= ALL_SINGULAR_VALUES {
+    if n <= limits::SINGULAR_VALUES_DOF {
         let Ok(values) = singular_values(mass.clone()) else { return 0.0 };
         return if values.max() > 0.0 { values.min() / values.max() } else { 0.0 };
     }

@@ -108,7 +108,8 @@ fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// Square matrix of this order from its rows; the length of the row that does not fit otherwise.
+/// Creates a square matrix of this order from its rows; returns the length of a row that does not
+/// fit.
 fn matrix(rows: &[Vec<f64>], order: usize) -> Result<DMatrix<f64>, usize> {
     match rows.iter().find(|row| row.len() != order) {
         Some(row) => Err(row.len()),

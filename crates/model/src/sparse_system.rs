@@ -1,4 +1,4 @@
-//! M ẍ + C ẋ + K x = F with matrices of which only the non-zero entries are stored.
+//! Linear systems with sparse matrices: M ẍ + C ẋ + K x = F.
 
 use nalgebra_sparse::coo::CooMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
@@ -29,15 +29,16 @@ pub struct SparseSystem {
 }
 
 impl SparseSystem {
-    /// Memory that factors of its matrices may take if nothing else is said, in bytes.
+    /// Default limit of the memory of the factors of its matrices, in bytes.
     pub const FACTOR_LIMIT: u64 = 4_000_000_000;
 
     /// Checks and takes the n×n matrices M (kg), C (N·s/m) and K (N/m).
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
-    /// [`ModelError::SingularMass`] if M has a row or a column of zeros, or is diagonal with entries
-    /// that span more than 15 decades. Whether any other M is singular shows when it is factored.
+    /// [`ModelError::SingularMass`] if M has a row or a column of zeros, or is diagonal with
+    /// entries that span more than 15 decades. Whether any other M is singular shows when it is
+    /// factored.
     pub fn new(
         mass: CsrMatrix<f64>,
         damping: CsrMatrix<f64>,
@@ -63,8 +64,8 @@ impl SparseSystem {
         Ok(Self { mass, damping, stiffness, factor_limit: Self::FACTOR_LIMIT })
     }
 
-    /// Returns the system with another limit, in bytes, of the memory that factors of its matrices may
-    /// take: those of bodies in three dimensions fill in, with the time that this takes.
+    /// Returns the system with another limit, in bytes, of the memory of the factors of its
+    /// matrices: the factors of three-dimensional bodies fill in, which also takes time.
     pub fn with_factor_limit(self, bytes: u64) -> Self {
         Self { factor_limit: bytes, ..self }
     }
@@ -102,7 +103,7 @@ impl From<&SecondOrderSystem> for SparseSystem {
 }
 
 /// Returns the `dof`×`dof` matrix with the given (row, column, value) entries, counted from 0, in
-/// the unit of the values; entries at the same place are added, as in the assembly of elements.
+/// the unit of the values; entries with the same indices are added, as in the assembly of elements.
 ///
 /// # Errors
 /// [`ModelError::EntryOutside`] if a row or column is not below `dof`.
@@ -157,7 +158,8 @@ fn check_finite(
     }
 }
 
-/// Smallest over largest entry of a diagonal M; 0 for an empty row or column, else 1.
+/// Returns the smallest over the largest entry of a diagonal M; 0 for an empty row or column,
+/// otherwise 1.
 fn mass_spread(mass: &CsrMatrix<f64>) -> f64 {
     let dof = mass.nrows();
     let (mut rows, mut columns) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);

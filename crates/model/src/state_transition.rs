@@ -8,8 +8,8 @@ use mechid_numerics::linear_algebra::exponential;
 /// Transition of the state over one step Δt:
 /// z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with Γ₁ only for a linear input.
 ///
-/// Step units: the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large unless the
-/// step is long for the system:
+/// Step units: the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large unless
+/// the step is long for the system:
 ///
 /// ```text
 /// d ┌  x   ┐   ┌      0           I     ┐ ┌  x   ┐   ┌ 0 ┐
@@ -39,13 +39,14 @@ pub struct StateTransition {
     /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input held over the step at its
     /// value at the start.
     pub held: DMatrix<f64>,
-    /// Γ₁, 2n × inputs, in the same unit: effect of the rise of the input over the step, from 0 to 1.
+    /// Γ₁, 2n × inputs, in the same unit: effect of the rise of the input over the step, from 0
+    /// to 1.
     pub ramp: DMatrix<f64>,
 }
 
 impl StateTransition {
-    /// Exact transition at any step, for the input matrix B (n × inputs, in m per unit of the input):
-    /// one matrix exponential of order 2(n + inputs).
+    /// Exact transition at any step, for the input matrix B (n × inputs, in m per unit of the
+    /// input): one matrix exponential of order 2(n + inputs).
     ///
     /// # Errors
     /// [`ModelError::ForceChannels`] if B has not one row per degree of freedom;

@@ -5,10 +5,11 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::{ModelError, Response, SecondOrderSystem};
 
-/// The response that repeats with a `force` of samples × n (N), which is band-limited between its samples, line by line
-/// X_n = (K − ω²M + iωC)⁻¹ F_n: exact to rounding, no time step involved.
+/// Computes the response that repeats with a `force` of samples × n (N), which is band-limited
+/// between its samples, line by line: X_n = (K − ω²M + iωC)⁻¹ F_n. It is exact to rounding, without
+/// a time step.
 ///
-/// The equations of an unstable system are solved, too, but no run reaches that response.
+/// For an unstable system the equations have a solution, too, but no motion reaches it.
 ///
 /// Lines without force have no response; that spares DC for a system free to drift.
 ///

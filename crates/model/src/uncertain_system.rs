@@ -4,8 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::{ModelError, Parameter, SecondOrderSystem};
 
-/// A system, those of its entries that are uncertain, and their covariance; all other entries are
-/// known.
+/// A system with some uncertain entries, and their covariance; all other entries are known.
 ///
 /// ```
 /// use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
@@ -38,10 +37,10 @@ impl UncertainSystem {
     /// their units (kg, N·s/m, N/m).
     ///
     /// # Errors
-    /// [`ModelError::CovarianceShape`] if it is not one row and column per parameter,
+    /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
     /// [`ModelError::RepeatedParameter`] if a parameter is named twice,
-    /// [`ModelError::NoSuchParameter`] if it belongs to a system of other size.
+    /// [`ModelError::NoSuchParameter`] if it belongs to a system of another size.
     pub fn new(
         system: SecondOrderSystem,
         parameters: Vec<Parameter>,
@@ -56,7 +55,7 @@ impl UncertainSystem {
         Ok(Self { system, parameters, covariance })
     }
 
-    /// A system of which every entry is known.
+    /// Creates a system with known entries only.
     pub fn exact(system: SecondOrderSystem) -> Self {
         Self { system, parameters: Vec::new(), covariance: DMatrix::zeros(0, 0) }
     }
@@ -77,7 +76,8 @@ impl UncertainSystem {
         &self.covariance
     }
 
-    /// Standard error of one entry, in its unit (kg, N·s/m or N/m); 0 for an entry that is known.
+    /// Returns the standard error of one entry, in its unit (kg, N·s/m or N/m); 0 for a known
+    /// entry.
     pub fn standard_error(&self, parameter: Parameter) -> f64 {
         let at = self.parameters.iter().position(|p| *p == parameter);
         at.map_or(0.0, |at| self.covariance[(at, at)].sqrt())

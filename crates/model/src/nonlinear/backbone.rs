@@ -1,4 +1,4 @@
-//! Frequency of free vibration over its amplitude.
+//! Frequency of free vibration as a function of its amplitude.
 
 use std::f64::consts::TAU;
 
@@ -6,33 +6,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{NonlinearSystem, UncertainNonlinearSystem};
 use crate::error::require;
+use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
-
-/// Harmonics of the motion beside its mean.
-const HARMONICS: usize = 9;
-
-/// Instants in a period: the ninth power of nine harmonics, times one of them, folds back on none.
-const INSTANTS: usize = 128;
-
-/// Newton steps to an amplitude, at most.
-const STEPS: usize = 30;
-
-/// Change, relative to amplitude and frequency, that counts as none.
-const SETTLED: f64 = 1e-11;
-
-/// Attempts on the way from one amplitude to the next, at most; each that fails halves the way.
-const ATTEMPTS: usize = 16;
-
-/// Part of a standard error by which a parameter is changed for a derivative.
-const STEP: f64 = 0.1;
-
-/// The real part of an undamped eigenvalue, over its modulus, that counts as zero.
-const UNDAMPED: f64 = 1e-6;
 
 /// One point of a backbone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackbonePoint {
-    /// Amplitude of the fundamental where the mode moves most, in m.
+    /// Amplitude of the fundamental at the degree of freedom with the largest motion, in m.
     pub amplitude: f64,
     /// Frequency of the free vibration, in rad/s.
     pub omega: f64,
@@ -41,14 +21,15 @@ pub struct BackbonePoint {
 }
 
 impl UncertainNonlinearSystem {
-    /// The backbone of a mode: its frequency without damping at each amplitude (m, rising; of the
-    /// fundamental, at the degree of freedom where the mode of small amplitudes moves most), with the
-    /// standard error that the covariance gives it (delta method).
+    /// Computes the backbone of a mode: its frequency without damping at each amplitude (m,
+    /// ascending), with the standard error from the covariance (delta method). The amplitude is
+    /// that of the fundamental, at the degree of freedom with the largest motion in the linear
+    /// mode.
     ///
-    /// Modes are counted from 0 by rising frequency, those of M and K alone. The motion is a Fourier
-    /// series of a mean and nine harmonics in balance with the forces; what the terms make of
-    /// velocities is left out with the damping. The list ends early where no such motion was found:
-    /// a spring that softens may have none.
+    /// Modes are counted from 0 in ascending order of frequency, those of M and K. The motion is a
+    /// Fourier series of a mean and nine harmonics in balance with the forces; terms of the
+    /// velocities are omitted together with the damping. The list ends early if no such motion was
+    /// found: a softening spring may have none.
     ///
     /// # Errors
     /// [`ModelError::NoSuchMode`] if fewer modes oscillate without damping,
@@ -106,7 +87,7 @@ impl UncertainNonlinearSystem {
         let covariance = self.covariance();
         let mut slopes = DVector::zeros(self.parameters().len());
         for (at, parameter) in self.parameters().iter().enumerate() {
-            let step = STEP * covariance[(at, at)].sqrt();
+            let step = limits::PARAMETER_STEP * covariance[(at, at)].sqrt();
             if step > 0.0 {
                 let [above, below] = [
                     self.system().changed(*parameter, step)?,
@@ -130,7 +111,7 @@ struct Motion {
     omega: f64,
 }
 
-/// The mode of M and K as a motion of 1 m at the degree of freedom where it moves most.
+/// The mode of M and K as a motion of 1 m at the degree of freedom with the largest motion.
 fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), ModelError> {
     let linear = system.linear();
     let none = DMatrix::zeros(linear.dof(), linear.dof());
@@ -138,13 +119,13 @@ fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), Model
     let modes = undamped.modes()?;
     let oscillating: Vec<_> = modes
         .iter()
-        .filter(|mode| mode.oscillates() && mode.damping_ratio().abs() < UNDAMPED)
+        .filter(|mode| mode.oscillates() && mode.damping_ratio().abs() < limits::UNDAMPED)
         .collect();
     let mode = oscillating
         .get(mode)
         .ok_or(ModelError::NoSuchMode { mode: mode + 1, modes: oscillating.len() })?;
     let dof = mode.shape().icamax();
-    let mut cosines = DMatrix::zeros(linear.dof(), HARMONICS + 1);
+    let mut cosines = DMatrix::zeros(linear.dof(), limits::HARMONICS + 1);
     cosines.set_column(1, &mode.shape().map(|entry| (entry / mode.shape()[dof]).re));
     Ok((Motion { cosines, omega: mode.damped_frequency() }, dof))
 }
@@ -158,9 +139,9 @@ struct Balance<'a> {
 
 impl<'a> Balance<'a> {
     fn new(system: &'a NonlinearSystem) -> Self {
-        let tau = TAU / INSTANTS as f64;
-        let wave = |s: usize, h: usize| (((s * h) % INSTANTS) as f64 * tau).cos();
-        Self { system, waves: DMatrix::from_fn(INSTANTS, HARMONICS + 1, wave) }
+        let tau = TAU / limits::INSTANTS as f64;
+        let wave = |s: usize, h: usize| (((s * h) % limits::INSTANTS) as f64 * tau).cos();
+        Self { system, waves: DMatrix::from_fn(limits::INSTANTS, limits::HARMONICS + 1, wave) }
     }
 
     /// The motion of another amplitude that continues one of this; `None` if none is found.
@@ -171,7 +152,7 @@ impl<'a> Balance<'a> {
         [mut reached, amplitude]: [f64; 2],
     ) -> Option<Motion> {
         let (mut at, mut next) = (from.clone(), amplitude);
-        for _ in 0..ATTEMPTS {
+        for _ in 0..limits::BACKBONE_ATTEMPTS {
             let mut guess = at.clone();
             guess.cosines *= next / at.cosines[(dof, 1)];
             match self.solve(guess, dof, next) {
@@ -185,7 +166,7 @@ impl<'a> Balance<'a> {
 
     /// Newton's method from a guess.
     fn solve(&self, mut motion: Motion, dof: usize, amplitude: f64) -> Option<Motion> {
-        for _ in 0..STEPS {
+        for _ in 0..limits::BACKBONE_NEWTON_STEPS {
             let forces = self.forces(&motion);
             let residual = forces.push(motion.cosines[(dof, 1)] - amplitude);
             let step = self.jacobian(&motion, dof).lu().solve(&residual)?;
@@ -200,16 +181,15 @@ impl<'a> Balance<'a> {
             if !(motion.omega > 0.0 && motion.omega.is_finite()) {
                 return None;
             }
-            let small = cosines.amax() <= SETTLED * amplitude;
-            if small && step[last].abs() <= SETTLED * motion.omega {
+            let small = cosines.amax() <= limits::BACKBONE_STEP * amplitude;
+            if small && step[last].abs() <= limits::BACKBONE_STEP * motion.omega {
                 return Some(motion);
             }
         }
         None
     }
 
-    /// (K − h²ω²M) a_h and the h-th harmonic of the terms, for every h, in N: all of which are to
-    /// vanish.
+    /// Residuals (K − h²ω²M) a_h plus the h-th harmonic of the terms, for every h, in N.
     fn forces(&self, motion: &Motion) -> DVector<f64> {
         let linear = self.system.linear();
         let mut forces = linear.stiffness() * &motion.cosines;
@@ -220,7 +200,7 @@ impl<'a> Balance<'a> {
         let course = &self.waves * motion.cosines.transpose();
         for (term, coefficient) in self.system.terms().iter().zip(self.system.coefficients()) {
             let at = term.coordinate();
-            let force = DVector::from_fn(INSTANTS, |s, _| {
+            let force = DVector::from_fn(limits::INSTANTS, |s, _| {
                 let q = at.of(&course.row(s).iter().copied().collect::<Vec<_>>());
                 coefficient * term.law().value(q, 0.0)
             });
@@ -233,13 +213,14 @@ impl<'a> Balance<'a> {
         DVector::from_column_slice(forces.as_slice())
     }
 
-    /// Derivatives of the forces and of the amplitude by the harmonics and the frequency.
+    /// Derivatives of the forces and of the amplitude with respect to the harmonics and the
+    /// frequency.
     fn jacobian(&self, motion: &Motion, dof: usize) -> DMatrix<f64> {
         let (n, linear) = (self.system.dof(), self.system.linear());
-        let last = n * (HARMONICS + 1);
+        let last = n * (limits::HARMONICS + 1);
         let mut jacobian = DMatrix::zeros(last + 1, last + 1);
         let inertia = linear.mass() * &motion.cosines;
-        for h in 0..=HARMONICS {
+        for h in 0..=limits::HARMONICS {
             let multiple = h as f64;
             let block = linear.stiffness() - linear.mass() * (multiple * motion.omega).powi(2);
             jacobian.view_mut((h * n, h * n), (n, n)).copy_from(&block);
@@ -255,8 +236,9 @@ impl<'a> Balance<'a> {
                 row *= coefficient * term.law().slopes(q, 0.0)[0];
             }
             let harmonics = self.waves.tr_mul(&bent);
-            for ((h, l), slope) in
-                (0..=HARMONICS).flat_map(|l| (0..=HARMONICS).map(move |h| (h, l))).zip(&harmonics)
+            for ((h, l), slope) in (0..=limits::HARMONICS)
+                .flat_map(|l| (0..=limits::HARMONICS).map(move |h| (h, l)))
+                .zip(&harmonics)
             {
                 for (row, sign) in at.signs() {
                     for (column, other) in at.signs() {
@@ -270,9 +252,9 @@ impl<'a> Balance<'a> {
     }
 }
 
-/// Factor of a sum over the instants in the harmonic.
+/// Weight of each instant in the harmonic.
 fn share(harmonic: usize) -> f64 {
-    if harmonic == 0 { 1.0 / INSTANTS as f64 } else { 2.0 / INSTANTS as f64 }
+    if harmonic == 0 { 1.0 / limits::INSTANTS as f64 } else { 2.0 / limits::INSTANTS as f64 }
 }
 
 #[cfg(test)]

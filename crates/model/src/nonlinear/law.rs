@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use crate::ModelError;
 use crate::error::require;
+use crate::limits;
 
-/// Force per unit of its coefficient, as a function of a displacement q (m) and its velocity q̇ (m/s).
+/// Force per unit of its coefficient, as a function of a displacement q (m) and its velocity q̇
+/// (m/s).
 ///
-/// The coefficient of a law is a parameter of the system; constants inside the law, which the force
-/// does not depend on linearly, are [`Law::constants`].
+/// The coefficient of a law is a parameter of the system; [`Law::constants`] are constants inside
+/// the law, on which the force depends nonlinearly.
 pub trait Law: fmt::Debug + Send + Sync {
     /// f(q, q̇), in powers of m and m/s: see [`Law::dimension`].
     fn value(&self, q: f64, v: f64) -> f64;
@@ -20,7 +22,7 @@ pub trait Law: fmt::Debug + Send + Sync {
     /// Powers of metre and second in the unit of f: \[1, −1\] for a velocity.
     fn dimension(&self) -> [i32; 2];
 
-    /// The law as it is written and parsed, with these names for q and q̇.
+    /// Returns the law in the syntax of the parser, with these names for q and q̇.
     fn expression(&self, q: &str, v: &str) -> String;
 
     /// Constants inside the law, with name, unit and value; none for most laws.
@@ -28,8 +30,8 @@ pub trait Law: fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Returns the same law with other constants, one for each of [`Law::constants`] and in its unit; `None`
-    /// where they are out of range.
+    /// Returns the same law with other constants, one for each of [`Law::constants`] and in its
+    /// unit; `None` if they are out of range.
     fn with_constants(&self, _values: &[f64]) -> Option<Arc<dyn Law>> {
         None
     }
@@ -59,19 +61,17 @@ pub struct Power {
     velocity: u32,
 }
 
-/// Highest exponent of a [`Power`] law.
-const HIGHEST: u32 = 9;
-
 impl Power {
     /// q^`displacement` · q̇^`velocity`.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] for an exponent above 9 or a linear law, which is an entry of K or C.
+    /// [`ModelError::Parameter`] for an exponent above 9 or a linear law, which is an entry of K or
+    /// C.
     pub fn new(displacement: u32, velocity: u32) -> Result<Self, ModelError> {
         for (name, exponent) in
             [("exponent of the displacement", displacement), ("exponent of the velocity", velocity)]
         {
-            require(name, f64::from(exponent), "at most 9", exponent <= HIGHEST)?;
+            require(name, f64::from(exponent), "at most 9", exponent <= limits::HIGHEST_EXPONENT)?;
         }
         let degree = displacement + velocity;
         let requirement = "0 or at least 2 (a linear force is an entry of K or C)";
@@ -182,8 +182,8 @@ impl Law for SaturatingDamping {
     }
 }
 
-/// A stop with clearance on either side, then a spring: gap(q, a) is q − a beyond a, q + a below −a and zero
-/// between; its coefficient is the stiffness of the spring.
+/// A stop with clearance on either side, then a spring: gap(q, a) is q − a beyond a, q + a below −a
+/// and zero between; its coefficient is the stiffness of the spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     clearance: f64,
@@ -227,8 +227,8 @@ impl Law for Gap {
     }
 }
 
-/// tanh(q̇/b): Coulomb friction that is regularised, whose coefficient is the force of sliding; below the
-/// velocity b it creeps where dry friction sticks.
+/// tanh(q̇/b): Coulomb friction that is regularised, whose coefficient is the force of sliding;
+/// below the velocity b it creeps where dry friction sticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     velocity: f64,

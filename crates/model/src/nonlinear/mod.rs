@@ -49,7 +49,7 @@ pub struct NonlinearSystem {
 }
 
 impl NonlinearSystem {
-    /// A linear system with terms and their coefficients, one for each, in its unit.
+    /// Creates a linear system with terms and their coefficients, each in its own unit.
     ///
     /// # Errors
     /// [`ModelError::Term`] if a term does not belong to the system,
@@ -74,7 +74,7 @@ impl NonlinearSystem {
         &self.terms
     }
 
-    /// Coefficients of the terms, one for each, in its unit.
+    /// Coefficients of the terms, each in its own unit.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
@@ -84,8 +84,8 @@ impl NonlinearSystem {
         self.linear.dof()
     }
 
-    /// C ẋ + K x + Σ θ f(q, q̇), in N, of displacements (m) and velocities (m/s); all with one entry
-    /// per degree of freedom.
+    /// C ẋ + K x + Σ θ f(q, q̇), in N, of displacements (m) and velocities (m/s); all with one
+    /// entry per degree of freedom.
     ///
     /// # Panics
     /// If one of the three has another length.

@@ -14,10 +14,10 @@ type Factor = (Coordinate, Arc<dyn Law>);
 impl FromStr for Terms {
     type Err = ModelError;
 
-    /// Terms such as `k2: x1^2, c2: |v1| v1`; none from an empty text.
+    /// Parses terms such as `k2: x1^2, c2: |v1| v1`; an empty text has none.
     ///
     /// # Errors
-    /// [`ModelError::Term`] for what is no term, [`ModelError::RepeatedTerm`].
+    /// [`ModelError::Term`] for a text that is not a term, [`ModelError::RepeatedTerm`].
     fn from_str(text: &str) -> Result<Self, ModelError> {
         match text.trim() {
             "" => Ok(Self::none()),
@@ -26,7 +26,7 @@ impl FromStr for Terms {
     }
 }
 
-/// The parts of `text` between commas that stand outside parentheses.
+/// Splits `text` at the commas outside parentheses.
 fn apart(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0_usize;
     text.split(move |c| {
@@ -50,7 +50,7 @@ impl TryFrom<String> for Terms {
 impl FromStr for Term {
     type Err = ModelError;
 
-    /// A term such as `k3: x1^3`.
+    /// Parses a term such as `k3: x1^3`.
     ///
     /// # Errors
     /// [`ModelError::Term`].
@@ -60,7 +60,7 @@ impl FromStr for Term {
             refused("a term is written `name: expression`, such as `k3: x1^3`".to_owned())
         })?;
         let (coordinate, law) = Parser::new(expression).law().map_err(refused)?;
-        Self::of(name.trim().to_owned(), coordinate, law)
+        Self::from_parts(name.trim().to_owned(), coordinate, law)
     }
 }
 
@@ -112,10 +112,10 @@ impl Parser {
         Ok((coordinate, law))
     }
 
-    /// `gap(x1, 0.001)` or `tanh(v1/0.01)`; nothing if the text begins otherwise.
+    /// Parses `gap(x1, 0.001)` or `tanh(v1/0.01)`; returns `None` if the text begins otherwise.
     fn function(&mut self) -> Result<Option<Factor>, String> {
         let named = |error: ModelError| error.to_string();
-        let found: Factor = if self.take_word("gap(") {
+        let factor: Factor = if self.take_word("gap(") {
             let (coordinate, clearance) =
                 self.argument('x', ',').ok_or("a gap is written gap(x1, 0.001)")?;
             (coordinate, Arc::new(Gap::new(number(&clearance)?).map_err(named)?))
@@ -127,13 +127,13 @@ impl Parser {
             return Ok(None);
         };
         match self.peek() {
-            None => Ok(Some(found)),
+            None => Ok(Some(factor)),
             Some(c) => Err(format!("unexpected {c} after the expression")),
         }
     }
 
-    /// A displacement or velocity, whichever `letter` says, and the text between the sign after it and the
-    /// parenthesis that closes.
+    /// Parses the argument of a function: a displacement or velocity (as `letter` says), a
+    /// separator and the text up to the closing parenthesis.
     fn argument(&mut self, letter: char, sign: char) -> Option<(Coordinate, String)> {
         let (found, coordinate) = self.variable().ok()?;
         if found != letter || !self.take(sign) {
@@ -193,9 +193,10 @@ impl Parser {
         self.expect('-')?;
         let (other, second) = self.single()?;
         self.expect(')')?;
-        match letter == other {
-            true => Ok((letter, Coordinate::Difference(first, second))),
-            false => Err("a difference is of two displacements or of two velocities".to_owned()),
+        if letter == other {
+            Ok((letter, Coordinate::Difference(first, second)))
+        } else {
+            Err("a difference is of two displacements or of two velocities".to_owned())
         }
     }
 
@@ -254,9 +255,10 @@ impl Parser {
 
     fn expect(&mut self, expected: char) -> Result<(), String> {
         let next = self.peek();
-        match self.take(expected) {
-            true => Ok(()),
-            false => Err(format!("expected {expected}, found {}", shown(next))),
+        if self.take(expected) {
+            Ok(())
+        } else {
+            Err(format!("expected {expected}, found {}", shown(next)))
         }
     }
 }

@@ -6,13 +6,12 @@ use std::sync::Arc;
 use super::Law;
 use crate::{ModelError, Parameter};
 
-/// The displacement that a force law depends on, and the degrees of freedom that the force acts on;
-/// counted from 0.
+/// The displacement of a force law, and the degrees of freedom of its force, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Coordinate {
     /// x_i: between a degree of freedom and the ground.
     Dof(usize),
-    /// x_i − x_j: between two degrees of freedom; the force stands in equation i, its reaction in
+    /// x_i − x_j: between two degrees of freedom; the force is in equation i, its reaction in
     /// equation j.
     Difference(usize, usize),
 }
@@ -66,7 +65,7 @@ impl Coordinate {
 
 /// θ f(q, q̇): a named coefficient θ, a [`Law`] f, and the [`Coordinate`] q.
 ///
-/// Two terms are equal if they are written alike.
+/// Two terms are equal if their expressions are.
 #[derive(Debug, Clone)]
 pub struct Term {
     name: String,
@@ -85,10 +84,10 @@ impl Term {
         coordinate: Coordinate,
         law: impl Law + 'static,
     ) -> Result<Self, ModelError> {
-        Self::of(name.into(), coordinate, Arc::new(law))
+        Self::from_parts(name.into(), coordinate, Arc::new(law))
     }
 
-    pub(super) fn of(
+    pub(super) fn from_parts(
         name: String,
         coordinate: Coordinate,
         law: Arc<dyn Law>,
@@ -117,13 +116,13 @@ impl Term {
         self.coordinate
     }
 
-    /// Returns the law by which the force depends on displacement and velocity.
+    /// Returns the law of displacement and velocity.
     pub fn law(&self) -> &dyn Law {
         &*self.law
     }
 
     /// Returns the same term with other constants in its law, in their units, one for each of
-    /// [`Law::constants`]; `None` where they are out of range.
+    /// [`Law::constants`]; `None` if they are out of range.
     pub fn with_constants(&self, values: &[f64]) -> Option<Self> {
         Some(Self { law: self.law.with_constants(values)?, ..self.clone() })
     }
@@ -153,15 +152,12 @@ impl Term {
             .filter(|(exponent, _)| *exponent > 0)
             .map(|(exponent, letter)| power(letter, *exponent))
             .collect();
-        match below.is_empty() {
-            true => format!("N{above}"),
-            false => format!("N{above}/{}", below.join("/")),
-        }
+        if below.is_empty() { format!("N{above}") } else { format!("N{above}/{}", below.join("/")) }
     }
 }
 
 impl fmt::Display for Term {
-    /// `k3: x1^3`, as it is parsed.
+    /// Writes the term in the syntax of the parser, such as `k3: x1^3`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [q, v] = self.coordinate.names();
         write!(f, "{}: {}", self.name, self.law.expression(&q, &v))
@@ -188,9 +184,10 @@ impl PartialEq for Term {
 /// ```
 ///
 /// A term is written `name: expression`, terms are separated by commas. An expression is a product
-/// of powers of `x1` and `v1` (displacement and velocity of degree of freedom 1; `x` and `v` mean the
-/// same) or of `(x1-x2)` and `(v1-v2)`; `|v1| v1`; or, with numbers for a and b, `v1^3/(1 + (v1/b)^2)`, a stop
-/// `gap(x1, a)` with the clearance a on either side, or friction `tanh(v1/b)`.
+/// of powers of `x1` and `v1` (displacement and velocity of degree of freedom 1; `x` and `v` mean
+/// the same) or of `(x1-x2)` and `(v1-v2)`; `|v1| v1`; or, with numbers for a and b,
+/// `v1^3/(1 + (v1/b)^2)`, a stop `gap(x1, a)` with the clearance a on either side, or friction
+/// `tanh(v1/b)`.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
@@ -235,9 +232,9 @@ impl Terms {
     /// # Errors
     /// [`ModelError::RepeatedTerm`] if its name is taken.
     pub fn and(&self, term: Term) -> Result<Self, ModelError> {
-        let mut all = self.0.clone();
-        all.push(term);
-        Self::new(all)
+        let mut terms = self.0.clone();
+        terms.push(term);
+        Self::new(terms)
     }
 
     /// Checks that the terms belong to a system of `dof` degrees of freedom.

@@ -23,10 +23,11 @@ pub enum NonlinearParameter {
 }
 
 impl NonlinearParameter {
-    /// Parameter of this name: `k12`, the name of a term, or `c3.b` for the constant b inside a term.
+    /// Parameter of this name: `k12`, the name of a term, or `c3.b` for the constant b inside a
+    /// term.
     ///
     /// # Errors
-    /// [`ModelError::NoSuchParameter`] if the name is none of theirs.
+    /// [`ModelError::NoSuchParameter`] if the system has no parameter of this name.
     pub fn named(name: &str, system: &NonlinearSystem) -> Result<Self, ModelError> {
         for (at, term) in system.terms().iter().enumerate() {
             if term.name() == name {
@@ -44,7 +45,7 @@ impl NonlinearParameter {
         Parameter::named(name, system.dof()).map(Self::Entry)
     }
 
-    /// Name of the parameter in a system of these terms.
+    /// Returns the name of the parameter in a system with these terms.
     ///
     /// # Panics
     /// If there is no such term or constant.
@@ -61,7 +62,7 @@ impl NonlinearParameter {
 }
 
 impl NonlinearSystem {
-    /// The same system with one parameter larger by `by`, in the unit of the parameter.
+    /// Returns the same system with one parameter larger by `by`, in the unit of the parameter.
     ///
     /// # Errors
     /// [`ModelError`] if there is no such system: a singular M, or a constant out of range.
@@ -95,8 +96,7 @@ impl NonlinearSystem {
     }
 }
 
-/// A nonlinear system, those of its parameters that are uncertain, and their covariance; all others
-/// are known.
+/// A nonlinear system with some uncertain parameters, and their covariance; all others are known.
 ///
 /// ```
 /// use mechid_model::{NonlinearParameter, NonlinearSystem, Sdof, UncertainNonlinearSystem};
@@ -138,7 +138,7 @@ impl UncertainNonlinearSystem {
         Ok(Self { system, parameters, covariance })
     }
 
-    /// A system of which every parameter is known.
+    /// Creates a system with known parameters only.
     pub fn exact(system: NonlinearSystem) -> Self {
         Self { system, parameters: Vec::new(), covariance: DMatrix::zeros(0, 0) }
     }

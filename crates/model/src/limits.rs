@@ -1,0 +1,52 @@
+//! Limits of this crate: the numbers that decide how long to iterate, when to stop and what counts
+//! as rounding.
+
+// Modes
+
+/// Relative difference below which eigenvalues are one multiple eigenvalue: about √ε, the rounding
+/// of a defective pair.
+pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-7;
+
+/// Distance of the shift of inverse iteration from the eigenvalue, in units of its rounding. It
+/// exceeds the coupling of equal eigenvalues by rounding, so that each start gives its own
+/// direction.
+pub(crate) const INVERSE_ITERATION_SHIFT: f64 = 100.0;
+
+/// Number of steps of inverse iteration: the first reduces other modes to rounding, the second
+/// below it.
+pub(crate) const INVERSE_ITERATION_STEPS: usize = 2;
+
+/// Smallest independent part of a shape, relative to others of the same eigenvalue, that makes it
+/// a separate shape.
+pub(crate) const INDEPENDENT_SHAPE: f64 = 1e-3;
+
+/// Maximum number of degrees of freedom for which all singular values of M are computed; above it
+/// the largest and the smallest are estimated by iteration.
+pub(crate) const SINGULAR_VALUES_DOF: usize = 64;
+
+// Backbone
+
+/// Number of harmonics of the motion, in addition to its mean.
+pub(crate) const HARMONICS: usize = 9;
+
+/// Number of instants of a period: enough that the ninth power of nine harmonics, times one of
+/// them, does not alias.
+pub(crate) const INSTANTS: usize = 128;
+
+/// Maximum number of Newton steps to one amplitude.
+pub(crate) const BACKBONE_NEWTON_STEPS: usize = 30;
+
+/// Newton step, relative to amplitude and frequency, at which the iteration ends.
+pub(crate) const BACKBONE_STEP: f64 = 1e-11;
+
+/// Maximum number of attempts from one amplitude to the next; each failure halves the step.
+pub(crate) const BACKBONE_ATTEMPTS: usize = 16;
+
+/// Change of a parameter for a derivative, in standard errors.
+pub(crate) const PARAMETER_STEP: f64 = 0.1;
+
+/// Real part of an eigenvalue, over its modulus, below which it is undamped.
+pub(crate) const UNDAMPED: f64 = 1e-6;
+
+/// Highest exponent of a power law; the backbone resolves its harmonics up to it.
+pub(crate) const HIGHEST_EXPONENT: u32 = 9;
