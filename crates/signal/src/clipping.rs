@@ -1,6 +1,8 @@
-//! Channels that an amplifier or a converter has clipped.
+//! Clipping by an amplifier or a converter.
 
-/// Level at which a channel is clipped, as [`clipping`] finds it.
+use crate::limits;
+
+/// Level at which a channel is clipped, from [`clipping`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipping {
     /// Level at which the channel is clipped, in its unit.
@@ -9,27 +11,12 @@ pub struct Clipping {
     pub samples: usize,
 }
 
-/// Least length of a run of equal samples: the peak of a smooth signal makes shorter ones.
-const RUN: usize = 3;
-
-/// Least jump, in steps of the converter, at the end of a clipped run. A smooth peak that stays on one
-/// step for [`RUN`] samples has fallen by less than four steps one sample later; a clipped signal leaves
-/// its limit as fast as it changes.
-const STEEP: f64 = 6.0;
-
-/// A channel that is at one of its extremes for more than this fraction of the time is at rest there.
-const AT_REST: f64 = 0.5;
-
-/// A channel that, outside of its rest, is at its extremes for more than this fraction of the time is a
-/// two-level signal.
-const SWITCHED: f64 = 0.9;
-
-/// Returns the level at which a channel, in any unit, is clipped: its minimum or maximum, if runs of
-/// three or more samples have exactly that value and a run begins or ends with a jump. If both are, the
-/// level with more samples; `None` if the channel is not clipped.
+/// Returns the level at which a channel, in any unit, is clipped: its minimum or maximum, if runs
+/// of three or more samples have exactly that value and a run begins or ends with a jump. If both
+/// are, it is the level with more samples; `None` if the channel is not clipped.
 ///
 /// Peaks through a coarse converter, two-level signals (binary sequences, steps), values held for
-/// several samples, and a value at which the channel rests do not count as clipping.
+/// several samples, and a value at rest do not count as clipping.
 ///
 /// ```
 /// use mechid_signal::clipping;
@@ -47,11 +34,12 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
     let at = |level: f64| samples.iter().filter(|x| **x == level).count() as f64;
-    let all = samples.len() as f64;
-    let (rests, cut): (Vec<_>, Vec<_>) =
-        [(low, at(low)), (high, at(high))].into_iter().partition(|end| end.1 > AT_REST * all);
+    let count = samples.len() as f64;
+    let (rests, cut): (Vec<_>, Vec<_>) = [(low, at(low)), (high, at(high))]
+        .into_iter()
+        .partition(|end| end.1 > limits::REST_FRACTION * count);
     let time = |ends: &[(f64, f64)]| ends.iter().map(|end| end.1).sum::<f64>();
-    if time(&cut) > SWITCHED * (all - time(&rests)) {
+    if time(&cut) > limits::TWO_LEVEL_FRACTION * (count - time(&rests)) {
         return None;
     }
     let runs = steep_runs(samples);
@@ -66,22 +54,24 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
         .max_by_key(|cut| cut.samples)
 }
 
-/// Value and length of every run of equal samples that begins or ends with a jump.
+/// Returns value and length of every run of equal samples that begins or ends with a jump.
 fn steep_runs(samples: &[f64]) -> Vec<(f64, usize)> {
-    if !samples.chunk_by(|a, b| a == b).any(|run| run.len() >= RUN) {
+    if !samples.chunk_by(|a, b| a == b).any(|run| run.len() >= limits::CLIPPED_RUN) {
         return Vec::new();
     }
-    // No two levels of a converter are nearer than its step.
+    // The smallest difference of two values is a step of the converter.
     let mut levels = samples.to_vec();
     levels.sort_unstable_by(f64::total_cmp);
     let steps = levels.windows(2).map(|x| x[1] - x[0]).filter(|step| *step > 0.0);
-    let steep = STEEP * steps.fold(f64::INFINITY, f64::min);
+    let steep = limits::CLIPPED_JUMP * steps.fold(f64::INFINITY, f64::min);
     let (mut runs, mut first) = (Vec::new(), 0);
     for run in samples.chunk_by(|a, b| a == b) {
         let (value, end) = (run[0], first + run.len());
         let before = first.checked_sub(1).map(|k| samples[k]);
         let sides = [before, samples.get(end).copied()];
-        if run.len() >= RUN && sides.into_iter().flatten().any(|x| (x - value).abs() > steep) {
+        if run.len() >= limits::CLIPPED_RUN
+            && sides.into_iter().flatten().any(|x| (x - value).abs() > steep)
+        {
             runs.push((value, run.len()));
         }
         first = end;
@@ -95,8 +85,12 @@ mod tests {
 
     use super::*;
     use crate::excitation::Prbs;
-    use crate::noise::add_white;
-    use crate::{Multisine, NoiseLevel, Phases, Record, Sampling, lines};
+    use crate::lines;
+    use crate::multisine::Multisine;
+    use crate::noise::{NoiseLevel, add_white};
+    use crate::phases::Phases;
+    use crate::record::Record;
+    use crate::sampling::Sampling;
 
     fn multisine(seed: u64) -> Record {
         let flat = Multisine::flat(lines::odd(60), 1.0, Phases::Random { seed }).unwrap();
@@ -143,7 +137,7 @@ mod tests {
             for step in [1e-12, 0.001, 0.03, 0.3] {
                 assert_eq!(clipping(&converted(&x, step)), None, "seed {seed}, step {step}");
             }
-            // Held for eight samples.
+            // The signal is held for eight samples.
             let held: Vec<f64> = x.iter().flat_map(|x| [*x; 8]).collect();
             assert_eq!(clipping(&held), None, "seed {seed}");
         }
@@ -155,7 +149,7 @@ mod tests {
         let binary = Prbs::new(7, 2.0, 5).unwrap();
         let binary = binary.sample(Sampling::new(0.01, 127 * 5).unwrap()).unwrap();
         assert_eq!(clipping(binary.channel(0)), None);
-        // A blow, and rest.
+        // One blow, then rest.
         let blow = |k: usize| if k < 20 { (TAU * k as f64 / 40.0).sin() } else { 0.0 };
         assert_eq!(clipping(&(0..500).map(blow).collect::<Vec<_>>()), None);
         for few in [&[][..], &[1.0], &[2.0; 50]] {

@@ -1,80 +1,72 @@
-//! Excited lines of a periodic signal, told from its noise.
+//! Excited lines of a periodic signal, separated from its noise.
 
 use nalgebra::DMatrix;
 
-use crate::{Record, SignalError, Spectrum, lines};
+use crate::error::SignalError;
+use crate::limits;
+use crate::lines;
+use crate::record::Record;
+use crate::spectrum::Spectrum;
 
-/// Least amplitude of a driven line, as a fraction of the strongest one: far above rounding and
-/// quantisation, far below any line that is driven on purpose.
-const EXCITED: f64 = 1e-3;
-
-/// A signal whose strongest line is below this fraction of its peak value is constant: its spectrum
-/// shows rounding only.
-const ROUNDING: f64 = 1e-12;
-
-/// Probability that any undriven line of a record counts as driven.
-const LEVEL: f64 = 1e-3;
-
-/// Number of lines to either side whose scatter gives the noise level of a line.
-const NEIGHBOURS: usize = 16;
-
-/// Least number of lines that are the noise of a single period.
-const NOISE_LINES: usize = 16;
-
-/// Least ratio of the amplitudes of driven lines to those of the noise of a single period: noise itself
-/// has no such gap in its amplitudes.
-const GAP: f64 = 3.0;
-
-/// Returns the lines of consecutive periods of `period` samples, DC and Nyquist excluded, that at least
-/// one channel drives; none if no channel varies.
+/// Returns the lines of consecutive periods of `period` samples, without DC and Nyquist, that at
+/// least one channel drives; none if no channel varies.
 ///
-/// A driven line has at least a thousandth of the amplitude of the strongest one, and exceeds the noise:
+/// A driven line has at least a thousandth of the amplitude of the strongest one, and exceeds the
+/// noise:
 ///
-/// - In several periods the noise is the part that changes from one to the next. The periodic part is
-///   compared with the median scatter of the 33 lines around it by Fisher's test, at a level of 0.1 %
-///   for all lines of the record together.
+/// - In several periods the noise is the part that changes from one to the next. The periodic part
+///   is compared with the median scatter of the 33 lines around it by Fisher's test, at a level of
+///   0.1 % for all lines of the record together.
 /// - In a single period the noise is the weakest 16 lines or more, if there is a gap above them: a
 ///   factor of 3 in amplitude without any line.
 ///
-/// Where these lines hold less than half of the power of each channel, because the excitation is
-/// random or the period is another, all lines above a thousandth count.
+/// If these lines have less than half of the power of each channel, because the excitation is
+/// random or the period is wrong, all lines above a thousandth count.
 ///
 /// # Errors
-/// As [`Record::period_mean`].
+/// The errors of [`Record::period_mean`].
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, on periodic
 /// excitations: the scatter of the periods as the noise level of their mean.
 pub fn driven_lines(record: &Record, period: usize) -> Result<Vec<usize>, SignalError> {
     let mean = record.period_mean(period)?;
-    let all = lines::full(mean.sampling());
+    let lines_of_period = lines::full(mean.sampling());
     let spectrum = Spectrum::of(&mean);
-    let (mut above_floor, mut above_noise) = (vec![false; all.len()], vec![false; all.len()]);
+    let (mut above_floor, mut above_noise) =
+        (vec![false; lines_of_period.len()], vec![false; lines_of_period.len()]);
     let mut periodic = false;
     for channel in 0..record.channels() {
-        let amplitude: Vec<f64> = all.iter().map(|n| spectrum.line(*n, channel).norm()).collect();
+        let amplitude: Vec<f64> =
+            lines_of_period.iter().map(|n| spectrum.line(*n, channel).norm()).collect();
         let strongest = amplitude.iter().copied().fold(0.0, f64::max);
-        if strongest <= ROUNDING * mean.column(channel).amax() {
+        if strongest <= limits::CONSTANT_SIGNAL * mean.column(channel).amax() {
             continue;
         }
         let limits = match record.len() / period {
-            1 => vec![above_gap(&amplitude, EXCITED * strongest); amplitude.len()],
+            1 => {
+                vec![above_gap(&amplitude, limits::EXCITED_AMPLITUDE * strongest); amplitude.len()]
+            }
             count => above_scatter(&scatter(record, &mean, channel)?, count),
         };
         let mut power = 0.0;
         for (at, (a, limit)) in amplitude.iter().zip(limits).enumerate() {
-            let stands_out = *a >= limit.max(EXCITED * strongest);
-            above_floor[at] |= *a >= EXCITED * strongest;
+            let stands_out = *a >= limit.max(limits::EXCITED_AMPLITUDE * strongest);
+            above_floor[at] |= *a >= limits::EXCITED_AMPLITUDE * strongest;
             above_noise[at] |= stands_out;
             power += if stands_out { 0.5 * a * a } else { 0.0 };
         }
         periodic |= power >= 0.5 * record.column(channel).variance();
     }
     let chosen = if periodic { above_noise } else { above_floor };
-    Ok(all.into_iter().zip(chosen).filter_map(|(n, driven)| driven.then_some(n)).collect())
+    Ok(lines_of_period
+        .into_iter()
+        .zip(chosen)
+        .filter_map(|(n, driven)| driven.then_some(n))
+        .collect())
 }
 
-/// Variance of each line, DC and Nyquist apart, over the periods of one channel.
+/// Returns the variance of each line, without DC and Nyquist, over the periods of one channel.
 fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, SignalError> {
     let (period, count) = (mean.len(), record.len() / mean.len());
     let mut periods =
@@ -85,42 +77,49 @@ fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, S
     Ok(lines::full(mean.sampling()).iter().map(variance).collect())
 }
 
-/// Least amplitudes of driven lines in the mean over `count` periods of this scatter.
+/// Returns the smallest amplitudes of driven lines in the mean over `count` periods with this
+/// scatter.
 fn above_scatter(scatter: &[f64], count: usize) -> Vec<f64> {
     let noise = |at: usize| {
-        let around = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(scatter.len());
+        let around = at.saturating_sub(limits::NOISE_NEIGHBOURS)
+            ..(at + limits::NOISE_NEIGHBOURS + 1).min(scatter.len());
         let mut around = scatter[around].to_vec();
         let (width, middle) = (around.len(), around.len() / 2);
         let (_, median, _) = around.select_nth_unstable_by(middle, f64::total_cmp);
         // Wilson and Hilferty's median of a χ² variable of 2(count − 1) degrees of freedom.
         let share = (1.0 - 1.0 / (9.0 * (count - 1) as f64)).powi(3);
-        // A median is worth about half as many lines as a mean.
+        // A median has the precision of a mean of about half as many lines.
         let freedom = (width * (count - 1)) as f64;
-        *median / share * fisher(LEVEL / scatter.len() as f64, freedom) / count as f64
+        *median / share * fisher(limits::EXCITED_LEVEL / scatter.len() as f64, freedom)
+            / count as f64
     };
     (0..scatter.len()).map(|at| noise(at).sqrt()).collect()
 }
 
-/// Value that Fisher's F of 2 and `freedom` degrees of freedom exceeds with this probability; the
-/// distribution function is 1 − (1 + 2F/ν)^(−ν/2).
+/// Returns the value that Fisher's F of 2 and `freedom` degrees of freedom exceeds with this
+/// probability; the distribution function is 1 − (1 + 2F/ν)^(−ν/2).
 fn fisher(probability: f64, freedom: f64) -> f64 {
     0.5 * freedom * (probability.powf(-2.0 / freedom) - 1.0)
 }
 
-/// The amplitude above the gap over the noise of a single period, if it is not below `floor`; 0
-/// where there is no gap.
+/// Returns the amplitude above the gap over the noise of a single period, if it is not below
+/// `floor`; 0 without a gap.
 fn above_gap(amplitude: &[f64], floor: f64) -> f64 {
     let mut sorted = amplitude.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let mut above = sorted.windows(2).skip(NOISE_LINES - 1);
-    above.find(|pair| pair[1] >= floor && pair[1] > GAP * pair[0]).map_or(0.0, |pair| pair[1])
+    let mut above = sorted.windows(2).skip(limits::NOISE_LINES - 1);
+    above
+        .find(|pair| pair[1] >= floor && pair[1] > limits::NOISE_GAP * pair[0])
+        .map_or(0.0, |pair| pair[1])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::add_white;
-    use crate::{Multisine, NoiseLevel, Phases, Sampling};
+    use crate::multisine::Multisine;
+    use crate::noise::{NoiseLevel, add_white};
+    use crate::phases::Phases;
+    use crate::sampling::Sampling;
 
     const PERIOD: usize = 256;
 
@@ -152,8 +151,8 @@ mod tests {
         }
     }
 
-    /// Line 40 has a hundredth of the others: within noise of 1 % only its mean over many periods
-    /// stands out.
+    /// Line 40 has a hundredth of the others: in noise of 1 % only its mean over many periods is
+    /// significant.
     #[test]
     fn many_periods_bring_a_weak_line_out() {
         let sampling = Sampling::new(1.0 / 128.0, PERIOD).unwrap();
@@ -181,7 +180,7 @@ mod tests {
         let random = add_white(&zero, NoiseLevel::StandardDeviation(1.0), 3).unwrap();
         assert!(driven_lines(&random, PERIOD).unwrap().len() > 120);
         assert!(driven_lines(&random, 4 * PERIOD).unwrap().len() > 500);
-        // Nor does a multisine keep to its lines in windows of another length.
+        // The power of a multisine spreads over other lines in windows of another length.
         let record = noisy(&[4, 9, 16, 25, 36, 49, 64], 4, 0.01, 1);
         assert!(driven_lines(&record, 190).unwrap().len() > 80);
     }

@@ -1,10 +1,11 @@
 //! Errors of signals.
 
-use crate::{Sampling, message};
+use crate::message;
+use crate::sampling::Sampling;
 
 /// A signal that cannot be made or used; every variant carries the offending numbers.
 ///
-/// Fields count from 0, as indices do; messages count from 1, as people do.
+/// Fields count from 0, as indices; messages count from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalError {
@@ -17,7 +18,7 @@ pub enum SignalError {
     /// A record or period needs at least one sample.
     #[error("a record needs at least one sample")]
     Empty,
-    /// The data do not have as many samples as the sampling says.
+    /// The data have another number of samples than the sampling.
     #[error("channel {} has {} where the sampling has {expected}", channel.saturating_add(1), message::count(*got, "sample"))]
     Length {
         /// Channel, counted from 0.
@@ -70,10 +71,10 @@ pub enum SignalError {
     NoSuchChannel {
         /// Channel, counted from 0.
         channel: usize,
-        /// Channels there are.
+        /// Number of channels.
         channels: usize,
     },
-    /// The lines of a spectrum do not belong to its sampling.
+    /// The spectrum has another number of lines than its sampling.
     #[error("{} where the sampling has {expected}", message::count(*got, "line"))]
     SpectrumLength {
         /// Lines given.
@@ -89,17 +90,17 @@ pub enum SignalError {
         /// Channel, counted from 0.
         channel: usize,
     },
-    /// A window does not lie inside the record.
+    /// A window extends beyond the record.
     #[error("samples {} to {end} were requested, but the record has {len}", start.saturating_add(1))]
     Window {
-        /// First sample asked for, counted from 0.
+        /// First sample requested, counted from 0.
         start: usize,
-        /// Index after the last sample asked for.
+        /// Index after the last sample requested.
         end: usize,
         /// Number of samples in the record.
         len: usize,
     },
-    /// Two records that must share a time axis do not.
+    /// Two records have different time axes.
     #[error(
         "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", message::count(*left_len, "sample"),
         left_dt = message::number(*left_dt), right_dt = message::number(*right_dt)
@@ -117,7 +118,7 @@ pub enum SignalError {
     /// A multisine without lines.
     #[error("a multisine needs at least one line")]
     NoLines,
-    /// A line no multisine can have: DC, or beyond the highest line supported.
+    /// A line that is impossible for a multisine: DC, or above the highest line supported.
     #[error("line {line} is not between 1 and {highest}")]
     Line {
         /// The line given.
@@ -125,7 +126,7 @@ pub enum SignalError {
         /// The highest line allowed.
         highest: usize,
     },
-    /// Lines must be given in rising order, each once.
+    /// Lines are not in ascending order, or repeated.
     #[error("line {line} follows line {previous}: lines must rise, each given once")]
     LineOrder {
         /// The line before.
@@ -133,7 +134,7 @@ pub enum SignalError {
         /// The line given after it.
         line: usize,
     },
-    /// A list that must have one entry per line has another length.
+    /// A list does not have one entry per line.
     #[error("{} but {got} {what}", message::count(*lines, "line"))]
     PerLine {
         /// Name of the entries.
@@ -211,7 +212,7 @@ pub enum SignalError {
         /// Spacing of the lines, in Hz.
         spacing_hz: f64,
     },
-    /// A quantity lies outside the range it may have.
+    /// A quantity is out of range.
     #[error(
         "{what} must be between {low} and {high}, got {value}",
         value = message::number(*value), low = message::number(*low), high = message::number(*high)
@@ -226,10 +227,10 @@ pub enum SignalError {
         /// Maximum allowed, in the same unit.
         high: f64,
     },
-    /// Too few samples or lines for what was asked.
+    /// Too few samples or lines for the task.
     #[error("{what} needs at least {least}, got {got}")]
     TooFew {
-        /// Task, and the kind of thing it needs.
+        /// Task, and the kind of samples or lines it needs.
         what: &'static str,
         /// Number needed.
         least: usize,
@@ -250,7 +251,7 @@ pub enum SignalError {
         /// The order asked for.
         order: usize,
     },
-    /// A signal that is zero throughout has no crest factor, no signal-to-noise ratio, no band.
+    /// A signal of zeros has no crest factor, no signal-to-noise ratio, no band.
     #[error("channel {} is zero throughout", channel.saturating_add(1))]
     Silent {
         /// Channel, counted from 0.
@@ -312,17 +313,17 @@ pub(crate) fn finite(what: &'static str, value: f64) -> Result<f64, SignalError>
     Err(SignalError::Infinite { what, value })
 }
 
-/// An error if `channels` channels of `samples` samples cannot be allocated.
+/// Returns an error if `channels` channels of `samples` samples cannot be allocated.
 pub(crate) fn fits_in_memory(samples: usize, channels: usize) -> Result<(), SignalError> {
     let reserve = |len: usize| Vec::<f64>::new().try_reserve_exact(len).ok();
-    // Time alone must be countable where there is no channel.
+    // The instants alone must be countable without a channel.
     samples
         .checked_mul(channels.max(1))
         .and_then(reserve)
         .ok_or(SignalError::Memory { samples, channels })
 }
 
-/// An error unless `channel` is one of `channels`.
+/// Returns an error unless `channel` is one of `channels`.
 pub(crate) fn has_channel(channel: usize, channels: usize) -> Result<(), SignalError> {
     if channel < channels { Ok(()) } else { Err(SignalError::NoSuchChannel { channel, channels }) }
 }

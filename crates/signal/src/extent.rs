@@ -2,20 +2,20 @@
 
 use std::fmt;
 
-/// Extent of a sampled record: an open stretch of time or one whole period.
+/// Extent of a sampled record: an open record or one whole period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Extent {
-    /// The record begins and ends anywhere: N samples have N − 1 steps between them.
+    /// The record is open at both ends: N samples have N − 1 steps between them.
     Open,
-    /// Exactly one period in steady state: the first sample follows the last again, N samples have
-    /// N steps.
+    /// One whole period in steady state: the first sample follows the last again, N samples have N
+    /// steps.
     WholePeriod,
 }
 
 impl Extent {
-    /// Number of steps from one sample to the next in a record of `samples` samples.
+    /// Returns the number of steps between the samples of a record of `samples` samples.
     pub fn steps(self, samples: usize) -> usize {
         match self {
             Extent::Open => samples.saturating_sub(1),

@@ -23,8 +23,8 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 //!
-//! Sampled signals are [`Record`]s on a [`Sampling`]; their complex amplitudes are a [`Spectrum`], whose
-//! scaling is stated once, in [`spectrum`].
+//! Sampled signals are [`Record`]s on a [`Sampling`]; their complex amplitudes are a [`Spectrum`],
+//! whose scaling is defined once, in [`spectrum`].
 //!
 //! | Wanted | Where |
 //! |---|---|
@@ -53,6 +53,7 @@ pub mod excitation;
 mod extent;
 mod floor;
 mod hits;
+mod limits;
 pub mod lines;
 pub mod measures;
 pub mod message;

@@ -1,12 +1,13 @@
 //! Sets of lines a multisine may excite.
 //!
-//! Each function returns rising line numbers up to and including `last`; none of them contains
-//! DC. A set that comes out empty is refused by [`Multisine::new`](crate::Multisine::new).
+//! Each function returns ascending line numbers up to and including `last`; none of them contains
+//! DC. [`Multisine::new`](crate::Multisine::new) refuses an empty set.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{Sampling, SignalError};
+use crate::error::SignalError;
+use crate::sampling::Sampling;
 
 /// Every line 1, 2, 3, … `last`.
 pub fn all(last: usize) -> Vec<usize> {
@@ -18,13 +19,13 @@ pub fn full(sampling: Sampling) -> Vec<usize> {
     all((sampling.len() - 1) / 2)
 }
 
-/// Odd lines 1, 3, 5, …: the even ones show even non-linearities, the signal is half-wave
+/// Odd lines 1, 3, 5, …: the even lines detect even nonlinearities, and the signal is half-wave
 /// antisymmetric.
 pub fn odd(last: usize) -> Vec<usize> {
     (1..=last).step_by(2).collect()
 }
 
-/// Odd-odd lines 1, 5, 9, …: the odd lines between them show odd non-linearities.
+/// Odd-odd lines 1, 5, 9, …: the odd lines between them detect odd nonlinearities.
 pub fn odd_odd(last: usize) -> Vec<usize> {
     (1..=last).step_by(4).collect()
 }
@@ -32,14 +33,14 @@ pub fn odd_odd(last: usize) -> Vec<usize> {
 /// Special odd lines 1, 3, 9, 11, 17, 19, …: two of every four odd lines.
 ///
 /// # Source
-/// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on detection
-/// lines for non-linear distortions.
+/// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on detection lines
+/// for nonlinear distortions.
 pub fn special_odd(last: usize) -> Vec<usize> {
     odd(last).into_iter().filter(|n| matches!(n % 8, 1 | 3)).collect()
 }
 
-/// Odd lines with one left out at random of every `group` consecutive ones, as detection lines
-/// for odd non-linearities; `group` below 2 leaves none out.
+/// Odd lines without one at random of every `group` consecutive ones, as detection lines for odd
+/// nonlinearities; `group` below 2 omits none.
 ///
 /// # Source
 /// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on random
@@ -50,18 +51,18 @@ pub fn random_odd(last: usize, group: usize, seed: u64) -> Vec<usize> {
     if group < 2 {
         return lines;
     }
-    let mut kept = Vec::with_capacity(lines.len());
+    let mut remaining = Vec::with_capacity(lines.len());
     for chunk in lines.chunks(group) {
         let out = rng.random_range(0..group);
-        kept.extend(chunk.iter().enumerate().filter(|(k, _)| *k != out).map(|(_, n)| *n));
+        remaining.extend(chunk.iter().enumerate().filter(|(k, _)| *k != out).map(|(_, n)| *n));
     }
-    kept
+    remaining
 }
 
-/// The lines of a period that lie between two frequencies in Hz, ends included, DC excluded.
+/// Lines of a period between two frequencies in Hz, including the ends, without DC.
 pub fn band(sampling: Sampling, low_hz: f64, high_hz: f64) -> Vec<usize> {
     let spacing = sampling.line_spacing_hz();
-    // A line meant to lie on an end must not be lost to rounding.
+    // Rounding must not exclude a line at an end.
     let slack = 1e-9 * spacing;
     (1..(sampling.len() - 1) / 2 + 1)
         .filter(|n| {
@@ -71,7 +72,7 @@ pub fn band(sampling: Sampling, low_hz: f64, high_hz: f64) -> Vec<usize> {
         .collect()
 }
 
-/// Lines dealt out in turn to several inputs, so that one experiment tells the inputs apart.
+/// Lines distributed in turn to several inputs, so that one experiment separates the inputs.
 ///
 /// # Errors
 /// [`SignalError::TooFew`] if there are no inputs, or fewer lines than inputs.

@@ -1,4 +1,4 @@
-//! Numbers to choose an excitation by.
+//! Quantities to choose an excitation by.
 //!
 //! ```
 //! use mechid_signal::{Multisine, Phases, Sampling, Spectrum, measures};
@@ -15,9 +15,10 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 
-use crate::error::{has_channel, not_negative, within};
+use crate::error::{SignalError, has_channel, not_negative, within};
+use crate::record::Record;
+use crate::spectrum::Spectrum;
 use crate::transform::forward;
-use crate::{Record, SignalError, Spectrum};
 
 /// Root mean square, in the unit of the samples; 0 for no samples.
 ///
@@ -28,7 +29,7 @@ pub fn rms(samples: &[f64]) -> f64 {
     if peak == 0.0 {
         return 0.0;
     }
-    // Squares of large or small samples leave the range of numbers; scaling is exact.
+    // Squares of very large or small samples overflow; scaling is exact.
     let unit = power_of_two(peak);
     let sum: f64 = samples.iter().map(|x| (x / unit).powi(2)).sum();
     unit * (sum / samples.len() as f64).sqrt()
@@ -41,11 +42,11 @@ pub fn peak(samples: &[f64]) -> f64 {
 
 /// Peak over RMS of the samples, a pure number: 1 for a two-level signal, √2 for a sine.
 ///
-/// The samples alone are looked at; what a multisine does between them is in
-/// [`Multisine::crest_factor`](crate::Multisine::crest_factor).
+/// It uses only the samples; [`Multisine::crest_factor`](crate::Multisine::crest_factor) also
+/// covers the values between them.
 ///
 /// # Errors
-/// [`SignalError::Silent`] if the channel is zero throughout, [`SignalError::NoSuchChannel`].
+/// [`SignalError::Silent`] if the channel is zero, [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on the choice of
@@ -81,8 +82,8 @@ pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, Sign
     Ok(0.5 * range / (std::f64::consts::SQRT_2 * rms(&centred)))
 }
 
-/// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for each of the lags k = 0 … N − 1, in the squared
-/// unit of the samples; not finite where these squares leave the range of numbers.
+/// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for each lag k = 0 … N − 1, in the squared unit of
+/// the samples; not finite if these squares overflow.
 ///
 /// # Source
 /// Dissertation eq. (4.3.1) with cyclic indices.
@@ -90,13 +91,13 @@ pub fn circular_autocorrelation(x: &[f64]) -> Vec<f64> {
     correlate(x, x.len())
 }
 
-/// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for each of the lags k = 0 … N − 1, in the squared unit of
-/// the samples; not finite where these squares leave the range of numbers.
+/// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for each lag k = 0 … N − 1, in the squared unit of the
+/// samples; not finite if these squares overflow.
 ///
 /// # Source
-/// Dissertation eq. (4.3.1), the sum ending with the sequence.
+/// Dissertation eq. (4.3.1), with a sum that ends with the sequence.
 pub fn aperiodic_autocorrelation(x: &[f64]) -> Vec<f64> {
-    // Zeros behind the sequence keep its end from meeting its beginning.
+    // Zeros after the sequence separate its end from its beginning.
     correlate(x, fast_length(2 * x.len()))
 }
 
@@ -105,14 +106,14 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     if x.is_empty() {
         return Vec::new();
     }
-    // Squares of large or small samples leave the range of numbers; scaling is exact.
+    // Squares of very large or small samples overflow; scaling is exact.
     let unit = power_of_two(peak(x));
     let plan = forward(period);
     let (mut samples, mut lines) = (plan.make_input_vec(), plan.make_output_vec());
     let mut scratch = plan.make_scratch_vec();
     samples.iter_mut().zip(x).for_each(|(padded, x)| *padded = x / unit);
     plan.process_with_scratch(&mut samples, &mut lines, &mut scratch).expect("buffers of the plan");
-    // The power of all lines is real and even: its transform is that of the way back, too.
+    // The power of all lines is real and even, so that its forward and backward transforms agree.
     for (n, power) in samples.iter_mut().enumerate() {
         *power = lines[n.min(period - n)].norm_sqr();
     }
@@ -121,14 +122,15 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     (0..x.len()).map(|lag| scale * lines[lag.min(period - lag)].re * unit * unit).collect()
 }
 
-/// Smallest 2ⁿ, 3·2ⁿ or 9·2ⁿ that is even and not below `least`: transforms of such lengths are fast.
+/// Returns the smallest 2ⁿ, 3·2ⁿ or 9·2ⁿ that is even and at least `least`: transforms of such
+/// lengths are fast.
 fn fast_length(least: usize) -> usize {
     let lengths = [1, 3, 9].map(|odd| odd * least.div_ceil(odd).max(2).next_power_of_two());
     lengths.into_iter().fold(usize::MAX, usize::min)
 }
 
-/// Largest power of two that is not above a positive level, in the unit of the level; at least the smallest
-/// normal number. Samples divided by it are near 1, and no digit of them changes.
+/// Returns the largest power of two up to a positive level, in the unit of the level; at least the
+/// smallest normal number. Samples divided by it are near 1 and keep all digits.
 pub fn power_of_two(level: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     f64::from_bits(level.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
@@ -138,8 +140,8 @@ pub fn power_of_two(level: f64) -> f64 {
 /// if one is missing.
 ///
 /// # Errors
-/// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line the spectrum
-/// has not, [`SignalError::Silent`] if none of them carries power, [`SignalError::NoSuchChannel`].
+/// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line outside the
+/// spectrum, [`SignalError::Silent`] if none of them has power, [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Gray and Markel (1974), IEEE Trans. Acoustics, Speech, Signal Processing 22, 207–217.
@@ -162,15 +164,15 @@ pub fn spectral_flatness(
     if mean == 0.0 {
         return Err(SignalError::Silent { channel });
     }
-    // The logarithm of each share, not of a product that would underflow.
+    // The sum of logarithms avoids a product that would underflow.
     let log = power.iter().map(|p| (p / mean).ln()).sum::<f64>() / power.len() as f64;
     Ok(log.exp())
 }
 
-/// The order of persistent excitation of a periodic signal: how many parameters it can tell
-/// apart. Each line between DC and Nyquist counts twice, DC and Nyquist once.
+/// Order of persistent excitation of a periodic signal: the number of parameters it can identify.
+/// Each line between DC and Nyquist counts twice, DC and Nyquist once.
 ///
-/// Lines weaker than the part `floor` of the strongest count as absent.
+/// Lines below `floor` times the strongest do not count.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power,
@@ -205,7 +207,8 @@ pub struct Band {
     pub high_hz: f64,
 }
 
-/// Band from the first to the last line within `drop_db` (dB) of the strongest, DC excluded.
+/// Returns the band from the first to the last line within `drop_db` (dB) of the strongest, without
+/// DC.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the drop, [`SignalError::Silent`] for a signal without power
@@ -229,7 +232,7 @@ pub fn effective_band(
     Ok(Band { low_hz: hz(first), high_hz: hz(last) })
 }
 
-/// The largest amplitude of a channel, not zero.
+/// Returns the largest amplitude of a channel, which must not be zero.
 fn strongest(spectrum: &Spectrum, channel: usize) -> Result<f64, SignalError> {
     let amplitude = |n: usize| spectrum.line(n, channel).norm();
     match (0..spectrum.len()).map(amplitude).fold(0.0, f64::max) {

@@ -1,8 +1,8 @@
-//! Numbers, counts and places as sentences show them.
+//! Text of numbers, counts and ordinals in messages.
 
 use std::fmt;
 
-/// Displays a number, in any unit: in full where that is short, otherwise with an exponent, so that
+/// Displays a number, in any unit: in full if that is short, otherwise with an exponent, so that
 /// 10³⁰⁰ does not take three hundred digits.
 ///
 /// ```
@@ -15,8 +15,8 @@ pub fn number(value: f64) -> impl fmt::Display {
     Number(value)
 }
 
-/// Displays a number, in any unit, as [`number`] does, with a fixed number of decimals where that is in
-/// full.
+/// Displays a number, in any unit, as [`number`] does, with a fixed number of decimals if written
+/// in full.
 ///
 /// ```
 /// use mechid_signal::message;
@@ -28,7 +28,7 @@ pub fn number_to(value: f64, decimals: usize) -> impl fmt::Display {
     NumberTo(value, decimals)
 }
 
-/// Returns a number of things, with their plural for anything but one.
+/// Returns a count with its noun, in the plural unless the count is one.
 ///
 /// ```
 /// use mechid_signal::message;
@@ -48,7 +48,7 @@ pub fn count(count: usize, thing: &str) -> String {
     }
 }
 
-/// Returns the place in a row, counted from 1: `1st`, `2nd`, `3rd`, `4th`.
+/// Returns the ordinal, counted from 1: `1st`, `2nd`, `3rd`, `4th`.
 ///
 /// ```
 /// use mechid_signal::message;
@@ -66,7 +66,7 @@ pub fn ordinal(place: usize) -> String {
     format!("{place}{ending}")
 }
 
-/// Returns the first items of a list, and how many more there are.
+/// Returns the first items of a list, and the number of further ones.
 ///
 /// ```
 /// use mechid_signal::message;
@@ -95,9 +95,10 @@ struct NumberTo(f64, usize);
 impl fmt::Display for NumberTo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(value, decimals) = self;
-        match IN_FULL.contains(&value.abs()) || *value == 0.0 {
-            true => write!(f, "{value:.decimals$}"),
-            false => Number(*value).fmt(f),
+        if IN_FULL.contains(&value.abs()) || *value == 0.0 {
+            write!(f, "{value:.decimals$}")
+        } else {
+            Number(*value).fmt(f)
         }
     }
 }

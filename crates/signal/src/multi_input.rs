@@ -1,24 +1,26 @@
 //! Uncorrelated multisines for tests with several inputs.
 //!
-//! Two ways to keep the inputs apart:
+//! There are two ways to separate the inputs:
 //!
-//! - [`orthogonal`]: all inputs excite the same lines, and as many experiments as inputs are run
-//!   with phases that make the inputs orthogonal across them, line by line. Full power on every
-//!   line.
-//! - [`lines::interleaved`](crate::lines::interleaved): each input has lines of its own, and one
-//!   experiment is enough. A line is then excited by one input only.
+//! - [`orthogonal`]: all inputs excite the same lines in as many experiments as inputs, with phases
+//!   that make the inputs orthogonal across the experiments, line by line. Every line has full
+//!   power.
+//! - [`lines::interleaved`](crate::lines::interleaved): each input has its own lines, and one
+//!   experiment is enough. Each line is then excited by only one input.
 
 use std::f64::consts::{PI, TAU};
 
-use crate::{Multisine, Phases, SignalError};
+use crate::error::SignalError;
+use crate::multisine::Multisine;
+use crate::phases::Phases;
 
 /// The matrix that makes inputs orthogonal across experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mixing {
     /// exp(i 2π e k / n) for experiment e and input k: any number of inputs.
     Dft,
-    /// ±1, Sylvester's matrix: a power of two inputs. Only signs change, so the crest factor of
-    /// every input stays what it is.
+    /// ±1, Sylvester's matrix: a power of two inputs. Only signs change, so that every input keeps
+    /// its crest factor.
     Hadamard,
 }
 
@@ -32,7 +34,8 @@ impl Mixing {
     }
 }
 
-/// Returns as many experiments as inputs: element `[e][k]` is the signal of input `k` in experiment `e`.
+/// Returns as many experiments as inputs: element `[e][k]` is the signal of input `k` in experiment
+/// `e`.
 ///
 /// With U_ek the complex amplitude of a line, the inputs are orthogonal:
 ///
@@ -40,7 +43,7 @@ impl Mixing {
 /// Σ_e U_ej conj(U_ek) = n A_k² δ_jk
 /// ```
 ///
-/// Amplitudes are those given; give each input phases of its own (random, or of low crest factor
+/// The amplitudes are unchanged. Give each input its own phases (random, or of low crest factor
 /// from different seeds), so that the inputs do not peak together in the first experiment.
 ///
 /// # Errors
@@ -82,7 +85,8 @@ mod tests {
     use nalgebra::Complex;
 
     use super::*;
-    use crate::{Sampling, Spectrum};
+    use crate::sampling::Sampling;
+    use crate::spectrum::Spectrum;
 
     fn inputs(n: u64) -> Vec<Multisine> {
         let input = |k| Multisine::flat(1..=9, 1.0 + k as f64, Phases::Random { seed: k }).unwrap();

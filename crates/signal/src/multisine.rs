@@ -4,13 +4,15 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::error::{fits_in_memory, has_channel, not_negative, positive};
-use crate::phases::gcd;
-use crate::{Phases, Record, Sampling, SignalError, Spectrum};
+use crate::error::{SignalError, fits_in_memory, has_channel, not_negative, positive};
+use crate::phases::{Phases, gcd};
+use crate::record::Record;
+use crate::sampling::Sampling;
+use crate::spectrum::Spectrum;
 
 /// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
 ///
-/// The fundamental ω0 is not part of it: the same multisine serves every period.
+/// The fundamental ω0 is not part of it: the same multisine serves any period.
 ///
 /// ```
 /// use mechid_signal::{Multisine, Phases, Sampling, lines};
@@ -35,20 +37,21 @@ pub struct Multisine {
 }
 
 impl Multisine {
-    /// The highest line supported; it bounds the memory a crest factor may take.
+    /// Highest line supported, which limits the memory for a crest factor.
     pub const MAX_LINE: usize = 1 << 24;
 
-    /// Samples per Nyquist interval from which [`peak`](Self::peak) and
-    /// [`crest_factor`](Self::crest_factor) are found.
+    /// Number of samples per Nyquist interval for [`peak`](Self::peak) and
+    /// [`crest_factor`](Self::crest_factor).
     pub const OVERSAMPLING: usize = 16;
 
-    /// A multisine of the given lines (rising, from 1) and amplitudes (one per line).
+    /// Creates a multisine from lines (ascending, from 1) and amplitudes (one per line).
     ///
     /// # Errors
     /// [`SignalError::NoLines`], [`SignalError::Line`] for DC or a line above
     /// [`MAX_LINE`](Self::MAX_LINE), [`SignalError::LineOrder`], [`SignalError::PerLine`] if the
-    /// lists differ in length, [`SignalError::Negative`] for an amplitude below zero or not
-    /// finite or for amplitudes too large to be added up, [`SignalError::Infinite`] for a given phase that is not finite.
+    /// lists differ in length, [`SignalError::Negative`] for an amplitude below zero or not finite
+    /// or for amplitudes too large to be added up, [`SignalError::Infinite`] for a given phase that
+    /// is not finite.
     pub fn new(
         lines: Vec<usize>,
         amplitudes: Vec<f64>,
@@ -69,14 +72,14 @@ impl Multisine {
             return Err(SignalError::PerLine { what: "amplitudes", lines: count, got });
         }
         check_amplitudes(&amplitudes)?;
-        let phases = phases.of(&lines, &amplitudes)?;
+        let phases = phases.values(&lines, &amplitudes)?;
         Ok(Self { lines, amplitudes, phases })
     }
 
-    /// A multisine with the same amplitude on every line.
+    /// Creates a multisine with the same amplitude on every line.
     ///
     /// # Errors
-    /// As [`Multisine::new`].
+    /// The errors of [`Multisine::new`].
     pub fn flat(
         lines: impl IntoIterator<Item = usize>,
         amplitude: f64,
@@ -87,11 +90,11 @@ impl Multisine {
         Self::new(lines, amplitudes, phases)
     }
 
-    /// The multisine of a measured period: its lines between DC and Nyquist, exactly.
+    /// Creates the multisine of a measured period: its lines between DC and Nyquist, exactly.
     ///
     /// # Errors
-    /// As [`Multisine::new`]: a period of one or two samples has no such lines;
-    /// [`SignalError::NoSuchChannel`].
+    /// The errors of [`Multisine::new`], also for a period of one or two samples, which has no such
+    /// lines; [`SignalError::NoSuchChannel`].
     pub fn from_spectrum(spectrum: &Spectrum, channel: usize) -> Result<Self, SignalError> {
         has_channel(channel, spectrum.channels())?;
         let lines = crate::lines::full(spectrum.sampling());
@@ -100,7 +103,7 @@ impl Multisine {
         Self::new(lines, amplitudes, Phases::Given(phases))
     }
 
-    /// Lines of the multisine, rising.
+    /// Lines of the multisine, in ascending order.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
@@ -115,16 +118,16 @@ impl Multisine {
         &self.phases
     }
 
-    /// The same lines and amplitudes with other phases.
+    /// Returns the same lines and amplitudes with other phases.
     ///
     /// # Errors
     /// [`SignalError::PerLine`] or [`SignalError::Infinite`] for bad [`Phases::Given`].
     pub fn with_phases(mut self, phases: Phases) -> Result<Self, SignalError> {
-        self.phases = phases.of(&self.lines, &self.amplitudes)?;
+        self.phases = phases.values(&self.lines, &self.amplitudes)?;
         Ok(self)
     }
 
-    /// The same shape, scaled to an RMS value.
+    /// Returns the same shape, scaled to an RMS value.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for an impossible `rms`, [`SignalError::Silent`] if all
@@ -135,7 +138,7 @@ impl Multisine {
         self.scaled(rms, now)
     }
 
-    /// The same shape, scaled to a largest absolute value, as [`peak`](Self::peak) finds it.
+    /// Returns the same shape, scaled to a largest absolute value ([`peak`](Self::peak)).
     ///
     /// # Errors
     /// [`SignalError::Negative`] for an impossible `peak`, [`SignalError::Silent`] if all
@@ -153,15 +156,15 @@ impl Multisine {
         Ok(self)
     }
 
-    /// The exact value at `t` seconds for a fundamental of `omega0` rad/s.
+    /// Returns the exact value at `t` seconds for a fundamental of `omega0` rad/s.
     pub fn value(&self, t: f64, omega0: f64) -> f64 {
-        // Whole periods are taken off first: n·ω0·t would lose digits at large t.
+        // Whole periods are subtracted first: n·ω0·t would lose digits at large t.
         let turn = (omega0 * t / TAU).fract() * TAU;
         let terms = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
         terms.map(|((&n, a), phase)| a * (n as f64 * turn + phase).cos()).sum()
     }
 
-    /// One period: the lines stand at multiples of `sampling.omega0()`.
+    /// Samples one period, with lines at multiples of `sampling.omega0()`.
     ///
     /// # Errors
     /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate,
@@ -170,10 +173,10 @@ impl Multisine {
         self.spectrum(sampling)?.to_record()
     }
 
-    /// The complex amplitudes A_n exp(i φ_n) as the spectrum of one period.
+    /// Returns the complex amplitudes A_n exp(i φ_n) as the spectrum of one period.
     ///
     /// # Errors
-    /// As [`Multisine::sample`].
+    /// The errors of [`Multisine::sample`].
     pub fn spectrum(&self, sampling: Sampling) -> Result<Spectrum, SignalError> {
         let line = self.lines[self.lines.len() - 1];
         if 2 * line >= sampling.len() {
@@ -189,7 +192,7 @@ impl Multisine {
 
     /// Root mean square over a period, √(Σ A_n² / 2).
     pub fn rms(&self) -> f64 {
-        // Relative to the largest amplitude: squares of large or small ones leave the range.
+        // Amplitudes relative to the largest: squares of very large or small ones overflow.
         let largest = self.amplitudes.iter().fold(0.0_f64, |m, a| m.max(*a));
         if largest == 0.0 {
             return 0.0;
@@ -198,9 +201,9 @@ impl Multisine {
         largest * (0.5 * squares.sum::<f64>()).sqrt()
     }
 
-    /// Largest absolute value over a period, seen at
-    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times the Nyquist rate or more and between those
-    /// instants on the parabola through three of them.
+    /// Largest absolute value over a period, from samples at least
+    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times as dense as the Nyquist rate and parabolas
+    /// through three of them.
     pub fn peak(&self) -> f64 {
         let x = self.fine_period();
         let n = x.len();
@@ -218,9 +221,9 @@ impl Multisine {
         Ok(self.peak() / rms)
     }
 
-    /// One period on a fine grid.
+    /// Samples one period on a fine grid.
     fn fine_period(&self) -> Vec<f64> {
-        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3: look at the shortest period only.
+        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3: the shortest period is enough.
         let common = self.lines.iter().fold(0, |d, n| gcd(d, *n));
         let lines: Vec<usize> = self.lines.iter().map(|n| n / common).collect();
         let last = lines[lines.len() - 1];
@@ -233,20 +236,20 @@ impl Multisine {
     }
 }
 
-/// Amplitudes are finite and not negative, and so is every sum of them.
+/// Checks that amplitudes are finite and not negative, as are their sums.
 fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
     for a in amplitudes {
         not_negative("amplitude", *a)?;
     }
-    // Twice, for the sums within a transform.
+    // The factor of two covers the sums within a transform.
     not_negative("sum of all amplitudes", 2.0 * amplitudes.iter().sum::<f64>())?;
     Ok(())
 }
 
-/// Largest |value| near the middle one of three equidistant samples: the top of their parabola
-/// if the middle one stands out, the middle one itself otherwise.
+/// Returns the largest |value| near the middle one of three equidistant samples: the vertex of
+/// their parabola if the middle one is the largest, otherwise the middle one itself.
 fn parabola_top(before: f64, middle: f64, after: f64) -> f64 {
-    // Towards the top counted positive; no products, which could leave the range of numbers.
+    // The sign is positive towards the vertex; there are no products, which could overflow.
     let [b, m, a] = [before, middle, after].map(|v| v * middle.signum());
     let bend = b - 2.0 * m + a;
     if m < b || m < a || bend >= 0.0 {

@@ -1,15 +1,18 @@
 //! Seeded Gaussian noise, white or coloured, at a stated level.
 //!
-//! Each channel has its own stream of a ChaCha generator: the numbers depend on the seed, the
-//! channel and the sample only, not on what else is computed or on how many threads.
+//! Each channel has its own stream of a ChaCha generator: the numbers depend only on the seed, the
+//! channel and the sample, not on other computations or the number of threads.
 
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::error::{finite, fits_in_memory, not_negative, positive, within};
-use crate::{Record, Sampling, SignalError, Spectrum};
+use crate::error::{SignalError, finite, fits_in_memory, not_negative, positive, within};
+use crate::limits;
+use crate::record::Record;
+use crate::sampling::Sampling;
+use crate::spectrum::Spectrum;
 
 /// Level of a disturbance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +26,7 @@ pub enum NoiseLevel {
 }
 
 impl NoiseLevel {
-    /// Standard deviation at this level for a signal.
+    /// Returns the standard deviation at this level for a signal.
     fn deviation(self, record: &Record, channel: usize) -> Result<f64, SignalError> {
         let per_rms = match self {
             Self::StandardDeviation(std) => return not_negative("standard deviation", std),
@@ -56,7 +59,7 @@ pub enum Colour {
     },
 }
 
-/// White Gaussian noise of a given standard deviation, in the unit of the record to be made,
+/// Returns white Gaussian noise of a given standard deviation, in the unit of the record,
 /// independent between channels.
 ///
 /// # Errors
@@ -70,11 +73,11 @@ pub fn white(
     coloured(sampling, channels, standard_deviation, Colour::White, seed)
 }
 
-/// Gaussian noise of a given standard deviation, in the unit of the record to be made, and
-/// colour, independent between channels.
+/// Returns Gaussian noise of a given standard deviation, in the unit of the record, and colour,
+/// independent between channels.
 ///
-/// The deviation is that of the process: a single record scatters about it, the more the fewer
-/// independent values it holds.
+/// The deviation is that of the process; a single record scatters about it, more with fewer
+/// independent values.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the deviation, [`SignalError::Range`] for the exponent,
@@ -101,7 +104,7 @@ pub fn coloured(
     Record::new(sampling, data)
 }
 
-/// The record with white Gaussian noise added to every channel.
+/// Returns the record with white Gaussian noise added to every channel.
 ///
 /// ```
 /// use mechid_signal::{Multisine, NoiseLevel, Phases, Sampling, noise};
@@ -114,15 +117,15 @@ pub fn coloured(
 ///
 /// # Errors
 /// [`SignalError::Negative`] or [`SignalError::Infinite`] for an impossible level,
-/// [`SignalError::Silent`] if the level is relative to a channel that is zero throughout.
+/// [`SignalError::Silent`] if the level is relative to a channel of zeros.
 pub fn add_white(record: &Record, level: NoiseLevel, seed: u64) -> Result<Record, SignalError> {
     add(record, level, Colour::White, seed)
 }
 
-/// The record with Gaussian noise of a given colour added to every channel.
+/// Returns the record with Gaussian noise of a given colour added to every channel.
 ///
 /// # Errors
-/// As [`add_white`] and [`coloured`].
+/// The errors of [`add_white`] and [`coloured`].
 pub fn add(
     record: &Record,
     level: NoiseLevel,
@@ -137,17 +140,14 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// Largest exponent of a power law: beyond it a single line has all the power.
-const MOST_EXPONENT: f64 = 10.0;
-
-/// White noise shaped in frequency, from a period twice as long: noise does not close on itself
-/// at the ends of a record.
+/// White noise shaped in frequency, from a period twice as long: the ends of a record of noise do
+/// not match.
 fn power_law(
     sampling: Sampling,
     exponent: f64,
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<f64>, SignalError> {
-    within("exponent of the power law", exponent, -MOST_EXPONENT, MOST_EXPONENT)?;
+    within("exponent of the power law", exponent, -limits::NOISE_EXPONENT, limits::NOISE_EXPONENT)?;
     let twice = sampling.with_len(sampling.len().saturating_mul(2))?;
     let white = Record::from_channel(twice, white_channel(twice, 1.0, rng))?;
     let spectrum = Spectrum::of(&white);

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{SignalError, error::finite};
+use crate::error::{SignalError, finite};
 
 /// Choice of the phases φ_n of a multisine Σ A_n cos(n ω0 t + φ_n).
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +27,12 @@ pub enum Phases {
 }
 
 impl Phases {
-    /// One phase per line, in rad.
-    pub(crate) fn of(&self, lines: &[usize], amplitudes: &[f64]) -> Result<Vec<f64>, SignalError> {
+    /// Returns one phase per line, in rad.
+    pub(crate) fn values(
+        &self,
+        lines: &[usize],
+        amplitudes: &[f64],
+    ) -> Result<Vec<f64>, SignalError> {
         match self {
             Self::Schroeder => Ok(schroeder(lines, amplitudes)),
             Self::SchroederBinary => {
@@ -55,10 +59,10 @@ impl Phases {
 /// φ_n = φ_1 − 2π Σ_{l<n} (n − l) p_l ,   p_l = A_l² / Σ A²
 /// ```
 ///
-/// with φ_1 = 0 at the first line: the signal dwells on each line in proportion to its power,
-/// like a swept sine. Line numbers are counted from the first line in steps of the common
-/// spacing (2 for odd lines), because lines d apart repeat, up to sign, after 1/d of the period
-/// and the sweep is to fill that part once. For N flat lines φ_n = −π n (n − 1) / N.
+/// with φ_1 = 0 at the first line: the signal spends a time in proportion to its power on each
+/// line, like a swept sine. Line numbers are counted from the first line in steps of the common
+/// spacing d (2 for odd lines): such a signal repeats, up to sign, after 1/d of the period, and the
+/// sweep fills this part once. For N flat lines φ_n = −π n (n − 1) / N.
 ///
 /// # Source
 /// Schroeder (1970), *Synthesis of low-peak-factor signals and binary sequences with low
@@ -73,7 +77,7 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
     let mut phases = Vec::with_capacity(lines.len());
     for (&line, a) in lines.iter().zip(amplitudes) {
         if let Some(previous) = previous {
-            // Every step adds the power passed so far once more to Σ (n − l) p_l.
+            // Each step adds the power so far once more to Σ (n − l) p_l.
             phase += (line.abs_diff(previous) / step) as f64 * share;
         }
         phases.push(0.0 - TAU * phase.fract());
@@ -137,7 +141,7 @@ mod tests {
         let amplitudes: [f64; 6] = [1.0, 0.5, 2.0, 0.0, 3.0, 1.5];
         let power: Vec<f64> = amplitudes.iter().map(|a| a * a).collect();
         let expected = direct_schroeder(&power);
-        // A line of zero power inside the band is the same as a line left out.
+        // A line of zero power inside the band is equivalent to a missing line.
         let with_gap = schroeder(&[1, 2, 3, 5, 6], &[1.0, 0.5, 2.0, 3.0, 1.5]);
         let all = schroeder(&[1, 2, 3, 4, 5, 6], &amplitudes);
         assert!(all.iter().zip(&expected).all(|(a, b)| same_angle(*a, *b)));
@@ -161,12 +165,12 @@ mod tests {
         let lines: Vec<usize> = (1..=7).collect();
         let expected = [0.0, 0.0, 0.0, PI, PI, 0.0, PI];
         assert_eq!(schroeder_binary(&lines, 8), expected);
-        assert_eq!(Phases::SchroederBinary.of(&lines, &[1.0; 7]).unwrap(), expected);
+        assert_eq!(Phases::SchroederBinary.values(&lines, &[1.0; 7]).unwrap(), expected);
     }
 
     #[test]
     fn random_phases_repeat_with_their_seed_and_bad_lists_are_refused() {
-        let of = |p: Phases| p.of(&[1, 2, 5], &[1.0; 3]);
+        let of = |p: Phases| p.values(&[1, 2, 5], &[1.0; 3]);
         assert_eq!(of(Phases::Random { seed: 7 }), of(Phases::Random { seed: 7 }));
         assert_ne!(of(Phases::Random { seed: 7 }), of(Phases::Random { seed: 8 }));
         let short = of(Phases::Given(vec![0.0; 2]));

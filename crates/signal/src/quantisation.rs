@@ -1,17 +1,13 @@
-//! Steps in which a converter or printed digits give the values of a channel.
+//! Step of a converter or of printed digits in the values of a channel.
 
-/// Number of samples that are looked at.
-const SAMPLES: usize = 8192;
-/// Number of different values from which they are those of a converter, and not of a signal that takes few.
-const LEVELS: usize = 16;
-/// Deviation of the distance of two values from a whole number of steps, in steps: what printed digits leave.
-const DEVIATION: f64 = 0.05;
+use crate::limits;
 
-/// Step between the values of a channel, in its unit, if all of them lie whole numbers of steps apart; `None` of
-/// values that do not, of more than the samples could show, and of a signal that takes fewer than 16 of them.
+/// Returns the step between the values of a channel, in its unit, if all of them are whole numbers
+/// of steps apart. `None` for other values, for more levels than the samples could show, and for
+/// fewer than 16 values.
 ///
-/// Rounding to such steps is an error of step/√12 in the RMS, which is the same in every period of a signal without
-/// other noise.
+/// Rounding to such steps adds an error of step/√12 RMS, which is the same in every period of a
+/// signal without other noise.
 ///
 /// ```
 /// use mechid_signal::quantisation_step;
@@ -25,18 +21,19 @@ const DEVIATION: f64 = 0.05;
 /// # Source
 /// Widrow & Kollár, *Quantization Noise* (2008), for the error; the search is ours.
 pub fn quantisation_step(samples: &[f64]) -> Option<f64> {
-    let mut values = samples[..samples.len().min(SAMPLES)].to_vec();
+    let mut values = samples[..samples.len().min(limits::QUANTISATION_SAMPLES)].to_vec();
     if values.iter().any(|value| !value.is_finite()) {
         return None;
     }
     values.sort_unstable_by(f64::total_cmp);
     values.dedup();
-    if values.len() < LEVELS {
+    if values.len() < limits::QUANTISATION_LEVELS {
         return None;
     }
     let distances = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let smallest = distances().fold(f64::INFINITY, f64::min);
-    // The smallest distance has the error of two printed values; those of one step show their mean.
+    // The smallest distance has the rounding of two printed values; the mean of the distances of
+    // one step is more precise.
     let (sum, count) = distances()
         .filter(|distance| *distance < 1.5 * smallest)
         .fold((0.0, 0.0), |(sum, count), distance| (sum + distance, count + 1.0));
@@ -46,13 +43,14 @@ pub fn quantisation_step(samples: &[f64]) -> Option<f64> {
         let count = distance / step;
         (count - count.round()).abs()
     };
-    distances().all(|distance| off(distance) <= DEVIATION).then_some(step)
+    distances().all(|distance| off(distance) <= limits::QUANTISATION_DEVIATION).then_some(step)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Sampling, noise};
+    use crate::noise;
+    use crate::sampling::Sampling;
 
     fn white(samples: usize, seed: u64) -> Vec<f64> {
         let sampling = Sampling::new(0.001, samples).unwrap();

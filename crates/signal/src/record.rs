@@ -2,12 +2,13 @@
 
 use nalgebra::{DMatrix, DVectorView};
 
-use crate::error::fits_in_memory;
-use crate::{Sampling, SignalError};
+use crate::error::{SignalError, fits_in_memory};
+use crate::sampling::Sampling;
 
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
-/// Every value is finite: a record that exists can be computed with. Values are in any unit: whoever takes a record states which, and results in this crate keep it.
+/// Every value is finite, so that a record needs no further checks. Values are in any unit: each
+/// function that takes a record states it, and results of this crate have the same unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     sampling: Sampling,
@@ -15,7 +16,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// A record from a matrix of `sampling.len()` rows and one column per channel.
+    /// Creates a record from a matrix of `sampling.len()` rows and one column per channel.
     ///
     /// # Errors
     /// [`SignalError::Length`] if the rows do not match the sampling,
@@ -36,15 +37,15 @@ impl Record {
         Ok(Self { sampling, data })
     }
 
-    /// A record of values that are known to be finite, so that a long result is not read once more; shape and
-    /// unit as in [`Record::new`].
+    /// Creates a record of values that are known to be finite, without reading them once more;
+    /// shape and unit as in [`Record::new`].
     ///
     /// # Errors
     /// [`SignalError::Length`] if the rows do not match the sampling.
     ///
     /// # Panics
     /// With debug assertions, if a value is not finite.
-    pub fn of_finite(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
+    pub fn from_finite(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
         debug_assert!(first_unusable(data.as_slice()).is_none(), "the values are finite");
         if data.nrows() != sampling.len() {
             return Err(SignalError::Length {
@@ -56,19 +57,19 @@ impl Record {
         Ok(Self { sampling, data })
     }
 
-    /// A record of one channel.
+    /// Creates a record of one channel.
     ///
     /// # Errors
-    /// As [`Record::new`].
+    /// The errors of [`Record::new`].
     pub fn from_channel(sampling: Sampling, channel: Vec<f64>) -> Result<Self, SignalError> {
         let len = channel.len();
         Self::new(sampling, DMatrix::from_vec(len, 1, channel))
     }
 
-    /// A record from its channels, all as long as the sampling.
+    /// Creates a record from its channels, each as long as the sampling.
     ///
     /// # Errors
-    /// As [`Record::new`], naming the channel of the wrong length.
+    /// The errors of [`Record::new`], with the channel of the wrong length.
     pub fn from_channels(
         sampling: Sampling,
         channels: &[impl AsRef<[f64]>],
@@ -83,10 +84,10 @@ impl Record {
         Self::new(sampling, DMatrix::from_vec(sampling.len(), channels.len(), data.concat()))
     }
 
-    /// A record of one channel from its value at each instant, in seconds.
+    /// Creates a record of one channel from its value at each instant, in seconds.
     ///
     /// # Errors
-    /// As [`Record::new`], and [`SignalError::Memory`].
+    /// The errors of [`Record::new`], and [`SignalError::Memory`].
     pub fn from_fn(sampling: Sampling, value: impl FnMut(f64) -> f64) -> Result<Self, SignalError> {
         fits_in_memory(sampling.len(), 1)?;
         Self::from_channel(sampling, sampling.times().map(value).collect())
@@ -135,10 +136,10 @@ impl Record {
         self.data
     }
 
-    /// Samples `start .. start + len`, the first of them at t = 0 again.
+    /// Returns samples `start .. start + len`, with the first at t = 0.
     ///
     /// # Errors
-    /// [`SignalError::Window`] if they do not all exist, [`SignalError::Empty`] if `len` is 0.
+    /// [`SignalError::Window`] unless they all exist, [`SignalError::Empty`] if `len` is 0.
     pub fn window(&self, start: usize, len: usize) -> Result<Self, SignalError> {
         let sampling = self.sampling.with_len(len)?;
         let end = start.saturating_add(len);
@@ -158,7 +159,8 @@ impl Record {
         Self { sampling: self.sampling, data }
     }
 
-    /// Returns the mean over consecutive periods of `period` samples; an incomplete last one is left out.
+    /// Returns the mean over consecutive periods of `period` samples, without an incomplete last
+    /// one.
     ///
     /// # Errors
     /// [`SignalError::Window`] if the record is shorter than one period,
@@ -189,7 +191,7 @@ impl Record {
     /// Checks that `other` has the same time axis (steps may differ by rounding only).
     ///
     /// # Errors
-    /// [`SignalError::SamplingMismatch`] if it has not.
+    /// [`SignalError::SamplingMismatch`] if it has another one.
     pub fn check_same_sampling(&self, other: &Self) -> Result<(), SignalError> {
         let (left, right) = (self.sampling, other.sampling);
         let same_dt = (left.dt() - right.dt()).abs() <= 1e-9 * left.dt();
@@ -207,7 +209,8 @@ impl Record {
 
 /// Position of the first NaN or infinity.
 ///
-/// Block by block without a branch inside, so that a sound record is checked at the speed of memory.
+/// Works block by block without a branch inside, so that the check of a finite record runs at
+/// memory speed.
 fn first_unusable(values: &[f64]) -> Option<usize> {
     const BLOCK: usize = 1024;
     let usable = |v: &f64| v.is_finite();

@@ -1,47 +1,34 @@
 //! Periods of records that repeat.
 
+use crate::limits;
 use crate::measures::aperiodic_autocorrelation;
 
-/// Period of a record and how well it repeats, as [`repetition`] finds it.
+/// Period of a record and its mismatch, from [`repetition`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repetition {
     /// Number of samples of one period.
     pub period: usize,
     /// RMS difference of samples one period apart, over √2 times the RMS of the samples about their
-    /// mean: 0 if they repeat exactly, 1 for white noise, and the noise-to-signal ratio for a
+    /// mean: 0 for exact repetition, 1 for white noise, and the noise-to-signal ratio for a
     /// periodic signal in little noise.
     pub mismatch: f64,
 }
 
-/// Largest mismatch of a periodic signal: noise of a tenth of the RMS value, whose mismatch scatters,
-/// stays below it.
-const WORST: f64 = 0.125;
-
-/// Largest ratio of the squared mismatches of lags that are equally good.
-const ALIKE: f64 = 2.0;
-
-/// A slow signal resembles itself up to the first lag at which the squared mismatch is this many times
-/// that of [`WORST`]: more than the ratio of any two equally good lags.
-const APART: f64 = 2.0 * ALIKE;
-
-/// Squared mismatch that rounding in the Fourier transforms makes of zero.
-const ROUNDING: f64 = 1e-12;
-
-/// Returns the smallest number of samples after which a signal, in any unit, repeats, if it does so at
-/// least once in full and to better than an eighth of its RMS value.
+/// Returns the smallest number of samples after which a signal, in any unit, repeats, if it does so
+/// at least once in full and to better than an eighth of its RMS value.
 ///
-/// The whole record must repeat: samples two, three and more periods apart, as long as every sample has
-/// such a partner, also agree to √2 eighths of the RMS value. A decay does not count: a free vibration
-/// resembles itself after each of its cycles, only weaker, and a modulated one alternately stronger and
-/// weaker. There d, the difference of samples one period apart, is proportional to their sum s, while
-/// noise leaves a difference that is independent of the sum. So in every period d is fitted by the terms
-/// κs (the same shape, larger or smaller) and τs′ (the same shape a fraction of a sample later, for a
-/// period need not be a whole number of samples); if κs explains more than half of the part of d that
-/// τs′ does not, the record does not repeat.
+/// The whole record must repeat: samples two, three and more periods apart, as long as every sample
+/// has such a partner, also agree to √2 eighths of the RMS value. A decay does not count. A free
+/// vibration resembles itself after each of its cycles with a smaller amplitude, a modulated one
+/// with an alternating amplitude. There d, the difference of samples one period apart, is
+/// proportional to their sum s, while noise leaves a difference that is independent of the sum. So
+/// in every period d is fitted by the terms κs (the same shape, larger or smaller) and τs′ (the
+/// same shape a fraction of a sample later, for a fractional period). If κs explains more than half
+/// of the part of d that τs′ does not explain, the record does not repeat.
 ///
-/// A signal that changes slowly also resembles itself a few samples later; lags up to the first at
-/// which it does not are left out. A period that is no whole number of samples is not found, but a
-/// multiple that nearly is may be.
+/// A slow signal also resembles itself a few samples later; the search begins at the first lag at
+/// which it does not. A period of a fractional number of samples is not found, but an almost
+/// integer multiple may be.
 ///
 /// ```
 /// use mechid_signal::repetition;
@@ -63,24 +50,32 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
         return None;
     }
     let differences = squared_mismatches(&centred);
-    // The first lag beyond those at which a slow signal resembles itself.
-    let apart = (1..differences.len()).find(|lag| differences[*lag] > APART * WORST * WORST)?;
+    // The first lag at which a slow signal no longer resembles itself.
+    let apart = (1..differences.len()).find(|lag| {
+        differences[*lag]
+            > limits::SLOW_SIGNAL * limits::PERIODIC_MISMATCH * limits::PERIODIC_MISMATCH
+    })?;
     let best = differences[apart..].iter().copied().fold(f64::INFINITY, f64::min);
-    if best > WORST * WORST {
+    if best > limits::PERIODIC_MISMATCH * limits::PERIODIC_MISMATCH {
         return None;
     }
-    let alike = |lag: usize| differences[lag] <= ALIKE * best.max(0.0) + ROUNDING;
+    let is_equal = |lag: usize| {
+        differences[lag] <= limits::EQUAL_LAGS * best.max(0.0) + limits::MISMATCH_ROUNDING
+    };
     let throughout = |period: &usize| {
         let mut multiples = (*period..differences.len()).step_by(*period);
-        multiples.all(|lag| differences[lag] <= ALIKE * WORST * WORST)
+        multiples.all(|lag| {
+            differences[lag]
+                <= limits::EQUAL_LAGS * limits::PERIODIC_MISMATCH * limits::PERIODIC_MISMATCH
+        })
     };
-    let period = valleys(&differences, apart, alike).find(throughout)?;
+    let period = valleys(&differences, apart, is_equal).find(throughout)?;
     let repetition = Repetition { period, mismatch: mismatch(&centred, period) };
     (!grows_or_decays(&centred, period)).then_some(repetition)
 }
 
-/// Lags of the minima of the difference, one for each run of lags that are `alike`, from `first` on:
-/// a slow signal resembles itself also at the lags around its period.
+/// Returns the lags of the minima of the difference, one for each run of lags that are `alike`,
+/// from `first` on: a slow signal also resembles itself at the lags around its period.
 fn valleys(
     differences: &[f64],
     first: usize,
@@ -95,65 +90,59 @@ fn valleys(
     })
 }
 
-/// Least number of pairs of samples in a fit of growth: two terms would explain any difference of
-/// fewer.
-const PAIRS: usize = 20;
-
-/// Least fraction of the difference that counts as growth: a smaller one may be rounding.
-const LEAST_GROWTH: f64 = 0.01;
-
 /// Returns whether more than half of the difference of samples one period apart is the same shape,
-/// larger or smaller, in each period by a factor of its own.
+/// larger or smaller by a factor for each period.
 fn grows_or_decays(x: &[f64], period: usize) -> bool {
     let (early, late) = (&x[..x.len() - period], &x[period..]);
     let sum: Vec<f64> = early.iter().zip(late).map(|(a, b)| b + a).collect();
     let difference: Vec<f64> = early.iter().zip(late).map(|(a, b)| b - a).collect();
     let after = |k: usize| sum.get(k + 1).unwrap_or(&sum[k]);
     let slope: Vec<f64> = (0..sum.len()).map(|k| after(k) - sum[k.saturating_sub(1)]).collect();
-    let stretch = PAIRS.div_ceil(period) * period;
+    let stretch = limits::GROWTH_PAIRS.div_ceil(period) * period;
     let (mut shift, mut growth) = (0.0, 0.0);
     for ((d, s), t) in
         difference.chunks(stretch).zip(sum.chunks(stretch)).zip(slope.chunks(stretch))
     {
-        if d.len() < PAIRS.min(difference.len()) {
+        if d.len() < limits::GROWTH_PAIRS.min(difference.len()) {
             continue;
         }
         let tt = product(t, t);
         let [of_sum, of_difference] =
             [s, d].map(|values| if tt > 0.0 { product(values, t) / tt } else { 0.0 });
         shift += of_difference * of_difference * tt;
-        // Both without what the shift explains.
+        // Both are corrected for the shift.
         let ss = product(s, s) - of_sum * of_sum * tt;
         let ds = product(d, s) - of_difference * of_sum * tt;
-        growth += if ss > ROUNDING * product(s, s) { ds * ds / ss } else { 0.0 };
+        growth += if ss > limits::MISMATCH_ROUNDING * product(s, s) { ds * ds / ss } else { 0.0 };
     }
     let whole = product(&difference, &difference);
-    growth > 0.5 * (whole - shift) && growth > LEAST_GROWTH * whole
+    growth > 0.5 * (whole - shift) && growth > limits::GROWTH_FRACTION * whole
 }
 
 fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Squared mismatch for the lags 0 … ⌊N/2⌋, from the autocorrelation: exact to rounding.
+/// Returns the squared mismatch for the lags 0 … ⌊N/2⌋, from the autocorrelation: exact to
+/// rounding.
 fn squared_mismatches(x: &[f64]) -> Vec<f64> {
     let len = x.len();
     let products = aperiodic_autocorrelation(x);
     let total: f64 = x.iter().map(|v| v * v).sum();
-    // Sums of the squares left out at the end and at the beginning.
+    // Sums of the squares that a lag omits at the end and at the beginning.
     let (mut end, mut beginning) = (0.0, 0.0);
-    let mut all = Vec::with_capacity(len / 2 + 1);
+    let mut mismatches = Vec::with_capacity(len / 2 + 1);
     for lag in 0..=len / 2 {
         let overlap = (total - end) + (total - beginning);
         let difference = overlap - 2.0 * products[lag] * len as f64;
-        all.push(if overlap > 0.0 { difference / overlap } else { 1.0 });
+        mismatches.push(if overlap > 0.0 { difference / overlap } else { 1.0 });
         end += x[len - 1 - lag].powi(2);
         beginning += x[lag].powi(2);
     }
-    all
+    mismatches
 }
 
-/// Mismatch for one lag, without cancellation.
+/// Returns the mismatch for one lag, without cancellation.
 fn mismatch(x: &[f64], lag: usize) -> f64 {
     let (early, late) = (&x[..x.len() - lag], &x[lag..]);
     let difference: f64 = early.iter().zip(late).map(|(a, b)| (a - b).powi(2)).sum();
@@ -164,8 +153,12 @@ fn mismatch(x: &[f64], lag: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lines;
+    use crate::multisine::Multisine;
     use crate::noise::{NoiseLevel, add_white};
-    use crate::{Multisine, Phases, Record, Sampling, lines};
+    use crate::phases::Phases;
+    use crate::record::Record;
+    use crate::sampling::Sampling;
 
     fn multisine(period: usize, periods: usize) -> Record {
         let sampling = Sampling::new(0.01, period).unwrap();
@@ -194,13 +187,15 @@ mod tests {
             let noisy = add_white(&clean, NoiseLevel::FractionOfRms(part), 7).unwrap();
             let found = repetition(noisy.channel(0)).unwrap();
             assert_eq!(found.period, 200, "noise of {part}");
-            // Noise adds to both: part/√(1 + part²). 1800 pairs scatter by 1/√3600 of it.
+            // Noise adds to both: part/√(1 + part²). The standard error of 1800 pairs is 1/√3600 of
+            // it.
             let expected = part / (1.0 + part * part).sqrt();
             assert!((found.mismatch / expected - 1.0).abs() < 0.07, "{}", found.mismatch);
         }
     }
 
-    /// Slow periods included, whose samples resemble their neighbours as well as those of the next period.
+    /// The cases include slow periods, whose samples resemble their neighbours as well as those of
+    /// the next period.
     #[test]
     fn noise_of_a_tenth_hides_no_period() {
         for (period, periods) in [(64, 3), (100, 12), (257, 7), (1024, 8)] {
@@ -228,7 +223,7 @@ mod tests {
                 for seconds in [0.5, 1.0, 2.0, 5.0] {
                     let ring: Vec<f64> = free(damping, hz, seconds).collect();
                     assert_eq!(repetition(&ring), None, "{damping}, {hz} Hz, {seconds} s");
-                    // Nor does it backwards, growing.
+                    // The reversed signal, which grows, does not repeat either.
                     let grown: Vec<f64> = ring.into_iter().rev().collect();
                     assert_eq!(repetition(&grown), None, "{damping}, {hz} Hz, {seconds} s");
                     let second = free(1.5 * damping, 2.6 * hz, seconds);
@@ -240,7 +235,8 @@ mod tests {
         }
     }
 
-    /// Three eighths and one and a half of a modulation: the amplitude is another in every cycle.
+    /// A modulation with three eighths and with one and a half of a period: each cycle has another
+    /// amplitude.
     #[test]
     fn a_modulated_vibration_does_not_repeat_within_its_modulation() {
         for depth in [0.1, 0.3, 0.9] {
@@ -251,7 +247,7 @@ mod tests {
                 };
                 let record: Vec<f64> = (0..1000).map(wave).collect();
                 assert_eq!(repetition(&record), None, "{depth}, {hz} Hz, {modulation_hz} Hz");
-                // Over some modulations it does, after each of them.
+                // Whole modulations repeat, after each of them.
                 let long: Vec<f64> = (0..16_000).map(wave).collect();
                 let found = repetition(&long).unwrap();
                 let cycles = found.period as f64 * modulation_hz / 1000.0;
@@ -260,8 +256,8 @@ mod tests {
         }
     }
 
-    /// A period of 76.1 samples: after 76 the next one is alike, the fortieth is not; after ten times
-    /// 76.1 all are.
+    /// A period of 76.1 samples: after 76 samples the next period agrees, the fortieth does not;
+    /// after ten times 76.1 all agree.
     #[test]
     fn a_period_that_only_neighbours_share_is_none() {
         let turn = |k: usize| std::f64::consts::TAU * k as f64 / 76.1;
@@ -280,7 +276,7 @@ mod tests {
         assert_eq!(repetition(noise.channel(0)), None);
         let ramp: Vec<f64> = (0..1000).map(f64::from).collect();
         assert_eq!(repetition(&ramp), None);
-        // One period and a half is not once in full again.
+        // One period and a half does not repeat once in full.
         assert_eq!(repetition(&multisine(100, 2).channel(0)[..150]), None);
         for few in [&[][..], &[1.0], &[2.0; 50]] {
             assert_eq!(repetition(few), None);

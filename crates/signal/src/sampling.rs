@@ -1,13 +1,12 @@
 //! The uniform time axis.
 
-use crate::SignalError;
-use crate::error::positive;
+use crate::error::{SignalError, positive};
 
 /// A uniform time axis: `len` samples, `dt` seconds apart, the first at t = 0.
 ///
-/// When the samples are one period of a periodic signal, the period is
-/// `len · dt` (the sample at t = `len · dt` is the first one again), and the
-/// spectral lines stand at multiples of [`omega0`](Self::omega0).
+/// If the samples are one period of a periodic signal, the period is `len · dt` (the sample at t =
+/// `len · dt` is the first one again), and the spectral lines are multiples of
+/// [`omega0`](Self::omega0).
 ///
 /// # Source
 /// Dissertation eqs. (5.2.3)–(5.2.4): T = Nt·Dt, ω0 = 2π/(Nt·Dt).
@@ -18,7 +17,7 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// A time axis of `len` samples, `dt` seconds apart.
+    /// Creates a time axis of `len` samples, `dt` seconds apart.
     ///
     /// # Errors
     /// [`SignalError::TimeStep`] if `dt` is not positive and finite,
@@ -33,7 +32,7 @@ impl Sampling {
         Ok(Self { dt, len })
     }
 
-    /// A time axis of `len` samples at `rate_hz` samples per second.
+    /// Creates a time axis of `len` samples at `rate_hz` samples per second.
     ///
     /// # Errors
     /// [`SignalError::NotPositive`] if the rate is not positive and finite,
@@ -86,7 +85,7 @@ impl Sampling {
         0.5 / self.dt
     }
 
-    /// Number of one-sided spectral lines, `len / 2 + 1`, DC included.
+    /// Number of one-sided spectral lines, `len / 2 + 1`, including DC.
     pub fn lines(&self) -> usize {
         self.len / 2 + 1
     }

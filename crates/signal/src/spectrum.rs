@@ -1,4 +1,4 @@
-//! One-sided complex amplitudes of a periodic record, and the way back.
+//! One-sided complex amplitudes of a periodic record, and the inverse.
 //!
 //! The convention, everywhere in `mechid`: for one period of N samples x_k,
 //!
@@ -6,20 +6,22 @@
 //! x_k = Re Σ_{n=0}^{⌊N/2⌋} X_n exp(i 2π n k / N)
 //! ```
 //!
-//! so a cosine of amplitude A on line n gives X_n = A, and a sine gives X_n = −iA.
-//! With S_n the unnormalised forward transform Σ x_k exp(−i 2π n k / N) this is
-//! X_n = 2 S_n / N, except at DC and (N even) at Nyquist, where X_n = S_n / N.
-//! In the dissertation's real series (4.6.1), X_n = X_n^c − i X_n^s.
-//! No window is applied: a multisine is measured over whole periods.
+//! so that a cosine of amplitude A on line n gives X_n = A, and a sine gives X_n = −iA. With S_n
+//! the unnormalised forward transform Σ x_k exp(−i 2π n k / N) this is X_n = 2 S_n / N, except at
+//! DC and (N even) at Nyquist, where X_n = S_n / N. In the dissertation's real series (4.6.1),
+//! X_n = X_n^c − i X_n^s. No window is applied: a multisine is measured over whole periods.
 
 use nalgebra::{Complex, DMatrix};
 
+use crate::error::SignalError;
+use crate::record::Record;
+use crate::sampling::Sampling;
 use crate::transform::{forward, inverse};
-use crate::{Record, Sampling, SignalError};
 
-/// Lines × channels of one-sided complex amplitudes, in the unit of the record; line n stands at n·ω0.
+/// Lines × channels of one-sided complex amplitudes, in the unit of the record; the frequency of
+/// line n is n·ω0.
 ///
-/// The scaling is stated in the [module documentation](self).
+/// The [module documentation](self) defines the scaling.
 ///
 /// # Source
 /// Dissertation eqs. (4.6.1)–(4.6.5).
@@ -30,7 +32,7 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The spectrum of a record taken as one whole period, any length.
+    /// Computes the spectrum of a record that is one whole period of any length.
     pub fn of(record: &Record) -> Self {
         let sampling = record.sampling();
         let plan = forward(sampling.len());
@@ -48,10 +50,10 @@ impl Spectrum {
         Self { sampling, lines }
     }
 
-    /// A spectrum from its lines: `sampling.lines()` rows, one column per channel.
+    /// Creates a spectrum from its lines: `sampling.lines()` rows, one column per channel.
     ///
-    /// The imaginary parts of DC and (for an even length) Nyquist describe nothing
-    /// that can be sampled and are set to zero.
+    /// The imaginary parts of DC and (for an even length) Nyquist have no effect on samples and are
+    /// set to zero.
     ///
     /// # Errors
     /// [`SignalError::SpectrumLength`] for another number of rows, [`SignalError::LineNotFinite`].
@@ -77,12 +79,12 @@ impl Spectrum {
     /// Returns the period that has this spectrum; the exact inverse of [`Spectrum::of`].
     ///
     /// # Errors
-    /// [`SignalError::NotFinite`] if the lines add up to more than a number can hold.
+    /// [`SignalError::NotFinite`] if the sum of the lines overflows.
     pub fn to_record(&self) -> Result<Record, SignalError> {
         Record::new(self.sampling, self.samples())
     }
 
-    /// The samples of the period, samples × channels.
+    /// Returns the samples of the period, samples × channels.
     pub(crate) fn samples(&self) -> DMatrix<f64> {
         let len = self.sampling.len();
         let plan = inverse(len);
@@ -105,7 +107,7 @@ impl Spectrum {
         self.sampling
     }
 
-    /// Number of lines, DC included.
+    /// Number of lines, including DC.
     #[allow(clippy::len_without_is_empty, reason = "DC is always there")]
     pub fn len(&self) -> usize {
         self.lines.nrows()
@@ -140,7 +142,7 @@ impl Spectrum {
     }
 }
 
-/// 1 for the lines that are their own mirror image (DC, Nyquist), 2 for the others.
+/// Returns 1 for the lines that are their own mirror image (DC, Nyquist), 2 for the others.
 fn line_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 } else { 2.0 }
 }

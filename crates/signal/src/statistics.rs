@@ -1,10 +1,11 @@
-//! Mean, level and extremes of samples that come a block at a time.
+//! Mean, level and extremes of samples that arrive in blocks.
 
+use crate::error::SignalError;
+use crate::measures;
 use crate::measures::power_of_two;
-use crate::{SignalError, measures};
 
-/// Count, mean, RMS value, standard deviation and extremes of a channel whose samples come a block at
-/// a time and need not be held.
+/// Count, mean, RMS value, standard deviation and extremes of a channel whose samples arrive in
+/// blocks and need not be stored.
 ///
 /// ```
 /// use mechid_signal::RunningStatistics;
@@ -23,15 +24,15 @@ use crate::{SignalError, measures};
 ///
 /// # Source
 /// Chan, Golub & LeVeque (1983), The American Statistician 37, 242–247 (sums of squares about the
-/// mean, put together from parts).
+/// mean, combined from parts).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunningStatistics {
     count: usize,
     sum: f64,
-    /// Σ x² over the square of [`power_of_two`] of the peak: squares of large or small values leave the range of
-    /// numbers, and scaling by a power of two is exact, whatever the peak was before.
+    /// Σ x² over the square of [`power_of_two`] of the peak: squares of very large or small values
+    /// overflow, and scaling by a power of two is exact for any earlier peak.
     squares: f64,
-    /// Σ (x − mean)² over the same.
+    /// Σ (x − mean)² with the same scale.
     centred_squares: f64,
     peak: f64,
     minimum: f64,
@@ -39,11 +40,11 @@ pub struct RunningStatistics {
 }
 
 impl Default for RunningStatistics {
-    /// Statistics of no samples.
+    /// Returns the statistics of no samples.
     fn default() -> Self {
         Self {
             count: 0,
-            // The neutral element of addition: −0 + x is x, the sign of zero included.
+            // −0 is the neutral element of addition: −0 + x is x, including the sign of zero.
             sum: -0.0,
             squares: 0.0,
             centred_squares: 0.0,
@@ -55,22 +56,22 @@ impl Default for RunningStatistics {
 }
 
 impl RunningStatistics {
-    /// Statistics of these samples, in any unit.
+    /// Computes the statistics of these samples, in any unit.
     ///
     /// # Errors
-    /// As [`push`](Self::push).
-    pub fn of(samples: &[f64]) -> Result<Self, SignalError> {
+    /// The error of [`push`](Self::push).
+    pub fn from_samples(samples: &[f64]) -> Result<Self, SignalError> {
         let mut statistics = Self::default();
         statistics.push(samples)?;
         Ok(statistics)
     }
 
-    /// Adds the next samples, in the unit of those before.
+    /// Adds the next samples, in the unit of the earlier ones.
     ///
-    /// The order of additions to mean and RMS value is that of the samples, whatever the blocks.
+    /// Mean and RMS value are summed in the order of the samples, independently of the blocks.
     ///
     /// # Errors
-    /// [`SignalError::NotFinite`] at the sample, counted from the first of all, where a sample or the
+    /// [`SignalError::NotFinite`] at the sample, counted from the first of all, if a sample or the
     /// sum so far is not finite.
     pub fn push(&mut self, samples: &[f64]) -> Result<(), SignalError> {
         if samples.is_empty() {
@@ -98,10 +99,10 @@ impl RunningStatistics {
         Ok(())
     }
 
-    /// Adds the statistics of the samples that follow, in the unit of those before.
+    /// Adds the statistics of later samples, in the unit of the earlier ones.
     ///
     /// # Errors
-    /// [`SignalError::NotFinite`], with the number of samples before, if the sum of both is not
+    /// [`SignalError::NotFinite`], with the number of earlier samples, if the sum of both is not
     /// finite.
     pub fn merge(&mut self, later: &Self) -> Result<(), SignalError> {
         if later.count == 0 {
@@ -130,8 +131,7 @@ impl RunningStatistics {
         self.count
     }
 
-    /// Mean, in the unit of the samples; 0 for no samples, and where it is no more than the rounding
-    /// of the samples leaves.
+    /// Mean, in the unit of the samples; 0 for no samples, and if it is only rounding.
     pub fn mean(&self) -> f64 {
         let mean = self.sum / self.count.max(1) as f64;
         if mean.abs() < 4.0 * f64::EPSILON * self.rms() { 0.0 } else { mean }
@@ -176,8 +176,8 @@ impl RunningStatistics {
         (self.peak > 0.0).then(|| self.peak / self.rms())
     }
 
-    /// Σ (x − mean)² / unit² of the samples so far together with `count` samples of this `mean` and
-    /// this sum of squares about it.
+    /// Returns Σ (x − mean)² / unit² of the samples so far together with `count` samples of this
+    /// `mean` and this sum of squares about it.
     fn combined(&self, squares: f64, mean: f64, count: usize, unit: f64) -> f64 {
         if self.count == 0 {
             return squares;
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn blocks_change_nothing_in_mean_level_and_extremes() {
         let all = samples(1000, 0.3, 2.0);
-        let whole = RunningStatistics::of(&all).unwrap();
+        let whole = RunningStatistics::from_samples(&all).unwrap();
         assert_eq!(whole.rms(), measures::rms(&all));
         assert_eq!(whole.peak(), measures::peak(&all));
         for block in [1, 7, 999] {
@@ -238,7 +238,7 @@ mod tests {
         let all = samples(5000, 1e9, 1.0);
         let mut merged = RunningStatistics::default();
         for part in all.chunks(64) {
-            merged.merge(&RunningStatistics::of(part).unwrap()).unwrap();
+            merged.merge(&RunningStatistics::from_samples(part).unwrap()).unwrap();
         }
         let (_, deviation) = two_pass(&all);
         // Samples of this size are themselves rounded to 1e-7 of the deviation.
@@ -250,11 +250,11 @@ mod tests {
     fn parts_in_any_order_make_the_whole() {
         let (first, second) = (samples(300, 4.0, 1.0), samples(500, -2.0, 1e-3));
         let all = [first.clone(), second.clone()].concat();
-        let whole = RunningStatistics::of(&all).unwrap();
+        let whole = RunningStatistics::from_samples(&all).unwrap();
         for parts in [[&first, &second], [&second, &first]] {
             let mut merged = RunningStatistics::default();
-            merged.merge(&RunningStatistics::of(parts[0]).unwrap()).unwrap();
-            merged.merge(&RunningStatistics::of(parts[1]).unwrap()).unwrap();
+            merged.merge(&RunningStatistics::from_samples(parts[0]).unwrap()).unwrap();
+            merged.merge(&RunningStatistics::from_samples(parts[1]).unwrap()).unwrap();
             for (a, b) in [
                 (merged.mean(), whole.mean()),
                 (merged.rms(), whole.rms()),
@@ -272,7 +272,7 @@ mod tests {
         for scale in [1e-300, 1e-200, 1e200, 1e300] {
             let all = samples(100, 0.5, 1.0);
             let (mean, deviation) = two_pass(&all);
-            let scaled = RunningStatistics::of(&samples(100, 0.5, scale)).unwrap();
+            let scaled = RunningStatistics::from_samples(&samples(100, 0.5, scale)).unwrap();
             assert!((scaled.mean() / scale / mean - 1.0).abs() < 1e-13);
             assert!((scaled.rms() / scale / measures::rms(&all) - 1.0).abs() < 1e-13);
             assert!((scaled.standard_deviation() / scale / deviation - 1.0).abs() < 1e-13);
@@ -284,22 +284,25 @@ mod tests {
         let none = RunningStatistics::default();
         assert_eq!((none.count(), none.mean(), none.rms()), (0, 0.0, 0.0));
         assert_eq!((none.standard_deviation(), none.crest_factor()), (0.0, None));
-        let zeros = RunningStatistics::of(&[0.0; 5]).unwrap();
+        let zeros = RunningStatistics::from_samples(&[0.0; 5]).unwrap();
         assert_eq!((zeros.mean(), zeros.standard_deviation()), (0.0, 0.0));
-        let rounding = RunningStatistics::of(&[1.0, -1.0, 1.0, -1.0 + 1e-16]).unwrap();
+        let rounding = RunningStatistics::from_samples(&[1.0, -1.0, 1.0, -1.0 + 1e-16]).unwrap();
         assert_eq!(rounding.mean(), 0.0);
-        assert_eq!(RunningStatistics::of(&[2.0, -2.0]).unwrap().crest_factor(), Some(1.0));
+        assert_eq!(
+            RunningStatistics::from_samples(&[2.0, -2.0]).unwrap().crest_factor(),
+            Some(1.0)
+        );
     }
 
     #[test]
     fn what_is_not_finite_is_named_and_adds_nothing() {
-        let mut statistics = RunningStatistics::of(&[1.0, 2.0]).unwrap();
+        let mut statistics = RunningStatistics::from_samples(&[1.0, 2.0]).unwrap();
         let before = statistics;
         let refused = statistics.push(&[3.0, f64::INFINITY]);
         let value = f64::INFINITY;
         assert_eq!(refused, Err(SignalError::NotFinite { sample: 3, channel: 0, value }));
         assert_eq!(statistics, before);
-        let large = RunningStatistics::of(&[f64::MAX]).unwrap();
-        assert!(RunningStatistics::of(&[f64::MAX]).unwrap().merge(&large).is_err());
+        let large = RunningStatistics::from_samples(&[f64::MAX]).unwrap();
+        assert!(RunningStatistics::from_samples(&[f64::MAX]).unwrap().merge(&large).is_err());
     }
 }

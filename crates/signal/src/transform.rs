@@ -1,14 +1,14 @@
-//! Fast Fourier transforms of real samples, planned once for many of one length.
+//! Fast Fourier transforms of real samples, planned once for each length.
 //!
-//! Every crate that names a planner compiles all of its algorithms anew; through these functions they are
-//! compiled with this crate only.
+//! Every crate that names a planner compiles all of its algorithms again; these functions compile
+//! them only in this crate.
 
 use std::sync::Arc;
 
 use realfft::RealFftPlanner;
 pub use realfft::{ComplexToReal, RealToComplex};
 
-/// Plan from `len` samples to their `len / 2 + 1` lines, not scaled.
+/// Plans the transform of `len` samples to their `len / 2 + 1` lines, without scaling.
 ///
 /// # Source
 /// The crates `realfft` and `rustfft`.
@@ -17,7 +17,8 @@ pub fn forward(len: usize) -> Arc<dyn RealToComplex<f64>> {
     RealFftPlanner::new().plan_fft_forward(len)
 }
 
-/// Plan from `len / 2 + 1` lines to `len` samples, not scaled: [`forward`] and back multiplies by `len`.
+/// Plans the transform of `len / 2 + 1` lines to `len` samples, without scaling: [`forward`] and
+/// back multiplies by `len`.
 ///
 /// # Source
 /// The crates `realfft` and `rustfft`.

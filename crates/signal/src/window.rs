@@ -1,9 +1,9 @@
-//! Windows: weights of the samples of a piece of a record.
+//! Windows: weights of the samples of a segment of a record.
 
 use std::f64::consts::TAU;
 use std::fmt;
 
-/// Window that the samples of a piece of a record are weighted with.
+/// Window of the samples of a segment of a record.
 ///
 /// # Source
 /// Harris (1978), Proceedings of the IEEE 66, 51–83.
@@ -17,7 +17,7 @@ pub enum Window {
     Hamming,
     /// 0.42 − 0.5 cos + 0.08 cos 2: the least leakage, a wider peak.
     Blackman,
-    /// All samples alike: for pieces that begin and end at rest, such as bursts.
+    /// Equal weights: for segments that begin and end at rest, such as bursts.
     Rectangular,
 }
 
@@ -38,7 +38,7 @@ impl Window {
     /// Returns the weight of sample `k` of `len`, a pure number.
     ///
     /// # Source
-    /// That of [`Window`].
+    /// The source of [`Window`].
     pub fn weight(self, k: usize, len: usize) -> f64 {
         let turn = TAU * k as f64 / len as f64;
         match self {

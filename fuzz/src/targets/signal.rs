@@ -182,7 +182,7 @@ fn samples(d: &mut Draw, sampling: Sampling) -> Result<(), String> {
     let _ = (measures::peak(&values), measures::rms(&values));
     let _ = measures::aperiodic_autocorrelation(&values);
     let _ = measures::circular_autocorrelation(&values);
-    if let Some(mut all) = passed(RunningStatistics::of(&values))? {
+    if let Some(mut all) = passed(RunningStatistics::from_samples(&values))? {
         passed(all.push(&d.numbers(9)))?;
         passed(all.merge(&RunningStatistics::default()))?;
         let _ = (all.crest_factor(), all.standard_deviation(), all.mean(), all.rms());

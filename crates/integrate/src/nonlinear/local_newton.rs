@@ -300,7 +300,7 @@ fn solve_in_place(a: &mut DMatrix<f64>, b: &mut DVector<f64>) -> bool {
         }
         a.swap_rows(j, pivot);
         b.swap_rows(j, pivot);
-        // By columns, in the order of memory.
+        // Columns are contiguous in memory.
         let (before, after) = a.as_mut_slice().split_at_mut((j + 1) * p);
         let column = &mut before[j * p..];
         let pivot = column[j];

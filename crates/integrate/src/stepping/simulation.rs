@@ -83,7 +83,7 @@ impl<'a> Motion<'a> {
         table: &ForceTable<'_>,
     ) -> Result<[Record; Q], IntegrateError> {
         let dof = |channel: usize| self.observed.map_or(channel, |observed| observed[channel]);
-        let new = if self.finite { Record::of_finite } else { Record::new };
+        let new = if self.finite { Record::from_finite } else { Record::new };
         let record = |data| match new(table.sampling(), data) {
             Err(SignalError::NotFinite { sample, channel, .. }) => {
                 Err(IntegrateError::Overflow { sample, component: dof(channel) + 1 })

@@ -1,34 +1,32 @@
-//! Phases of least crest factor for a given amplitude spectrum.
+//! Phases of minimum crest factor for a given amplitude spectrum.
 //!
 //! The peak is the limit of the p-norm ‖x‖_p for large p, and the p-norm is smooth in the phases.
-//! From each starting point the norm is brought down for p = 16, 32, … 1024 in turn, each time
-//! by a damped Newton method; the best of several starts is kept. See [`CrestSearch`].
+//! From each starting point a damped Newton method reduces the norm for p = 16, 32, … 1024 in turn;
+//! the best of several starts is the result. See [`CrestSearch`].
 
 mod newton;
 mod p_norm;
 
-use crate::error::positive;
-use crate::{Multisine, Phases, SignalError};
+use crate::error::{SignalError, positive};
+use crate::limits;
+use crate::multisine::Multisine;
+use crate::phases::Phases;
 use p_norm::PNorm;
 
-/// The exponents of the continuation, and the samples per Nyquist interval each is taken on.
+/// Exponents of the continuation, and the samples per Nyquist interval for each.
 ///
-/// Below 16 the norm hardly knows the peak, beyond 1024 it differs from it by less than the grid
-/// does: between 32 samples per interval a sine at the highest line rises by 0.1 % at most.
+/// Below 16 the norm is almost insensitive to the peak; above 1024 it differs from the peak by less
+/// than the grid does: between 32 samples per interval a sine at the highest line rises by at most
+/// 0.1 %.
 const STAGES: [(&[i32], usize); 2] = [(&[16, 32, 64], 8), (&[128, 256, 512, 1024], 32)];
 
-/// Largest change of the given phases before the first start, as a fraction of 2π.
-const NUDGE: f64 = 1e-2;
-
-/// Multiple of the mean curvature the first step is damped by.
-const FIRST_DAMPING: f64 = 1e-2;
-
-/// A search for the phases of least crest factor, the same on every run.
+/// A search for the phases of minimum crest factor, the same on every run.
 ///
-/// The first start is next to the phases the multisine has (Schroeder's are good ones), all
-/// others are random. For 127 flat lines 16 starts reach a crest factor of 1.38 in a third of a second. The
-/// time per start grows with the third power of the number of lines up to some hundreds (where it
-/// is half a second), then about linearly: ten seconds for 4,000 lines, where a few starts do.
+/// The first start is close to the phases of the multisine (Schroeder's are good ones), all others
+/// are random. For 127 flat lines 16 starts reach a crest factor of 1.38 in a third of a second.
+/// The time per start grows with the third power of the number of lines up to some hundreds (where
+/// it is half a second), then about linearly: ten seconds for 4,000 lines, for which a few starts
+/// are enough.
 ///
 /// ```
 /// use mechid_signal::{CrestSearch, Multisine, Phases, lines};
@@ -42,8 +40,8 @@ const FIRST_DAMPING: f64 = 1e-2;
 ///
 /// # Source
 /// Guillaume, Schoukens, Pintelon and Kollár (1991), *Crest-factor minimization using nonlinear
-/// Chebyshev approximation methods*, IEEE Trans. Instrum. Meas. 40(6): the p-norm continuation.
-/// The Newton step here takes the exact Hessian instead of the Gauss-Newton one.
+/// Chebyshev approximation methods*, IEEE Trans. Instrum. Meas. 40(6): the p-norm continuation. The
+/// Newton step here uses the exact Hessian instead of the Gauss-Newton one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CrestSearch {
     /// Number of starting points; at least one is always tried.
@@ -59,7 +57,7 @@ impl Default for CrestSearch {
 }
 
 impl CrestSearch {
-    /// Returns the multisine with the best phases found; lines and amplitudes are untouched, and the
+    /// Returns the multisine with the best phases; lines and amplitudes are unchanged, and the
     /// crest factor never rises.
     ///
     /// # Errors
@@ -73,7 +71,7 @@ impl CrestSearch {
         for start in 0..self.starts.max(1) {
             log::debug!("start {} of {}", start + 1, self.starts.max(1));
             let mut phases = self.start(multisine, start)?;
-            let mut damping = FIRST_DAMPING;
+            let mut damping = limits::FIRST_DAMPING;
             for (exponents, norm) in &stages {
                 for p in *exponents {
                     phases = newton::minimise(norm, phases, *p, &mut damping);
@@ -88,16 +86,18 @@ impl CrestSearch {
         Ok(best)
     }
 
-    /// The phases of a starting point.
+    /// Returns the phases of a starting point.
     fn start(&self, multisine: &Multisine, start: usize) -> Result<Vec<f64>, SignalError> {
-        // Seeds far apart, so that searches with neighbouring seeds share no starting point.
+        // Distant seeds, so that searches with neighbouring seeds share no starting point.
         let seed = self.seed.rotate_left(32).wrapping_add(start as u64);
-        let random = Phases::Random { seed }.of(multisine.lines(), multisine.amplitudes())?;
+        let random = Phases::Random { seed }.values(multisine.lines(), multisine.amplitudes())?;
         if start > 0 {
             return Ok(random);
         }
-        // Phases of 0 and π only make the signal even, and the norm stationary: nudge them.
-        let nudged = multisine.phases().iter().zip(random).map(|(own, r)| own + NUDGE * r);
+        // Phases of only 0 and π make the signal even and the norm stationary; a small change
+        // avoids this.
+        let nudged =
+            multisine.phases().iter().zip(random).map(|(own, r)| own + limits::PHASE_CHANGE * r);
         Ok(nudged.collect())
     }
 }

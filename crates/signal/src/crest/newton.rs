@@ -3,23 +3,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::p_norm::{Derivatives, PNorm, norm};
-
-/// Maximum number of steps per exponent; far more than are ever needed.
-const MAX_STEPS: usize = 400;
-
-/// Two successive steps that gain less than this fraction of the norm end an exponent.
-const LEAST_GAIN: f64 = 1e-5;
-
-/// Largest damping; beyond it the norm is stationary to rounding.
-const MOST_DAMPING: f64 = 1e6;
-
-/// Largest number of lines for which the Hessian is formed and factored; with more it is only applied; about
-/// here the two cost the same.
-const MOST_DENSE: usize = 400;
-
-/// Residual, as a fraction of the gradient, at which conjugate gradients stop, and their number.
-const CG_TOLERANCE: f64 = 0.05;
-const MOST_CG: usize = 60;
+use crate::limits;
 
 /// Phases, with the norm and its derivatives there.
 pub(super) struct Point {
@@ -36,15 +20,15 @@ impl Point {
     }
 }
 
-/// Reduces ‖x‖_p from given phases; `damping` is handed from one exponent to the next.
+/// Reduces ‖x‖_p from given phases; `damping` continues from one exponent to the next.
 pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mut f64) -> Vec<f64> {
     let mut point = Point::new(objective, phases, p);
     let mut small_gains = 0;
-    for _ in 0..MAX_STEPS {
+    for _ in 0..limits::CREST_STEPS {
         let Some(next) = step(objective, &point, p, damping) else {
             break;
         };
-        let small = point.norm - next.norm < LEAST_GAIN * point.norm;
+        let small = point.norm - next.norm < limits::CREST_GAIN * point.norm;
         small_gains = if small { small_gains + 1 } else { 0 };
         point = next;
         if small_gains == 2 {
@@ -54,15 +38,16 @@ pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mu
     point.phases
 }
 
-/// One step that lowers the norm, with the damping it took; `None` at a stationary point.
+/// Takes one step that lowers the norm and returns it with its damping; `None` at a stationary
+/// point.
 fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Point> {
     let derivatives = objective.derivatives(&from.phases, &from.signal, p);
-    // Levenberg's multiple of the identity: a common shift in time has no curvature of its own.
+    // Levenberg's multiple of the identity: a common shift in time has zero curvature.
     let scale = derivatives.mean_curvature();
-    let hessian = (from.phases.len() <= MOST_DENSE).then(|| derivatives.hessian());
-    while *damping < MOST_DAMPING {
+    let hessian = (from.phases.len() <= limits::DENSE_HESSIAN).then(|| derivatives.hessian());
+    while *damping < limits::LARGEST_DAMPING {
         let added = *damping * scale;
-        // The damping grows where the damped norm is not convex.
+        // The damping grows until the damped norm is convex.
         let step = match &hessian {
             Some(hessian) => {
                 let mut damped = hessian.clone();
@@ -81,19 +66,19 @@ fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Po
         }
         *damping *= 4.0;
     }
-    *damping = super::FIRST_DAMPING;
+    *damping = limits::FIRST_DAMPING;
     None
 }
 
-/// (H + added·I) d = g to a few per cent; `None` on meeting negative curvature.
+/// Solves (H + added·I) d = g to a few per cent; `None` at negative curvature.
 fn conjugate_gradients(derivatives: &Derivatives<'_>, added: f64) -> Option<DVector<f64>> {
     let g = &derivatives.gradient;
     let mut solution = DVector::zeros(g.len());
     let mut residual = g.clone();
     let mut direction = g.clone();
     let mut square = residual.norm_squared();
-    let target = CG_TOLERANCE.powi(2) * square;
-    for _ in 0..MOST_CG.min(g.len()) {
+    let target = limits::CG_RESIDUAL.powi(2) * square;
+    for _ in 0..limits::CG_STEPS.min(g.len()) {
         let mut applied = derivatives.apply(&direction);
         applied.axpy(added, &direction, 1.0);
         let curvature = direction.dot(&applied);
@@ -118,21 +103,22 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::{Multisine, Phases};
+    use crate::multisine::Multisine;
+    use crate::phases::Phases;
 
     #[test]
     fn conjugate_gradients_solve_the_damped_system() {
         let m = Multisine::flat(1..=24, 1.0, Phases::Random { seed: 5 }).unwrap();
         let norm = PNorm::new(&m, 8);
         let derivatives = norm.derivatives(m.phases(), &norm.signal(m.phases()), 16);
-        // Enough to make the matrix positive definite, so that both ways have a step.
+        // The damping makes the matrix positive definite, so that both methods have a step.
         let added = 2.0 * derivatives.mean_curvature();
         let lower = derivatives.hessian();
         let full = DMatrix::from_fn(24, 24, |i, j| lower[(i.max(j), i.min(j))]);
         let step = conjugate_gradients(&derivatives, added).unwrap();
         let residual = full * &step + added * &step - &derivatives.gradient;
-        assert!(residual.norm() <= 1.001 * CG_TOLERANCE * derivatives.gradient.norm());
-        // Undamped, a point that is no minimum has negative curvature.
+        assert!(residual.norm() <= 1.001 * limits::CG_RESIDUAL * derivatives.gradient.norm());
+        // Without damping, a point that is not a minimum has negative curvature.
         assert!(conjugate_gradients(&derivatives, -added).is_none());
     }
 }

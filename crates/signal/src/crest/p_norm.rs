@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::Multisine;
+use crate::multisine::Multisine;
 use crate::phases::gcd;
-use crate::transform::{self, ComplexToReal, RealToComplex};
+use crate::transform;
+use crate::transform::{ComplexToReal, RealToComplex};
 
 /// The norm for given lines and amplitudes, of unit RMS.
 pub(super) struct PNorm {
@@ -17,9 +18,9 @@ pub(super) struct PNorm {
 }
 
 impl PNorm {
-    /// The norm over a grid of `oversampling` samples per Nyquist interval, or more.
+    /// Creates the norm over a grid of at least `oversampling` samples per Nyquist interval.
     pub(super) fn new(multisine: &Multisine, oversampling: usize) -> Self {
-        // The waveform of lines 10, 20, 30 is the one of lines 1, 2, 3.
+        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3.
         let common = multisine.lines().iter().fold(0, |d, n| gcd(d, *n));
         let lines: Vec<usize> = multisine.lines().iter().map(|n| n / common).collect();
         let rms = multisine.rms();
@@ -30,7 +31,7 @@ impl PNorm {
         Self { lines, amplitudes, forward, inverse }
     }
 
-    /// The period on the grid.
+    /// Returns the period on the grid.
     pub(super) fn signal(&self, phases: &[f64]) -> Vec<f64> {
         let terms = self.amplitudes.iter().zip(phases);
         self.synthesise(terms.map(|(a, phase)| Complex::from_polar(*a, *phase)))
@@ -55,10 +56,10 @@ impl PNorm {
         output
     }
 
-    /// First and second derivatives of (1/p) Σ_k (x_k / s)^p, s being the present peak.
+    /// First and second derivatives of (1/p) Σ_k (x_k / s)^p, with s the present peak.
     ///
-    /// With x'_n = −A_n sin(nθ + φ_n) the derivative by φ_n, x''_n = −A_n cos(nθ + φ_n) and no
-    /// mixed second derivatives:
+    /// With x'_n = −A_n sin(nθ + φ_n) the derivative with respect to φ_n, x''_n = −A_n cos(nθ +
+    /// φ_n) and without mixed second derivatives:
     ///
     /// ```text
     /// g_n  = Σ_k (x/s)^(p−1) x'_n / s
@@ -102,15 +103,16 @@ pub(super) struct Derivatives<'a> {
 }
 
 impl Derivatives<'_> {
-    /// Mean of the diagonal of the first term of the Hessian, with sin² taken as ½.
+    /// Mean of the diagonal of the first term of the Hessian, with sin² = ½.
     pub(super) fn mean_curvature(&self) -> f64 {
         let power: f64 = self.turned.iter().map(|z| 0.5 * z.norm_sqr()).sum();
         self.factor * power * self.weight.iter().sum::<f64>() / self.turned.len() as f64
     }
 
-    /// The lower triangle of the Hessian, which is all the Cholesky factorisation reads.
+    /// Returns the lower triangle of the Hessian, the part that a Cholesky factorisation reads.
     ///
-    /// 2 sin a sin b = cos(a − b) − cos(a + b) makes one transform of the weight give all of it.
+    /// Since 2 sin a sin b = cos(a − b) − cos(a + b), one transform of the weight gives all
+    /// entries.
     pub(super) fn hessian(&self) -> DMatrix<f64> {
         let weight = self.norm.transform(self.weight.clone());
         let lines = &self.norm.lines;
@@ -126,7 +128,7 @@ impl Derivatives<'_> {
         hessian
     }
 
-    /// The Hessian times a vector, by two transforms.
+    /// Returns the Hessian times a vector, by two transforms.
     pub(super) fn apply(&self, v: &DVector<f64>) -> DVector<f64> {
         // −A sin(nθ + φ) is the real part of i A exp(i (nθ + φ)).
         let terms = self.turned.iter().zip(v).map(|(z, v)| z * Complex::new(0.0, *v));
@@ -155,9 +157,9 @@ fn peak(signal: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Phases;
+    use crate::phases::Phases;
 
-    /// (1/p) Σ (x/s)^p with s held fixed, the function `derivatives` differentiates.
+    /// (1/p) Σ (x/s)^p with s held fixed, the function that `derivatives` differentiates.
     fn objective(norm: &PNorm, phases: &[f64], p: i32, s: f64) -> f64 {
         norm.signal(phases).iter().map(|x| (x / s).powi(p)).sum::<f64>() / f64::from(p)
     }

@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::error::{below_nyquist, finite, not_negative, positive};
-use crate::{Record, Sampling, SignalError};
+use crate::error::{SignalError, below_nyquist, finite, not_negative, positive};
+use crate::record::Record;
+use crate::sampling::Sampling;
 
 /// F(t) = A cos(2π f t + φ).
 #[derive(Debug, Clone, Copy, PartialEq)]

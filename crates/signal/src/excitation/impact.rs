@@ -2,12 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::error::{finite, fits_in_memory, not_negative, positive};
-use crate::{Record, Sampling, SignalError};
+use crate::error::{SignalError, finite, fits_in_memory, not_negative, positive};
+use crate::record::Record;
+use crate::sampling::Sampling;
 
 /// An ideal impact of given momentum, in the unit of the signal times seconds: N·s for a force.
 ///
-/// Sampled, it is one sample of momentum / Δt, the one nearest to its instant.
+/// The sampled impact is one sample of momentum / Δt, the one nearest to its instant.
 ///
 /// # Source
 /// Clough & Penzien, *Dynamics of Structures*, the chapter on impulsive loading.
@@ -46,8 +47,8 @@ impl Impulse {
     }
 }
 
-/// An impact in the shape of half a sine, as an instrumented hammer gives it:
-/// F(t) = F_max sin(π (t − t_0) / d) for t_0 ≤ t ≤ t_0 + d, zero elsewhere.
+/// An impact in the shape of half a sine, such as that of an instrumented hammer: F(t) = F_max
+/// sin(π (t − t_0) / d) for t_0 ≤ t ≤ t_0 + d, zero elsewhere.
 ///
 /// # Source
 /// Clough & Penzien, *Dynamics of Structures*, the chapter on impulsive loading (half-sine pulse).
@@ -82,10 +83,10 @@ impl HalfSine {
         if (0.0..=1.0).contains(&passed) { self.peak * (PI * passed).sin() } else { 0.0 }
     }
 
-    /// The sampled impact; the part beyond the last sample is left out.
+    /// Samples the impact, without a part beyond the last sample.
     ///
     /// # Errors
-    /// None for a blow that exists; the signature is that of all excitations.
+    /// None for a valid impact; the signature is the same for all excitations.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         Record::from_fn(sampling, |t| self.value(t))
     }

@@ -1,4 +1,4 @@
-//! The excitations of a vibration test besides the [`Multisine`](crate::Multisine).
+//! The excitations of a vibration test other than the [`Multisine`](crate::Multisine).
 //!
 //! | Excitation | Type | Use |
 //! |---|---|---|
@@ -8,8 +8,8 @@
 //! | swept sine | [`Sweep`] | linear and logarithmic, ramped ends |
 //! | binary noise | [`Prbs`] | maximum-length sequences, crest factor 1 |
 //!
-//! Each is made by a constructor that checks its numbers and sampled by `sample`; those that are
-//! functions of time also give their `value` at any t, for integrators that ask between samples.
+//! Each has a constructor that checks its numbers and a method `sample`; functions of time also
+//! have a `value` at any t, for integrators that need the force between samples.
 //!
 //! ```
 //! use mechid_signal::{Sampling, excitation::{Sweep, SweepLaw}};

@@ -1,11 +1,12 @@
 //! Maximum-length pseudo-random binary sequences.
 
-use crate::error::{fits_in_memory, not_negative};
-use crate::{Record, Sampling, SignalError};
+use crate::error::{SignalError, fits_in_memory, not_negative};
+use crate::record::Record;
+use crate::sampling::Sampling;
 
 /// Feedback taps of a shift register of maximum period, for orders 2 to 24; bit k − 1 is stage k.
 ///
-/// Every entry is checked by a test that runs the register through its whole period.
+/// A test runs the register through its whole period for every entry.
 const TAPS: [u32; 23] = [
     stages(&[2, 1]),
     stages(&[3, 2]),
@@ -88,7 +89,7 @@ impl Prbs {
         self.first_chips(usize::MAX)
     }
 
-    /// The levels of one period, or of its first `most` chips.
+    /// Returns the levels of one period, or of its first `most` chips.
     fn first_chips(&self, most: usize) -> Vec<f64> {
         let taps = TAPS[self.order as usize - 2];
         let mut register = (1u32 << self.order) - 1;
@@ -102,13 +103,13 @@ impl Prbs {
             .collect()
     }
 
-    /// The sequence from its beginning, repeated or cut to the length of the record.
+    /// Samples the sequence from its beginning, repeated or cut to the length of the record.
     ///
-    /// Only a record of [`period`](Self::period) samples, or a multiple, has the sequence's
-    /// autocorrelation.
+    /// Only a record of [`period`](Self::period) samples, or a multiple, has the autocorrelation of
+    /// the sequence.
     ///
     /// # Errors
-    /// None for a sequence that exists; the signature is that of all excitations.
+    /// None for a valid sequence; the signature is the same for all excitations.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         fits_in_memory(sampling.len(), 1)?;
         let chips = self.first_chips(sampling.len().div_ceil(self.hold));

@@ -1,14 +1,16 @@
 //! Random excitation.
 
-use crate::error::{band, below_nyquist, fits_in_memory, not_negative, within};
+use crate::error::{SignalError, band, below_nyquist, fits_in_memory, not_negative, within};
 use crate::noise::{stream, white_channel};
-use crate::{Record, Sampling, SignalError, Spectrum};
+use crate::record::Record;
+use crate::sampling::Sampling;
+use crate::spectrum::Spectrum;
 
-/// Gaussian random force: white, or limited to a band of the period's lines, throughout the
-/// record or in a burst at its beginning.
+/// Gaussian random force: white, or limited to a band of the period's lines, throughout the record
+/// or in a burst at its beginning.
 ///
-/// The record is taken as one period. A burst lets the response die out before the period ends,
-/// so that the transform sees a whole transient and nothing leaks.
+/// The record is assumed to be one period. The response to a burst decays before the period ends,
+/// so that the transform covers a whole transient and has no leakage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Random {
     standard_deviation: f64,
@@ -27,7 +29,7 @@ impl Random {
         Ok(Self { standard_deviation, band_hz: None, on: 1.0, seed })
     }
 
-    /// Noise on the lines between two frequencies in Hz, ends included, DC excluded.
+    /// Creates noise on the lines between two frequencies in Hz, including the ends, without DC.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for the deviation, [`SignalError::Band`] for the ends.
@@ -41,7 +43,7 @@ impl Random {
         Ok(Self { band_hz, ..Self::white(standard_deviation, seed)? })
     }
 
-    /// The same noise during the first `fraction` of the record only, zero after it.
+    /// Returns the same noise during the first `fraction` of the record only, zero after it.
     ///
     /// # Errors
     /// [`SignalError::Range`] unless 0 ≤ `fraction` ≤ 1.
@@ -53,7 +55,7 @@ impl Random {
     ///
     /// # Errors
     /// [`SignalError::AboveNyquist`] for the upper end of the band, [`SignalError::EmptyBand`] if
-    /// it holds no line, [`SignalError::NotFinite`] if the deviation is out of all bounds.
+    /// it has no line, [`SignalError::NotFinite`] if the deviation overflows.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         fits_in_memory(sampling.len(), 1)?;
         let white = white_channel(sampling, 1.0, &mut stream(self.seed, 0));
@@ -72,7 +74,7 @@ impl Random {
     }
 }
 
-/// The lines in a band that lies below Nyquist, at least one.
+/// Returns the lines in a band below Nyquist, at least one.
 fn band_lines(sampling: Sampling, low_hz: f64, high_hz: f64) -> Result<Vec<usize>, SignalError> {
     below_nyquist(high_hz, sampling)?;
     let lines = crate::lines::band(sampling, low_hz, high_hz);
@@ -83,16 +85,16 @@ fn band_lines(sampling: Sampling, low_hz: f64, high_hz: f64) -> Result<Vec<usize
     Ok(lines)
 }
 
-/// White noise with all other lines removed, scaled so that the variance is expected unchanged:
-/// of `len` equal shares each line (with its mirror image) holds two.
+/// Removes all other lines from white noise and scales the rest to the same expected variance: each
+/// line (with its mirror image) has two of `len` equal shares.
 fn keep_lines(white: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let gain = (white.len() as f64 / (2 * lines.len()) as f64).sqrt();
     let spectrum = Spectrum::of(white);
-    let mut kept = spectrum.lines() * nalgebra::Complex::from(0.0);
+    let mut lines_kept = spectrum.lines() * nalgebra::Complex::from(0.0);
     for n in lines {
-        kept[(*n, 0)] = spectrum.line(*n, 0) * gain;
+        lines_kept[(*n, 0)] = spectrum.line(*n, 0) * gain;
     }
-    Spectrum::from_lines(white.sampling(), kept)?.to_record()
+    Spectrum::from_lines(white.sampling(), lines_kept)?.to_record()
 }
 
 #[cfg(test)]

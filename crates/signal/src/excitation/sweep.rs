@@ -2,10 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::error::{below_nyquist, not_negative, positive, within};
-use crate::{Record, Sampling, SignalError};
+use crate::error::{SignalError, below_nyquist, not_negative, positive, within};
+use crate::record::Record;
+use crate::sampling::Sampling;
 
-/// Law by which the frequency of a sweep runs from one end to the other.
+/// Law of the frequency of a sweep between its two ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SweepLaw {
     /// f(t) = f_0 + (f_1 − f_0) t/T: the same time per Hz.
@@ -17,7 +18,7 @@ pub enum SweepLaw {
 /// F(t) = A w(t) sin 2π ∫ f dt over 0 ≤ t ≤ T, zero elsewhere; upwards or downwards.
 ///
 /// w(t) rises and falls as half a cosine at the two ends ([`with_ramps`](Self::with_ramps)), so
-/// that the machine is not hit when the sweep begins and ends.
+/// that the sweep begins and ends without a shock.
 ///
 /// # Source
 /// Farina (2000), *Simultaneous measurement of impulse response and distortion with a swept-sine
@@ -52,7 +53,7 @@ impl Sweep {
         Ok(Self { amplitude, start_hz, end_hz, duration, law, ramp: 0.0 })
     }
 
-    /// The same sweep, raised from zero and lowered to zero over `ramp` seconds at each end.
+    /// Returns the same sweep with ramps from and to zero over `ramp` seconds at each end.
     ///
     /// # Errors
     /// [`SignalError::Range`] unless 0 ≤ `ramp` ≤ half the duration.
@@ -73,7 +74,7 @@ impl Sweep {
     fn cycles(&self, t: f64) -> f64 {
         let rate = (self.end_hz / self.start_hz).ln() / self.duration;
         match self.law {
-            // A logarithmic sweep between equal ends is a sine, too.
+            // A logarithmic sweep between equal ends is also a sine.
             SweepLaw::Logarithmic if rate != 0.0 => self.start_hz * (rate * t).exp_m1() / rate,
             _ => t * (self.start_hz + 0.5 * (self.end_hz - self.start_hz) * t / self.duration),
         }
@@ -96,7 +97,7 @@ impl Sweep {
         }
     }
 
-    /// The sampled sweep; the part beyond the last sample is left out.
+    /// Samples the sweep, without a part beyond the last sample.
     ///
     /// # Errors
     /// [`SignalError::AboveNyquist`] if either end is at or above half the sampling rate.

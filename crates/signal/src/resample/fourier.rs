@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::{Record, Sampling, SignalError, Spectrum};
+use crate::error::SignalError;
+use crate::record::Record;
+use crate::sampling::Sampling;
+use crate::spectrum::Spectrum;
 
 /// Re Σ X_n exp(i n ω0 t), by Horner's rule.
 pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
@@ -14,8 +17,8 @@ pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
     lines.iter().rev().fold(Complex::from(0.0), |sum, x| sum * z + x).re
 }
 
-/// The same period with at least as many samples, by a longer inverse transform; `None` if the
-/// new time axis is not that.
+/// Returns the same period with at least as many samples, by a longer inverse transform; `None` if
+/// the new time axis is another period.
 pub(super) fn same_period(
     spectrum: &Spectrum,
     sampling: Sampling,
@@ -25,20 +28,20 @@ pub(super) fn same_period(
     if !same || sampling.len() < spectrum.sampling().len() {
         return None;
     }
-    // One-sided amplitudes do not depend on the number of samples: the old Nyquist line is a
-    // cosine like any other on the finer axis.
+    // One-sided amplitudes are independent of the number of samples: the old Nyquist line is an
+    // ordinary cosine on the finer axis.
     let mut lines = DMatrix::zeros(sampling.lines(), spectrum.channels());
     lines.rows_mut(0, spectrum.len()).copy_from(spectrum.lines());
     Some(Spectrum::from_lines(sampling, lines).and_then(|finer| finer.to_record()))
 }
 
-/// The same period begun `part` of a step later.
+/// Returns the same period begun `part` of a step later.
 pub(super) fn later(spectrum: &Spectrum, part: f64) -> Result<Record, SignalError> {
     let sampling = spectrum.sampling();
     let mut lines = spectrum.lines().clone();
     for (n, mut line) in lines.row_iter_mut().enumerate() {
         let turn = Complex::from_polar(1.0, TAU * n as f64 * part / sampling.len() as f64);
-        // Of a cosine at the Nyquist frequency the samples show the cosine alone.
+        // At the Nyquist frequency the samples contain only the cosine.
         let turn = if 2 * n == sampling.len() { turn.re.into() } else { turn };
         line *= turn;
     }

@@ -31,8 +31,10 @@ mod spline;
 
 use nalgebra::DMatrix;
 
-use crate::error::{fits_in_memory, has_channel};
-use crate::{Record, Sampling, SignalError, Spectrum};
+use crate::error::{SignalError, fits_in_memory, has_channel};
+use crate::record::Record;
+use crate::sampling::Sampling;
+use crate::spectrum::Spectrum;
 
 /// Method of interpolation between samples; compared in the [module documentation](self).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,24 +43,24 @@ use crate::{Record, Sampling, SignalError, Spectrum};
 pub enum Interpolation {
     /// Straight lines from sample to sample.
     Linear,
-    /// Cubic spline with no second derivative at the two ends.
+    /// Cubic spline with zero second derivative at the two ends.
     NaturalSpline,
     /// Cubic spline whose two outermost intervals share one cubic at each end.
     NotAKnotSpline,
     /// Piecewise cubic Hermite interpolation with monotone pieces (Fritsch and Butland).
     Pchip,
-    /// The Fourier series of the record taken as one whole period.
+    /// The Fourier series of the record as one whole period.
     BandLimited,
 }
 
-/// A record prepared for values between its samples.
+/// A record prepared for interpolation.
 #[derive(Debug, Clone)]
 pub struct Interpolator {
     sampling: Sampling,
     pieces: Pieces,
 }
 
-/// Data that the values are computed from.
+/// Data of the method.
 #[derive(Debug, Clone)]
 enum Pieces {
     Linear(DMatrix<f64>),
@@ -68,7 +70,7 @@ enum Pieces {
 }
 
 impl Interpolator {
-    /// Prepares a record: slopes of a spline, or the spectrum, are found once.
+    /// Prepares a record: computes the slopes of a spline, or the spectrum, once.
     ///
     /// # Errors
     /// [`SignalError::TooFew`] for a record of a single sample, unless it is a period.
@@ -93,11 +95,11 @@ impl Interpolator {
         Ok(Self { sampling, pieces })
     }
 
-    /// The value of a channel at `t` seconds.
+    /// Returns the value of a channel at `t` seconds.
     ///
     /// # Errors
-    /// [`SignalError::Range`] if `t` is not between the first and the last sample; a period goes
-    /// on forever, so that [`Interpolation::BandLimited`] only asks for a finite `t`;
+    /// [`SignalError::Range`] if `t` is not between the first and the last sample; a period
+    /// continues without end, so that [`Interpolation::BandLimited`] only needs a finite `t`;
     /// [`SignalError::NoSuchChannel`].
     pub fn value(&self, t: f64, channel: usize) -> Result<f64, SignalError> {
         has_channel(channel, self.channels())?;
@@ -107,11 +109,11 @@ impl Interpolator {
                 Ok(fourier::value(spectrum, channel, t))
             }
             Pieces::Linear(y) => {
-                let (k, u) = self.place(t)?;
+                let (k, u) = self.interval(t)?;
                 Ok((1.0 - u) * y[(k, channel)] + u * y[(k + 1, channel)])
             }
             Pieces::Hermite(y, d) => {
-                let (k, u) = self.place(t)?;
+                let (k, u) = self.interval(t)?;
                 let at = |k| (y[(k, channel)], d[(k, channel)]);
                 Ok(hermite(at(k), at(k + 1), u))
             }
@@ -125,11 +127,11 @@ impl Interpolator {
         }
     }
 
-    /// The interval `t` lies in and how far, from 0 to 1.
-    fn place(&self, t: f64) -> Result<(usize, f64), SignalError> {
+    /// Returns the interval of `t` and the position in it, from 0 to 1.
+    fn interval(&self, t: f64) -> Result<(usize, f64), SignalError> {
         let last = self.sampling.len() - 1;
         let steps = t / self.sampling.dt();
-        // An instant meant to be the last sample must not be lost to rounding.
+        // Rounding must not exclude the instant of the last sample.
         let slack = 1e-9 * (1.0 + last as f64);
         if !(steps >= -slack && steps <= last as f64 + slack) {
             let high = self.sampling.time(last);
@@ -140,7 +142,7 @@ impl Interpolator {
     }
 }
 
-/// The cubic through two values with two slopes, `u` of the way along a unit interval.
+/// Returns the cubic through two values with two slopes, at the fraction `u` of a unit interval.
 fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
     let secant = y1 - y0;
     let (c2, c3) = (3.0 * secant - 2.0 * d0 - d1, d0 + d1 - 2.0 * secant);
@@ -149,11 +151,11 @@ fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
 
 /// Returns the record at the instants of another time axis, both beginning at t = 0.
 ///
-/// Nothing is filtered: with a longer step, what lies above the new Nyquist frequency folds back,
-/// as it does when a signal is sampled.
+/// There is no filter: with a longer step, frequencies above the new Nyquist frequency alias, as in
+/// any sampling.
 ///
 /// # Errors
-/// As [`Interpolator::new`] and [`Interpolator::value`]; [`SignalError::Memory`].
+/// The errors of [`Interpolator::new`] and [`Interpolator::value`]; [`SignalError::Memory`].
 pub fn resample(
     record: &Record,
     sampling: Sampling,
@@ -175,9 +177,9 @@ pub fn resample(
     Record::new(sampling, data)
 }
 
-/// Returns the values within the steps, at t = (k + `part`) Δt for every sample k, `part` being a pure number
-/// from 0 to 1: the force that a Runge-Kutta stage asks for. Behind the last sample of anything but a period
-/// stands that sample.
+/// Returns the values within the steps, at t = (k + `part`) Δt for every sample k, with `part` a
+/// pure number from 0 to 1: the force for a Runge-Kutta stage. Except for a period, the last sample
+/// continues after the record.
 ///
 /// ```
 /// use mechid_signal::{Interpolation, Multisine, Phases, Sampling, resample::within_steps};
@@ -191,7 +193,7 @@ pub fn resample(
 /// ```
 ///
 /// # Errors
-/// [`SignalError::Range`] for a `part` outside, and those of [`Interpolator::new`].
+/// [`SignalError::Range`] for a `part` out of range, and the errors of [`Interpolator::new`].
 pub fn within_steps(
     record: &Record,
     part: f64,
@@ -226,7 +228,7 @@ pub fn within_steps(
 /// its last sample.
 ///
 /// # Errors
-/// As [`resample`], and [`SignalError::TooFew`] if `factor` is 0.
+/// The errors of [`resample`], and [`SignalError::TooFew`] if `factor` is 0.
 pub fn refine(
     record: &Record,
     factor: usize,

@@ -1,7 +1,7 @@
 //! Cubic splines on a uniform axis, as slopes at the samples.
 //!
-//! Continuity of the second derivative at an inner sample asks, per step,
-//! d_{k−1} + 4 d_k + d_{k+1} = 3 (y_{k+1} − y_{k−1}); the two ends add one equation each.
+//! Continuity of the second derivative at an inner sample requires, per step, d_{k−1} + 4 d_k +
+//! d_{k+1} = 3 (y_{k+1} − y_{k−1}); the two ends add one equation each.
 //!
 //! # Source
 //! de Boor, *A Practical Guide to Splines*, chapter on cubic spline interpolation.
@@ -32,11 +32,11 @@ pub(super) fn not_a_knot(y: &[f64]) -> Vec<f64> {
     }
 }
 
-/// The tridiagonal system; an end equation is (coefficient of the end, of its neighbour, right
-/// side).
+/// Solves the tridiagonal system; an end equation is (coefficient of the end, of its neighbour,
+/// right side).
 fn solve(y: &[f64], first: (f64, f64, f64), last: (f64, f64, f64)) -> Vec<f64> {
     let n = y.len();
-    // Elimination leaves d_k + above[k] · d_{k+1} = right[k].
+    // After elimination d_k + above[k] · d_{k+1} = right[k].
     let (mut above, mut right) = (vec![0.0; n], vec![0.0; n]);
     (above[0], right[0]) = (first.1 / first.0, first.2 / first.0);
     for k in 1..n - 1 {

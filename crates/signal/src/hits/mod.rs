@@ -1,0 +1,392 @@
+//! Hits of an instrumented hammer, detected in its force.
+
+use std::fmt;
+use std::ops::Range;
+
+use crate::clipping::clipping;
+use crate::error::{SignalError, not_negative, positive};
+use crate::limits;
+use crate::message;
+use crate::record::Record;
+
+/// Ratio of the standard deviation of Gaussian noise to the median of its magnitude.
+const GAUSSIAN: f64 = 1.482_602;
+
+/// Rule that detects hits in a force and their faults.
+///
+/// ```
+/// use mechid_signal::{HitRule, Sampling, excitation::HalfSine, hits};
+///
+/// let sampling = Sampling::from_rate_hz(1000.0, 4000)?;
+/// let pulse = |peak, start| HalfSine::new(peak, start, 0.008)?.sample(sampling);
+/// let pulses = [pulse(100.0, 0.5)?, pulse(4.0, 1.5)?, pulse(80.0, 2.5)?, pulse(30.0, 2.53)?];
+/// let force: Vec<f64> = (0..4000).map(|k| pulses.iter().map(|p| p.channel(0)[k]).sum()).collect();
+/// let found = hits(&force, sampling.dt(), &HitRule::default())?;
+/// assert_eq!(found.all.len(), 3);
+/// assert!(found.all[0].faults.is_empty());
+/// assert_eq!(found.all[1].faults[0].to_string(), "weak hit: its peak is 4.0 % of the median peak");
+/// assert_eq!(found.all[2].faults[0].to_string(), "double hit: a second peak of 37.5 % after 30.0 ms");
+/// # Ok::<(), mechid_signal::SignalError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct HitRule {
+    /// Force that begins a hit, in per cent of the largest force of the record. A smaller force
+    /// does not end the window of the hit before it, although the structure responds to it.
+    pub trigger_percent: f64,
+    /// Smallest second peak of a double hit, in per cent of the first.
+    pub double_percent: f64,
+    /// Smallest peak of a hit, in per cent of the median of all peaks of at least a tenth of the
+    /// largest.
+    pub weak_percent: f64,
+    /// Time after the trigger within which a force belongs to the same hit, in s. The structure
+    /// strikes a bouncing hammer again some milliseconds to some hundredths of a second later; the
+    /// anti-aliasing filters have settled by then.
+    pub bounce_s: f64,
+    /// Number of samples of a window before its pulse; `None`: twice those of the pulse.
+    pub before: Option<usize>,
+    /// Number of samples of a window; `None`: up to the window of the next hit.
+    pub samples: Option<usize>,
+}
+
+impl Default for HitRule {
+    fn default() -> Self {
+        Self {
+            trigger_percent: 0.5,
+            double_percent: 5.0,
+            weak_percent: 25.0,
+            bounce_s: 0.1,
+            before: None,
+            samples: None,
+        }
+    }
+}
+
+impl HitRule {
+    fn check(&self) -> Result<(), SignalError> {
+        let percentages = [
+            ("trigger in per cent", self.trigger_percent),
+            ("second peak in per cent", self.double_percent),
+            ("weak hit in per cent", self.weak_percent),
+        ];
+        for (what, value) in percentages {
+            positive(what, value)?;
+            if value > 100.0 {
+                return Err(SignalError::Range { what, value, low: 0.0, high: 100.0 });
+            }
+        }
+        not_negative("bounce", self.bounce_s)?;
+        match self.samples {
+            Some(0) => Err(SignalError::Empty),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Hits of a record of force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hits {
+    /// Median of the force, in its unit: the offset of its transducer.
+    pub offset: f64,
+    /// Standard deviation of the force between the hits, in its unit.
+    pub noise: f64,
+    /// Every hit, good or bad, in order of time.
+    pub all: Vec<Hit>,
+}
+
+/// One hit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hit {
+    /// Samples around the peak where the force is above a tenth of it, counted from 0.
+    pub pulse: Range<usize>,
+    /// Largest force without the offset, in its unit; negative if the hits are.
+    pub peak: f64,
+    /// Samples that belong to the hit, counted from 0: some before the pulse, and the response
+    /// after it.
+    pub window: Range<usize>,
+    /// Faults of the hit; none for a good hit.
+    pub faults: Vec<HitFault>,
+}
+
+/// Reason not to use a hit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(tag = "fault", rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum HitFault {
+    /// The hammer bounces: the force has a second peak before the window ends.
+    Double {
+        /// Second peak, in per cent of the first.
+        percent: f64,
+        /// Time from the first peak to the second, in s; negative if the smaller one is first.
+        after_s: f64,
+    },
+    /// The force is clipped.
+    Overload {
+        /// Level at which it is clipped, in its unit.
+        level: f64,
+    },
+    /// A response is clipped.
+    ResponseOverload {
+        /// Channel of the response, counted from 0.
+        channel: usize,
+        /// Level at which it is clipped, in its unit.
+        level: f64,
+    },
+    /// The peak is small compared with the others.
+    Weak {
+        /// Peak, in per cent of the median peak.
+        percent: f64,
+    },
+    /// The record begins or ends within the pulse.
+    Cut,
+    /// The record ends too soon after the hit.
+    RecordEnds {
+        /// Number of samples in the window.
+        samples: usize,
+        /// Number of samples needed.
+        needed: usize,
+    },
+    /// The next hit comes too soon.
+    NextHit {
+        /// Number of samples in the window.
+        samples: usize,
+        /// Number of samples needed.
+        needed: usize,
+    },
+}
+
+impl fmt::Display for HitFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Double { percent, after_s } => {
+                let side = if after_s < 0.0 { "before" } else { "after" };
+                let ms = 1e3 * after_s.abs();
+                write!(f, "double hit: a second peak of {percent:.1} % {side} {ms:.1} ms")
+            }
+            Self::Overload { level } => {
+                write!(f, "overload: the force is clipped at {}", message::number_to(level, 3))
+            }
+            Self::ResponseOverload { channel, level } => write!(
+                f,
+                "overload: response channel {} is clipped at {}",
+                channel.saturating_add(1),
+                message::number_to(level, 3)
+            ),
+            Self::Weak { percent } => {
+                write!(f, "weak hit: its peak is {percent:.1} % of the median peak")
+            }
+            Self::Cut => f.write_str("the record begins or ends within the pulse"),
+            Self::RecordEnds { samples, needed } => {
+                write!(f, "the record ends after {samples} samples of its window, {needed} needed")
+            }
+            Self::NextHit { samples, needed } => {
+                write!(
+                    f,
+                    "the next hit comes after {samples} samples of its window, {needed} needed"
+                )
+            }
+        }
+    }
+}
+
+/// Detects the hits of a hammer in its force, sampled every `dt` seconds.
+///
+/// A hit begins where the force exceeds the trigger level, counted from the median of all samples.
+/// Its window extends to the next hit, however light, or has the length of the rule. A force below
+/// 12 standard deviations of the noise between the hits, or below four steps of the converter, is
+/// noise.
+///
+/// # Errors
+/// [`SignalError::NotPositive`], [`SignalError::Negative`], [`SignalError::Range`] and
+/// [`SignalError::Empty`] for impossible numbers of the rule; [`SignalError::NotFinite`].
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 3 (transient excitation by a hammer); the limits
+/// are ours.
+pub fn hits(force: &[f64], dt: f64, rule: &HitRule) -> Result<Hits, SignalError> {
+    rule.check()?;
+    positive("time step", dt)?;
+    if let Some((sample, value)) = force.iter().enumerate().find(|(_, f)| !f.is_finite()) {
+        return Err(SignalError::NotFinite { sample, channel: 0, value: *value });
+    }
+    let offset = median(force.to_vec());
+    let noise = GAUSSIAN * median(force.iter().map(|f| (f - offset).abs()).collect());
+    let furthest = force.iter().map(|f| f - offset).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let sign = if furthest.unwrap_or(0.0) < 0.0 { -1.0 } else { 1.0 };
+    let push: Vec<f64> = force.iter().map(|f| sign * (f - offset)).collect();
+    let largest = furthest.unwrap_or(0.0).abs();
+    // The steps of a short pulse without noise are large.
+    let floor = (limits::HIT_OVER_NOISE * noise)
+        .max((limits::HIT_OVER_STEP * step(force)).min(limits::MEDIAN_PEAK_FRACTION * largest));
+    if largest <= floor || largest == 0.0 {
+        return Ok(Hits { offset, noise, all: Vec::new() });
+    }
+    let trigger = floor.max(0.01 * rule.trigger_percent * largest);
+    let bounce = (rule.bounce_s / dt).ceil() as usize;
+    let mut hits: Vec<Hit> = Vec::new();
+    let mut at = 0;
+    while let Some(first) = (at..push.len()).find(|k| push[*k] > trigger) {
+        let below = |from: usize| (from..push.len()).find(|k| push[*k] <= trigger);
+        let end = first.saturating_add(bounce).max(below(first).unwrap_or(push.len()));
+        at = below(end).unwrap_or(push.len());
+        hits.push(Hit::around(&push, first..end.min(push.len()), sign));
+    }
+    windows(&mut hits, push.len(), rule);
+    find_faults(&mut hits, force, &push, dt, floor, rule);
+    Ok(Hits { offset, noise, all: hits })
+}
+
+impl Hits {
+    /// Detects clipped responses (samples × channels) in the window of every hit.
+    ///
+    /// # Errors
+    /// [`SignalError::Range`] if the response ends before the last window.
+    ///
+    /// # Source
+    /// The source of [`clipping()`].
+    pub fn check_response(&mut self, response: &Record) -> Result<(), SignalError> {
+        for hit in &mut self.all {
+            let window = response.window(hit.window.start, hit.window.len())?;
+            for channel in 0..window.channels() {
+                if let Some(cut) = clipping(window.channel(channel)) {
+                    let level = cut.level;
+                    hit.faults.push(HitFault::ResponseOverload { channel, level });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the force in the window of a hit, in its unit, one value per sample: without the
+    /// offset, and zero away from the pulse (a *force window*), where the hammer has no contact and
+    /// the transducer measures only noise.
+    ///
+    /// # Panics
+    /// If the window is outside this force.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation.
+    pub fn pulse_alone(&self, force: &[f64], hit: &Hit) -> Vec<f64> {
+        let margin = hit.pulse.len();
+        let around_pulse = hit.pulse.start.saturating_sub(margin)..hit.pulse.end + margin;
+        let value = |k: usize| if around_pulse.contains(&k) { force[k] - self.offset } else { 0.0 };
+        hit.window.clone().map(value).collect()
+    }
+}
+
+impl Hit {
+    /// Returns the hit with its peak among some samples of an upward force.
+    fn around(push: &[f64], range: Range<usize>, sign: f64) -> Self {
+        let at = largest_of(push, range);
+        let limit = limits::PULSE_FRACTION * push[at];
+        let start = (0..at).rev().find(|k| push[*k] <= limit).map_or(0, |k| k + 1);
+        let end = (at..push.len()).find(|k| push[*k] <= limit).unwrap_or(push.len());
+        Self { pulse: start..end, peak: sign * push[at], window: start..end, faults: Vec::new() }
+    }
+}
+
+/// Sets the window of every hit, and the fault of a window that is too short.
+fn windows(all: &mut [Hit], samples: usize, rule: &HitRule) {
+    let mut earliest = 0;
+    for hit in all.iter_mut() {
+        let before = rule.before.unwrap_or(limits::PRE_TRIGGER * hit.pulse.len());
+        hit.window.start = hit.pulse.start.saturating_sub(before).max(earliest);
+        earliest = hit.pulse.end;
+    }
+    let ends: Vec<usize> =
+        all.iter().skip(1).map(|hit| hit.window.start).chain([samples]).collect();
+    let rooms = all.iter().zip(&ends).map(|(hit, end)| (end - hit.window.start) as f64).collect();
+    let least = (limits::SHORTEST_WINDOW * median(rooms)).ceil() as usize;
+    for (hit, end) in all.iter_mut().zip(ends) {
+        let needed = rule.samples.unwrap_or(least);
+        let got = end - hit.window.start;
+        hit.window.end = match rule.samples {
+            Some(samples) => hit.window.start + samples.min(got),
+            None => end,
+        };
+        if hit.pulse.start == 0 || hit.pulse.end == samples {
+            hit.faults.push(HitFault::Cut);
+        } else if got < needed {
+            hit.faults.push(if end == samples {
+                HitFault::RecordEnds { samples: got, needed }
+            } else {
+                HitFault::NextHit { samples: got, needed }
+            });
+        }
+    }
+}
+
+fn find_faults(all: &mut [Hit], force: &[f64], push: &[f64], dt: f64, floor: f64, rule: &HitRule) {
+    let heights = || all.iter().map(|hit| hit.peak.abs());
+    let least = limits::MEDIAN_PEAK_FRACTION * heights().fold(0.0, f64::max);
+    let usual = median(heights().filter(|peak| *peak >= least).collect());
+    let in_record = clipping(force).map(|cut| cut.level);
+    for hit in all {
+        let peak = hit.peak.abs();
+        let least = floor.max(0.01 * rule.double_percent * peak);
+        let window = hit.window.clone();
+        let main = largest_of(push, hit.pulse.clone());
+        let second = peaks(&push[window.clone()], least)
+            .into_iter()
+            .map(|at| window.start + at)
+            .filter(|at| push[*at] >= least && *at != main)
+            .max_by(|a, b| push[*a].total_cmp(&push[*b]));
+        if let Some(at) = second {
+            let after_s = (at as f64 - main as f64) * dt;
+            hit.faults.push(HitFault::Double { percent: 100.0 * push[at] / peak, after_s });
+        }
+        let in_window = clipping(&force[window]).map(|cut| cut.level);
+        let level =
+            [in_record, in_window].into_iter().flatten().find(|level| *level == force[main]);
+        hit.faults.extend(level.map(|level| HitFault::Overload { level }));
+        if peak < 0.01 * rule.weak_percent * usual {
+            hit.faults.push(HitFault::Weak { percent: 100.0 * peak / usual });
+        }
+    }
+}
+
+/// Returns the indices of the maxima after which, and between which, the values fall by at least
+/// `prominence`.
+fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
+    let mut maxima = Vec::new();
+    let (mut rising, mut extreme) = (true, 0);
+    for (at, value) in values.iter().enumerate() {
+        let further = if rising { *value > values[extreme] } else { *value < values[extreme] };
+        if further {
+            extreme = at;
+        } else if (value - values[extreme]).abs() >= prominence {
+            if rising {
+                maxima.push(extreme);
+            }
+            (rising, extreme) = (!rising, at);
+        }
+    }
+    maxima
+}
+
+/// Returns the smallest change from one sample to the next: a step of the converter, or almost zero
+/// if it has very many.
+fn step(values: &[f64]) -> f64 {
+    let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| *d > 0.0);
+    changes.fold(f64::INFINITY, f64::min)
+}
+
+/// Returns the index of the largest value in a range that is not empty, the first of several.
+fn largest_of(values: &[f64], range: Range<usize>) -> usize {
+    let start = range.start;
+    range.fold(start, |largest, at| if values[at] > values[largest] { at } else { largest })
+}
+
+/// Returns the median; 0 without values.
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests;

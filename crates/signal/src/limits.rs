@@ -1,0 +1,153 @@
+//! Limits of this crate: the numbers that decide what is noise, when to stop and what to accept.
+
+// Clipping
+
+/// Minimum number of equal samples of a clipped run: the peak of a smooth signal has fewer.
+pub(crate) const CLIPPED_RUN: usize = 3;
+
+/// Smallest jump, in steps of the converter, at the end of a clipped run. A smooth peak with three
+/// equal samples falls by less than four steps in the next one; a clipped signal leaves its limit
+/// as fast as it changes.
+pub(crate) const CLIPPED_JUMP: f64 = 6.0;
+
+/// Fraction of the time at an extreme above which a channel is at rest there.
+pub(crate) const REST_FRACTION: f64 = 0.5;
+
+/// Fraction of the time at the extremes, without the rest, above which a channel is a two-level
+/// signal.
+pub(crate) const TWO_LEVEL_FRACTION: f64 = 0.9;
+
+// Excited lines
+
+/// Smallest amplitude of an excited line, relative to the strongest: far above rounding and
+/// quantisation, far below any line that is driven on purpose.
+pub(crate) const EXCITED_AMPLITUDE: f64 = 1e-3;
+
+/// Ratio of the strongest line to the peak value below which a signal is constant and its spectrum
+/// rounding.
+pub(crate) const CONSTANT_SIGNAL: f64 = 1e-12;
+
+/// Probability that any undriven line of a record counts as excited.
+pub(crate) const EXCITED_LEVEL: f64 = 1e-3;
+
+/// Number of lines on either side whose scatter gives the noise level of a line.
+pub(crate) const NOISE_NEIGHBOURS: usize = 16;
+
+/// Minimum number of lines that are the noise of a single period.
+pub(crate) const NOISE_LINES: usize = 16;
+
+/// Smallest ratio of the amplitudes of excited lines to the noise of a single period: the
+/// amplitudes of noise have no such gap.
+pub(crate) const NOISE_GAP: f64 = 3.0;
+
+// Noise above the driven band
+
+/// Number of lines averaged for one level.
+pub(crate) const FLOOR_LINES: usize = 64;
+
+/// Minimum number of equal levels, from half the sampling rate down.
+pub(crate) const FLOOR_LEVELS: usize = 3;
+
+/// Ratio up to which levels are equal: more than four standard deviations of the ratio of two.
+pub(crate) const FLOOR_RATIO: f64 = 3.0;
+
+/// Standard deviation of the logarithm of a level of 64 lines under Hann's window, whose
+/// neighbours are correlated.
+pub(crate) const FLOOR_SCATTER: f64 = 0.17;
+
+/// Maximum difference of the upper and the lower half of the levels, in standard deviations.
+pub(crate) const FLOOR_DEVIATION: f64 = 4.0;
+
+/// Level, relative to the largest, above which the band is driven.
+pub(crate) const DRIVEN_LEVEL: f64 = 0.01;
+
+/// Standard deviation of noise, relative to the RMS of the signal, that is too small to affect a
+/// parameter and counts as zero.
+pub(crate) const NEGLIGIBLE_NOISE: f64 = 1e-5;
+
+// Hits
+
+/// Fraction of its own peak above which a force belongs to the pulse of a hit.
+pub(crate) const PULSE_FRACTION: f64 = 0.1;
+
+/// Smallest peak of a hit, in standard deviations of the noise: the range of 10⁵ samples of
+/// Gaussian noise is 9 of them.
+pub(crate) const HIT_OVER_NOISE: f64 = 12.0;
+
+/// Smallest peak of a hit, in steps of the converter: a force at rest flickers between two of its
+/// levels.
+pub(crate) const HIT_OVER_STEP: f64 = 4.0;
+
+/// Fraction of the largest peak above which a peak counts for the median: there may be many light
+/// hits between the good ones.
+pub(crate) const MEDIAN_PEAK_FRACTION: f64 = 0.1;
+
+/// Smallest length of a window that ends with the next one, over the median of all windows.
+pub(crate) const SHORTEST_WINDOW: f64 = 0.25;
+
+/// Default number of samples before a pulse, over the samples of the pulse.
+pub(crate) const PRE_TRIGGER: usize = 2;
+
+// Repetition and quantisation
+
+/// Largest mismatch of a periodic signal; the mismatch of a signal with noise of a tenth of its
+/// RMS value is smaller.
+pub(crate) const PERIODIC_MISMATCH: f64 = 0.125;
+
+/// Largest ratio of the squared mismatches of equally good lags.
+pub(crate) const EQUAL_LAGS: f64 = 2.0;
+
+/// Ratio of the squared mismatch to that of [`PERIODIC_MISMATCH`] that ends the first similarity
+/// of a slow signal with itself: more than the ratio of any two equally good lags.
+pub(crate) const SLOW_SIGNAL: f64 = 2.0 * EQUAL_LAGS;
+
+/// Squared mismatch due to rounding in the Fourier transforms.
+pub(crate) const MISMATCH_ROUNDING: f64 = 1e-12;
+
+/// Minimum number of pairs of samples in a fit of growth: two terms would explain any difference
+/// of fewer.
+pub(crate) const GROWTH_PAIRS: usize = 20;
+
+/// Smallest fraction of the difference that counts as growth; a smaller one may be rounding.
+pub(crate) const GROWTH_FRACTION: f64 = 0.01;
+
+/// Number of samples examined for the step of a converter.
+pub(crate) const QUANTISATION_SAMPLES: usize = 8192;
+
+/// Minimum number of different values; a signal with fewer may have few values without a
+/// converter.
+pub(crate) const QUANTISATION_LEVELS: usize = 16;
+
+/// Deviation of the distance of two values from a whole number of steps, in steps: the rounding of
+/// printed digits.
+pub(crate) const QUANTISATION_DEVIATION: f64 = 0.05;
+
+// Excitation
+
+/// Largest exponent of a power law; above it a single line has all the power.
+pub(crate) const NOISE_EXPONENT: f64 = 10.0;
+
+/// Largest change of the given phases before the first start, as a fraction of 2π.
+pub(crate) const PHASE_CHANGE: f64 = 1e-2;
+
+/// Damping of the first step, as a multiple of the mean curvature.
+pub(crate) const FIRST_DAMPING: f64 = 1e-2;
+
+/// Maximum number of steps per exponent, far more than needed.
+pub(crate) const CREST_STEPS: usize = 400;
+
+/// Relative reduction of the norm by two successive steps at which an exponent ends.
+pub(crate) const CREST_GAIN: f64 = 1e-5;
+
+/// Largest damping; above it the norm is stationary to rounding.
+pub(crate) const LARGEST_DAMPING: f64 = 1e6;
+
+/// Maximum number of lines for which the Hessian is formed and factored; for more it is only
+/// applied. At this number the two cost the same.
+pub(crate) const DENSE_HESSIAN: usize = 400;
+
+/// Residual, relative to the gradient, at which conjugate gradients stop.
+pub(crate) const CG_RESIDUAL: f64 = 0.05;
+
+/// Maximum number of steps of conjugate gradients.
+pub(crate) const CG_STEPS: usize = 60;
