@@ -27,7 +27,7 @@ fn response(len: usize) -> Response {
 fn displacements(len: usize) -> Measurement {
     let exact = response(len);
     let noisy = noise::add_white(exact.displacement(), NoiseLevel::FractionOfRms(0.01), 1).unwrap();
-    Measurement::of_all(ResponseQuantity::Displacement, noisy)
+    Measurement::from_record(ResponseQuantity::Displacement, noisy)
 }
 
 fn equations(c: &mut Criterion) {

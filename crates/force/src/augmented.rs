@@ -1,4 +1,4 @@
-//! Machine and forces as one state space, and the model of the forces that suits a measurement.
+//! System and forces as one state space, and the force model of maximum likelihood.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,52 +8,39 @@ use mechid_numerics::nelder_mead::minimise;
 use mechid_signal::Sampling;
 use nalgebra::DMatrix;
 
-use crate::alike::alike;
-use crate::force_model::{LowPass, step_noise};
-use crate::seen::Seen;
+use crate::error::ForceError;
+use crate::force_information::ForceInformation;
+use crate::force_model::{ForceModel, LowPass, step_noise};
+use crate::limits;
+use crate::measurement::{Measurement, Start};
+use crate::posterior_points::posterior_points;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;
-use crate::{ForceError, ForceModel, Measurement, Start};
 
-/// Orders tried, each from where the one before was most likely; the first two from a grid.
-const ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
-/// Logarithm of the likelihood that a higher order must gain for the next to be tried.
-const ENOUGH: f64 = 1.0;
-/// States that the forces may have together: more of them make long records slow.
-const FORCE_STATES: usize = 16;
-/// Ratio between the corner frequencies tried first, from half a period in the record up.
-const CORNER_RATIO: f64 = 4.0;
-/// Highest corner, in radians per sample: the Nyquist frequency.
-const HIGHEST: f64 = PI;
-/// Signal-to-noise ratios tried first.
-const RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
-/// The noise has no digits left above this ratio, and is all there is below the other.
-const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
-
-/// The machine with forces of any model. A force is carried as that part of x + ½ẍΔt² which it
-/// adds within a step, so that no entry is large whatever the unit of the machine.
+/// The system with forces of any model. The state of a force is its contribution to x + ½ẍΔt²
+/// within a step, so that no entry is large in any unit of the system.
 pub(crate) struct Augmented {
     machine: Machine,
     rate: DMatrix<f64>,
-    /// Newtons per unit of each force's state.
+    /// Force of each force state, in N.
     units: Vec<f64>,
     start: Start,
-    /// Largest displacement, and velocity times Δt, that the measurement may stand for.
+    /// Largest displacement, and velocity times Δt, that the measurement allows.
     spreads: [f64; 2],
     /// Samples, channels side by side, divided by their scale.
     data: Vec<f64>,
     sampling: Sampling,
-    seen: Seen,
+    information: ForceInformation,
 }
 
-/// A model of the forces with the noise it leaves, in channel scales.
+/// A model of the forces with the remaining noise, in channel scales.
 #[derive(Debug, Clone)]
 pub(crate) struct Tuned {
     pub model: ForceModel,
     pub noise: f64,
     pub log_likelihood: f64,
     /// Logarithms of the signal-to-noise ratio of each force and of the corner in radians per
-    /// sample; none of a model given.
+    /// sample; none for a given model.
     free: Vec<f64>,
 }
 
@@ -69,7 +56,7 @@ impl Augmented {
         let (channels, dt) = (scale.len(), sampling.dt());
         let machine = Machine::new(system, measured, forced, scale)?;
         let units = machine.input.column_iter().map(|column| column.amax().recip()).collect();
-        let sizes = Sizes::of(measured);
+        let sizes = Sizes::from_measurement(measured);
         let data = (0..sampling.len() * channels)
             .map(|at| {
                 measured.record().data()[(at / channels, at % channels)] / scale[at % channels]
@@ -82,7 +69,7 @@ impl Augmented {
             spreads: [sizes.displacement, sizes.velocity * dt],
             data,
             sampling,
-            seen: Seen::new(system, measured, forced, scale)?,
+            information: ForceInformation::new(system, measured, forced, scale)?,
             machine,
         })
     }
@@ -91,17 +78,17 @@ impl Augmented {
         &self.data
     }
 
-    pub fn seen(&self) -> &Seen {
-        &self.seen
+    pub fn information(&self) -> &ForceInformation {
+        &self.information
     }
 
-    /// Newtons per unit of each force's state.
+    /// Force of each force state, in N.
     pub fn units(&self) -> &[f64] {
         &self.units
     }
 
-    /// The state space under a model; `noise` and `spread` are relative to the channel scales and
-    /// to what the measurement shows at most.
+    /// Returns the state space under a model; `noise` and `spread` are relative to the channel
+    /// scales and to the largest response in the measurement.
     pub fn space(
         &self,
         model: &ForceModel,
@@ -147,14 +134,16 @@ impl Augmented {
         })
     }
 
-    /// The likelihood under a model, given as the logarithms of each force's signal-to-noise ratio
-    /// and of the corner in radians per sample. A noise that is not known is the one that the
-    /// innovations have: all variances go with it.
+    /// Returns the likelihood under a model, given as the logarithms of each force's
+    /// signal-to-noise ratio and of the corner in radians per sample. An unknown noise comes from
+    /// the innovations, and all variances scale with it.
     fn trial(&self, process: &LowPass, noise: Option<f64>, free: &[f64]) -> Option<Tuned> {
         let (corner, ratios) = free.split_last()?;
         let (lowest, forces) = (self.lowest(), ratios.len());
-        let outside = |ratio: &f64| !RATIO_RANGE.contains(&ratio.exp());
-        if !(lowest.ln()..=HIGHEST.ln()).contains(corner) || ratios.iter().any(outside) {
+        let outside = |ratio: &f64| !limits::RATIO_RANGE.contains(&ratio.exp());
+        if !(lowest.ln()..=limits::HIGHEST_CORNER.ln()).contains(corner)
+            || ratios.iter().any(outside)
+        {
             return None;
         }
         let order = process.rate.nrows();
@@ -162,14 +151,14 @@ impl Augmented {
         let mut model = ForceModel { order, corner_hz, rms: vec![1.0; forces] };
         let unit = noise.unwrap_or(1.0);
         for (f, ratio) in ratios.iter().enumerate() {
-            let gain = self.seen.gain(&model, process, f);
+            let gain = self.information.gain(&model, process, f);
             model.rms[f] = unit * ratio.exp() / gain;
         }
         if model.rms.iter().any(|rms| !(*rms > 0.0 && rms.is_finite())) {
             return None;
         }
         let largest = ratios.iter().copied().fold(0.0, f64::max).exp();
-        // Ten times what was seen is no constraint, and leaves the filter its digits.
+        // Ten times the measured size is no constraint, and keeps the digits of the filter.
         let spread = 10.0 * if noise.is_none() { largest } else { 1.0 };
         let space = self.space(&model, process, unit, spread).ok()?;
         let innovations = space.innovations(&self.data);
@@ -189,7 +178,7 @@ impl Augmented {
         log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
     }
 
-    /// A model given, with the noise of the scales.
+    /// Returns a given model, with the noise of the scales.
     pub fn given(&self, model: &ForceModel) -> Result<Tuned, ForceError> {
         let process = LowPass::new(model.order)?;
         let space = self.space(model, &process, 1.0, 10.0)?;
@@ -202,13 +191,13 @@ impl Augmented {
         0.05 * PI / self.sampling.len() as f64
     }
 
-    /// The model of greatest likelihood of all orders.
+    /// Returns the model of maximum likelihood over all orders.
     pub fn most_likely(&self, noise: Option<f64>) -> Result<Tuned, ForceError> {
         let forces = self.units.len();
         let mut best: Option<Tuned> = None;
         let mut from: Option<(f64, Vec<f64>)> = None;
-        for order in ORDERS {
-            if order > 2 && order * forces > FORCE_STATES {
+        for order in limits::FORCE_ORDERS {
+            if order > 2 && order * forces > limits::FORCE_STATES {
                 break;
             }
             let process = LowPass::new(order)?;
@@ -222,7 +211,8 @@ impl Augmented {
                     None => continue,
                 },
             };
-            // A hundredth in the log-likelihood moves no parameter by a tenth of its own uncertainty.
+            // A hundredth in the log-likelihood moves no parameter by a tenth of its own
+            // uncertainty.
             let step = if order > 2 { 0.3 } else { 1.0 };
             let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
             let Some(tuned) = self.trial(&process, noise, &point) else { continue };
@@ -231,33 +221,38 @@ impl Augmented {
             if gain.is_none_or(|gain| gain > 0.0) {
                 best = Some(tuned);
             }
-            // Where twice the order says no more, four times says no more either.
-            if order > 4 && gain.is_some_and(|gain| gain < ENOUGH) {
+            // If twice the order does not improve the likelihood, four times does not either.
+            if order > 4 && gain.is_some_and(|gain| gain < limits::ORDER_GAIN) {
                 break;
             }
         }
         best.ok_or(ForceError::NoLikelihood)
     }
 
-    /// Models as likely as the best one, with their weights; that one alone where it was given.
-    pub fn alike(&self, best: &Tuned, noise: Option<f64>) -> Result<Vec<(f64, Tuned)>, ForceError> {
+    /// Returns posterior models with their weights; only the best one if it was given.
+    pub fn posterior_points(
+        &self,
+        best: &Tuned,
+        noise: Option<f64>,
+    ) -> Result<Vec<(f64, Tuned)>, ForceError> {
         if best.free.is_empty() {
             return Ok(vec![(1.0, best.clone())]);
         }
         let process = LowPass::new(best.model.order)?;
-        let points =
-            alike(&best.free, |point| Some(self.trial(&process, noise, point)?.log_likelihood))?;
+        let points = posterior_points(&best.free, |point| {
+            Some(self.trial(&process, noise, point)?.log_likelihood)
+        })?;
         let tuned =
             |(weight, point): (f64, Vec<f64>)| Some((weight, self.trial(&process, noise, &point)?));
         Ok(points.into_iter().filter_map(tuned).collect())
     }
 
-    /// The best point of a grid, all forces alike.
+    /// Returns the best point of a grid, with equal forces.
     fn coarse(&self, forces: usize, cost: &dyn Fn(&[f64]) -> f64) -> Option<Vec<f64>> {
         let mut best = (f64::INFINITY, None);
         let mut corner = PI / self.sampling.len() as f64;
-        while corner < HIGHEST {
-            for ratio in RATIOS {
+        while corner < limits::HIGHEST_CORNER {
+            for ratio in limits::GRID_RATIOS {
                 let mut point = vec![ratio.ln(); forces];
                 point.push(corner.ln());
                 let value = cost(&point);
@@ -265,16 +260,17 @@ impl Augmented {
                     best = (value, Some(point));
                 }
             }
-            corner *= CORNER_RATIO;
+            corner *= limits::CORNER_RATIO;
         }
         best.1
     }
 
-    /// The state space started from what a first pass says of the first sample, within a hundred
-    /// times what the filter knows once it has settled.
+    /// Returns the state space with the initial state of a first pass, with standard deviations of
+    /// at most a hundred times those of the converged filter.
     ///
-    /// The wide start of the first pass costs the variances of the first samples their digits;
-    /// this one does not, and moves the estimates by a ten-thousandth of their standard error.
+    /// The wide initial covariance of the first pass costs the variances of the first samples their
+    /// digits; this one does not, and changes the estimates by a ten-thousandth of their standard
+    /// error.
     pub fn started(&self, mut space: StateSpace) -> StateSpace {
         let (m, machine) = (space.states, self.rate.nrows());
         let first = space.filter(&self.data);
@@ -292,12 +288,12 @@ impl Augmented {
     }
 }
 
-/// A start for a higher order: the corner of the one before, and the ratio that suits a sharper end.
-/// A band whose end is too gentle takes noise for force.
+/// Returns an initial estimate for a higher order: the corner of the one before, and the ratio for
+/// a sharper end. A band with a gentle end would model noise as force.
 fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     let mut best = (cost(point), point.to_vec());
     let last = point.len() - 1;
-    for ratio in RATIOS {
+    for ratio in limits::GRID_RATIOS {
         let mut trial = vec![ratio.ln(); last];
         trial.push(point[last]);
         let value = cost(&trial);
@@ -308,8 +304,8 @@ fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     best.1
 }
 
-/// Upper sizes of the motion, from what was measured: velocities by differences of the samples
-/// (noise included), displacements as if all motion were one period long.
+/// Upper bounds of the motion from the measurement: velocities by differences of the samples
+/// (including noise), displacements as if all motion were one period long.
 #[derive(Default)]
 struct Sizes {
     displacement: f64,
@@ -317,7 +313,7 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn of(measured: &Measurement) -> Self {
+    fn from_measurement(measured: &Measurement) -> Self {
         let sampling = measured.sampling();
         let (fast, slow) = (1.0 / sampling.dt(), 1.0 / sampling.omega0());
         let mut largest = Self::default();

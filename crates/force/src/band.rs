@@ -3,19 +3,17 @@
 use mechid_signal::{Extent, Record, Sampling, Spectrum};
 use nalgebra::DMatrix;
 
-use crate::ForceError;
+use crate::error::ForceError;
+use crate::limits;
 
-/// Line spacings by which the end of a band may miss a line through rounding.
-const SLACK: f64 = 1e-9;
-
-/// The part of a record between two frequencies in Hz, ends included: samples × channels, in the
-/// unit of the record.
+/// Returns the part of a record between two frequencies in Hz, including the ends: samples ×
+/// channels, in the unit of the record.
 ///
 /// A whole period keeps its lines in the band. An open record is continued by its mirror image, so
-/// that its ends need not meet: its lines are half as far apart.
+/// that its ends match: its lines are half as far apart.
 ///
-/// It is what methods that seek a force in a band ([`Measurement::in_band`]) return of it, and what
-/// their result is to be compared with.
+/// Methods that estimate a force in a band ([`Measurement::in_band`]) return this part, and their
+/// result is to be compared with it.
 ///
 /// # Errors
 /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
@@ -42,12 +40,12 @@ pub fn within_band(
     let columns: Vec<_> = record.data().column_iter().map(|c| c.as_slice().to_vec()).collect();
     let len = record.len();
     let filter = BandFilter { sampling: record.sampling(), band_hz, extent };
-    let kept = columns.iter().map(|c| filter.apply(c)).collect::<Result<Vec<_>, _>>()?;
-    let data = DMatrix::from_fn(len, kept.len(), |k, c| kept[c][k]);
+    let channels = columns.iter().map(|c| filter.apply(c)).collect::<Result<Vec<_>, _>>()?;
+    let data = DMatrix::from_fn(len, channels.len(), |k, c| channels[c][k]);
     Ok(Record::new(record.sampling(), data)?)
 }
 
-/// An error unless these are the ends of a band.
+/// Returns an error unless these are the ends of a band.
 pub(crate) fn check_band([low_hz, high_hz]: [f64; 2]) -> Result<(), ForceError> {
     if low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite() {
         return Ok(());
@@ -55,13 +53,13 @@ pub(crate) fn check_band([low_hz, high_hz]: [f64; 2]) -> Result<(), ForceError> 
     Err(ForceError::NoBand { low_hz, high_hz })
 }
 
-/// Whether a frequency lies in a band, but for rounding.
+/// Returns whether a frequency is in a band, up to rounding.
 pub(crate) fn is_within([low_hz, high_hz]: [f64; 2], frequency_hz: f64, spacing_hz: f64) -> bool {
-    let slack = SLACK * spacing_hz;
+    let slack = limits::BAND_TOLERANCE * spacing_hz;
     (low_hz - slack..=high_hz + slack).contains(&frequency_hz)
 }
 
-/// The error for a band that holds no line of a period.
+/// Returns the error for a band without a line of a period.
 pub(crate) fn empty_band([low_hz, high_hz]: [f64; 2], sampling: Sampling) -> ForceError {
     let spacing_hz = sampling.line_spacing_hz();
     let last_hz = (sampling.lines() - 1) as f64 * spacing_hz;
@@ -79,12 +77,12 @@ pub(crate) struct BandFilter {
 impl BandFilter {
     pub fn apply(&self, values: &[f64]) -> Result<Vec<f64>, ForceError> {
         let len = values.len();
-        let mut all = values.to_vec();
+        let mut mirrored = values.to_vec();
         if self.extent == Extent::Open {
-            all.extend(values.iter().rev());
+            mirrored.extend(values.iter().rev());
         }
         let spectrum =
-            Spectrum::of(&Record::from_channel(self.sampling.with_len(all.len())?, all)?);
+            Spectrum::of(&Record::from_channel(self.sampling.with_len(mirrored.len())?, mirrored)?);
         let spacing = spectrum.sampling().line_spacing_hz();
         let mut lines = spectrum.lines().clone();
         for (n, mut line) in lines.row_iter_mut().enumerate() {
@@ -92,7 +90,7 @@ impl BandFilter {
                 line.fill(nalgebra::Complex::ZERO);
             }
         }
-        let kept = Spectrum::from_lines(spectrum.sampling(), lines)?.to_record()?;
-        Ok(kept.channel(0)[..len].to_vec())
+        let filtered = Spectrum::from_lines(spectrum.sampling(), lines)?.to_record()?;
+        Ok(filtered.channel(0)[..len].to_vec())
     }
 }

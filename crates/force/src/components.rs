@@ -1,53 +1,54 @@
-//! The least-squares problem seen through its singular vectors: one number per unknown.
+//! The least-squares problem in its singular vectors: one number per unknown.
 
 use nalgebra::DMatrix;
 
-use crate::ForceError;
+use crate::error::ForceError;
 
-/// One unknown each, by falling singular value: y_i = s_i f_i + noise.
+/// Unknowns, in descending order of the singular value: y_i = s_i f_i + noise.
 ///
-/// A component of a complex line stands for two real unknowns and has weight 2, so that white
-/// noise of variance σ² has mean energy weight·σ² in it.
+/// A component of a complex line represents two real unknowns and has weight 2, so that white noise
+/// of variance σ² has mean energy weight·σ² in it.
 pub(crate) struct Components {
-    /// s_i, falling, the last ones possibly zero.
+    /// s_i, in descending order, the last ones possibly zero.
     pub singular: Vec<f64>,
     /// |y_i|².
     pub energy: Vec<f64>,
     /// Real unknowns per component, 1 or 2.
     pub weight: Vec<f64>,
-    /// Rate at which the force of each component varies, positive, in any unit.
+    /// Rate of change of the force of each component, positive, in any unit.
     pub frequency: Vec<f64>,
     /// Lowest frequency in it, in Hz.
     pub lowest_hz: Vec<f64>,
-    /// Energy of the measurement that no force explains.
+    /// Energy of the measurement outside the space of the forces.
     pub outside_energy: f64,
-    /// Real data in it.
+    /// Number of real data in the measurement.
     pub outside_weight: f64,
 }
 
-/// A measurement in its singular vectors, and the way back to the force.
+/// A measurement in its singular vectors, and the transformation back to the force.
 pub(crate) trait Operator {
     fn components(&self) -> &Components;
-    /// Samples × forces of the components times these factors (f̂_i = φ_i y_i / s_i).
+    /// Returns samples × forces from the components times these factors (f̂_i = φ_i y_i / s_i).
     fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError>;
-    /// Keeps of every component what lies within a band of frequencies in Hz.
+    /// Keeps the part of every component in a band of frequencies in Hz.
     fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError>;
-    /// Samples × forces: variance, given that of each component per real unknown.
+    /// Returns the variance, samples × forces, from the variances of the components per real
+    /// unknown.
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }
 
-/// Effect of a choice of filter factors on the measurement at hand.
+/// Effect of filter factors on this measurement.
 pub(crate) struct Fit {
     /// Energy not explained, ‖y − H f̂‖².
     pub residual: f64,
     /// ‖f̂‖².
     pub size: f64,
-    /// Σ φ_i: real unknowns that the filter lets through.
+    /// Σ φ_i: the effective number of real unknowns.
     pub unknowns: f64,
 }
 
 impl Fit {
-    /// Residual variance per remaining real datum: the noise level if the fit is right.
+    /// Returns the residual variance per remaining real datum: the noise level if the fit is right.
     pub fn noise(&self, components: &Components) -> f64 {
         self.residual / (components.data() - self.unknowns).max(f64::MIN_POSITIVE)
     }
@@ -59,7 +60,7 @@ impl Components {
         self.weight.iter().sum::<f64>() + self.outside_weight
     }
 
-    /// Components that can carry a force at all: s_i above rounding of the largest.
+    /// Returns the components that can carry a force: s_i above rounding of the largest.
     pub fn transmitted(&self) -> usize {
         let floor = 1e-14 * self.singular[0];
         self.singular.partition_point(|s| *s > floor)
@@ -71,7 +72,7 @@ impl Components {
         shown.map(|i| self.lowest_hz[i]).min_by(f64::total_cmp)
     }
 
-    /// Residual, size and unknowns for filter factors φ_i (f̂_i = φ_i y_i / s_i).
+    /// Returns residual, size and unknowns for filter factors φ_i (f̂_i = φ_i y_i / s_i).
     pub fn fit(&self, factor: impl Fn(usize) -> f64) -> Fit {
         let mut fit = Fit { residual: self.outside_energy, size: 0.0, unknowns: 0.0 };
         for (i, (energy, s)) in self.energy.iter().zip(&self.singular).enumerate() {

@@ -3,13 +3,14 @@
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::Record;
 
-use crate::{ForceError, IdentifiedForce};
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
 
 /// F̂ = M ẍ + C ẋ + K x at every sample.
 ///
-/// Exact when the response satisfies equilibrium at the sampled instants. Newmark, Houbolt,
-/// central difference and Runge-Kutta responses do; Wilson's θ method does not: it enforces
-/// equilibrium at t + θΔt, so its response gives another force back even with the exact matrices.
+/// Exact if the response satisfies equilibrium at the sampled instants. Newmark, Houbolt, central
+/// difference and Runge-Kutta responses do; Wilson's θ method does not: it enforces equilibrium at
+/// t + θΔt, so that its response gives another force even with the exact matrices.
 ///
 /// Cost: three products of samples × n by n × n.
 ///
@@ -48,7 +49,7 @@ pub fn continuous(
     let mut force = response.acceleration().data() * system.mass().transpose();
     force.gemm(1.0, response.velocity().data(), &system.damping().transpose(), 1.0);
     force.gemm(1.0, response.displacement().data(), &system.stiffness().transpose(), 1.0);
-    Ok(IdentifiedForce::of(Record::new(response.sampling(), force)?))
+    Ok(IdentifiedForce::from_record(Record::new(response.sampling(), force)?))
 }
 
 pub(crate) fn check_dof(system: &SecondOrderSystem, response: &Response) -> Result<(), ForceError> {

@@ -6,28 +6,29 @@ use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::continuous::check_dof;
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
+use crate::limits;
 use crate::state_space::exact_transition;
-use crate::{ForceError, IdentifiedForce};
 
-/// The force that carries the response from each sample to the next.
+/// Computes the force that takes the response from each sample to the next.
 ///
 /// With z = [x; ẋ] and the discretised equation z(k+1) = Φ z(k) + Γ F(k), the velocity rows are
-/// solved for F(k); Euler's Γ has nothing in the displacement rows. A held force of an open record
-/// has one sample less than the response. For a linear force,
-/// z(k+1) = Φ z(k) + Γ₀ F(k) + Γ₁ (F(k+1) − F(k)), all 2n rows together give F at both ends of
-/// each step and inner samples are the mean of their two values: no recursion runs along the
-/// record, so no error grows along it.
+/// solved for F(k); Euler's Γ is zero in the displacement rows. A held force of an open record has
+/// one sample less than the response. For a linear force, z(k+1) = Φ z(k) + Γ₀ F(k) + Γ₁ (F(k+1) −
+/// F(k)), all 2n rows together give F at both ends of each step; inner samples are the mean of
+/// their two values. Without a recursion along the record, no error grows along it.
 ///
-/// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by
-/// 6M/Δt² (linear); Euler's rule is exact for no motion at all: at a line ω it returns the force
-/// times M(e^{iωΔt} − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `choose/force.md`.
+/// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by 6M/Δt²
+/// (linear). Euler's rule is exact for no motion: at a line ω it returns the force times M(e^{iωΔt}
+/// − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `choose/force.md`.
 ///
 /// Cost: one exponential of order 4n, then one product of samples × 2n by 2n × n.
 ///
 /// # Errors
 /// [`ForceError::Dof`], [`ForceError::TooShort`] for a response shorter than one step,
-/// [`ForceError::StepTooLong`] where the step is so long that its end does not show the force
-/// during it, and [`ForceError::Unstable`] where the free response overflows within a step.
+/// [`ForceError::StepTooLong`] if the step is so long that its end does not depend on the force
+/// during it, and [`ForceError::Unstable`] if the free response overflows within a step.
 ///
 /// # Source
 /// Dissertation eqs. (4.7.1)–(4.7.3), read as their velocity rows with the minus sign between the
@@ -38,18 +39,18 @@ pub fn discretised(
     discretisation: Discretisation,
     extent: Extent,
 ) -> Result<IdentifiedForce, ForceError> {
-    let solution = |dt| Solution::of_rule(system, dt, discretisation);
+    let solution = |dt| Solution::from_rule(system, dt, discretisation);
     force_of_steps(system, response, extent, solution)
 }
 
-/// The same as [`discretised`], with the exponential series cut after the term of this `order`,
-/// 1 … 8, and the force held over a step; order 1 is Euler's rule.
+/// Computes the same as [`discretised`], with the exponential series truncated after the term of
+/// this `order`, 1 … 8, and the force held over a step; order 1 is Euler's rule.
 ///
 /// # Errors
-/// As [`discretised`]; [`ForceError::TaylorOrder`].
+/// The errors of [`discretised`]; [`ForceError::TaylorOrder`].
 ///
 /// # Source
-/// That of [`discretised`].
+/// The source of [`discretised`].
 pub fn discretised_by_taylor(
     system: &SecondOrderSystem,
     response: &Response,
@@ -78,23 +79,20 @@ fn force_of_steps(
     let input = solution(dt)?.input(response, extent);
     let force = (system.mass() * input).transpose() / (dt * dt);
     let sampling = sampling.with_len(force.nrows())?;
-    Ok(IdentifiedForce::of(Record::new(sampling, force)?))
+    Ok(IdentifiedForce::from_record(Record::new(sampling, force)?))
 }
 
 /// Solver for the input of a step, q in step units, from its change z(k+1) − Φ z(k).
 pub(crate) struct Solution {
     /// Φ, 2n×2n.
     pub state: DMatrix<f64>,
-    /// Factor of order n where the input is held over a step, of order 2n where it is linear.
+    /// Factor of order n if the input is held over a step, of order 2n if it is linear.
     input: LU<f64, Dyn, Dyn>,
 }
 
-/// Below this a sample of 16 digits leaves fewer than four for the force.
-const NO_TRACE: f64 = 1e-12;
-
 impl Solution {
-    /// Solution for the steps of a system under this rule.
-    pub fn of_rule(
+    /// Creates the solver for the steps of a system under this rule.
+    pub fn from_rule(
         system: &SecondOrderSystem,
         dt: f64,
         discretisation: Discretisation,
@@ -123,9 +121,9 @@ impl Solution {
         Ok(Self { state, input: invertible(input, dt)? })
     }
 
-    /// Solves for changes, 2n × any number: the input at the start of each step, n × the same; where it is
-    /// linear, that at its end too.
-    pub fn of(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
+    /// Solves for changes, 2n × any number: the input at the start of each step, n × the same; for
+    /// a linear input also at its end.
+    pub fn inputs(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let n = self.state.nrows() / 2;
         if self.input.lu_internal().nrows() == n {
             let mut velocity = change.rows(n, n).into_owned();
@@ -136,10 +134,10 @@ impl Solution {
         (change.rows(0, n).into_owned(), Some(change.rows(n, n).into_owned()))
     }
 
-    /// q, n × samples; of a held input n × steps.
+    /// Returns q, n × samples; for a held input n × steps.
     fn input(&self, response: &Response, extent: Extent) -> DMatrix<f64> {
         let len = response.sampling().len();
-        let (start, end) = self.of(changes(&self.state, response, extent));
+        let (start, end) = self.inputs(changes(&self.state, response, extent));
         let Some(end) = end else { return start };
         let mut input = DMatrix::zeros(response.dof(), len);
         for (k, (start, end)) in start.column_iter().zip(end.column_iter()).enumerate() {
@@ -154,7 +152,7 @@ impl Solution {
     }
 }
 
-/// z(k+1) − Φ z(k) in step units, 2n × steps.
+/// Returns z(k+1) − Φ z(k) in step units, 2n × steps.
 fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix<f64> {
     let (n, len, dt) = (response.dof(), response.sampling().len(), response.sampling().dt());
     let (x, v) = (response.displacement().data(), response.velocity().data());
@@ -165,13 +163,13 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
     change
 }
 
-/// The factorised input matrix, unless some force leaves no trace in its rows.
+/// Factors the input matrix, unless its rows do not show some force.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // In step units the input matrix of a short step is about I: a single force is judged too.
+    // In step units the input matrix of a short step is about I, which also judges a single force.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
-    if reciprocal_condition.is_nan() || reciprocal_condition < NO_TRACE {
+    if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });
     }
     Ok(input.lu())

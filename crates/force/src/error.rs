@@ -23,7 +23,7 @@ pub enum ForceError {
     TooShort {
         /// Samples given.
         samples: usize,
-        /// Fewest samples that will do.
+        /// Minimum number of samples.
         needed: usize,
     },
     /// A record and its list of channels differ in size.
@@ -37,9 +37,9 @@ pub enum ForceError {
     /// A degree of freedom that the system does not have.
     #[error("degree of freedom {} (counted from 1) of a system of {dofs}", dof.saturating_add(1))]
     NoSuchDof {
-        /// The one asked for, counted from 0.
+        /// Degree of freedom requested, counted from 0.
         dof: usize,
-        /// Number of those there are.
+        /// Number of degrees of freedom.
         dofs: usize,
     },
     /// The same spectral line was named twice.
@@ -71,7 +71,7 @@ pub enum ForceError {
     /// A Taylor order outside 1 … 8.
     #[error("Taylor order {order}: choose 1 (Euler) to 8, or the exact form")]
     TaylorOrder {
-        /// The order asked for.
+        /// Order given.
         order: usize,
     },
     /// The time step is so long that the end of a step does not depend on the force during it.
@@ -85,7 +85,7 @@ pub enum ForceError {
         /// Smallest over largest singular value of the input matrix.
         reciprocal_condition: f64,
     },
-    /// The free response of an unstable machine outgrows what double precision can resolve.
+    /// The free response of an unstable system exceeds the range of double precision.
     #[error(
         "the machine is unstable: its free response grows e-fold every {} s, by a factor of \
          10^{:.0} within {} s, which leaves no digits for the force; use whole periods in steady \
@@ -103,12 +103,12 @@ pub enum ForceError {
     /// No line was chosen.
     #[error("no spectral line was chosen")]
     NoLines,
-    /// A line that the spectrum does not have.
+    /// A line outside the spectrum.
     #[error("line {line} was asked for, the spectrum ends at line {last}")]
     NoSuchLine {
-        /// The line asked for.
+        /// Line requested.
         line: usize,
-        /// The last line there is.
+        /// Last line.
         last: usize,
     },
     /// The measured channels do not show a force at this line.
@@ -142,7 +142,7 @@ pub enum ForceError {
         /// Angular frequency, in rad/s.
         omega: f64,
     },
-    /// Too few lines are left to measure the noise on.
+    /// Too few lines remain to measure the noise on.
     #[error(
         "the noise level is to be measured outside the chosen lines, but only {outside} are left \
          of the {needed} needed: choose fewer lines, give a longer period, or state the level"
@@ -150,10 +150,10 @@ pub enum ForceError {
     TooFewOutsideLines {
         /// Lines not chosen.
         outside: usize,
-        /// Fewest that will do.
+        /// Minimum number of lines.
         needed: usize,
     },
-    /// A channel that shows no noise where it was to be measured.
+    /// A channel without noise on the lines that measure it.
     #[error(
         "channel {channel} (counted from 1) is zero outside the chosen lines, or not finite, where \
          its noise is to be measured: the sensor may be dead; leave it out, or state the noise level"
@@ -162,7 +162,7 @@ pub enum ForceError {
         /// The channel, counted from 1.
         channel: usize,
     },
-    /// A number that must be positive and finite is not.
+    /// A number is not positive and finite.
     #[error("{what} must be positive and finite, got {value}")]
     NotPositive {
         /// Name of the number.
@@ -178,7 +178,7 @@ pub enum ForceError {
     TooLarge {
         /// Samples × forces.
         unknowns: usize,
-        /// The most there may be.
+        /// Maximum number.
         limit: usize,
     },
     /// The measured channels cannot show a force, at any frequency.
@@ -191,23 +191,23 @@ pub enum ForceError {
         /// The forced degree of freedom, counted from 0.
         dof: usize,
     },
-    /// A model of the forces of another number of forces.
+    /// A model of another number of forces.
     #[error("the model of the forces has {models} RMS values for {}: give one for each", message::count(*forces, "force"))]
     ModelCount {
         /// RMS values given.
         models: usize,
-        /// Forces sought.
+        /// Number of forces.
         forces: usize,
     },
-    /// A model of the forces of an order that there is not.
+    /// A model of forces of an impossible order.
     #[error("a force model of order {order}: choose 1 (reverts to zero) to {most} (a sharp band)")]
     ModelOrder {
         /// The order given.
         order: usize,
-        /// The highest.
+        /// Highest order.
         most: usize,
     },
-    /// A band of frequencies that is none.
+    /// A band of frequencies with impossible ends.
     #[error(
         "the band from {low_hz} to {high_hz} Hz is none: give a lower end from 0 Hz on and an upper \
          end above it"
@@ -230,7 +230,7 @@ pub enum ForceError {
         low_hz: f64,
         /// Upper end, in Hz.
         high_hz: f64,
-        /// Distance of the lines, in Hz.
+        /// Spacing of the lines, in Hz.
         spacing_hz: f64,
         /// Frequency of the last line, in Hz.
         last_hz: f64,
@@ -253,13 +253,13 @@ pub enum ForceError {
         /// Channels of the force it is compared with.
         truth: usize,
     },
-    /// A ratio to a force that is not there.
+    /// A ratio to a force that is zero at the line.
     #[error("the force compared with is zero at line {line}: leave the line out")]
     NoForceAtLine {
         /// The line.
         line: usize,
     },
-    /// A ratio to a force that is not there.
+    /// A ratio to a force that is zero.
     #[error("the force compared with is zero on every channel")]
     NoForce,
     /// The model is not usable.

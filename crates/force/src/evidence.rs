@@ -1,16 +1,16 @@
 //! Marginal likelihood of force and noise, before any parameter is chosen.
 //!
-//! Each component is y_i = s_i f_i + e_i with e of variance σ². Of the `reach` strongest
-//! components a share π carries a force of variance τ² g_i, the others and all weaker ones carry
-//! none: a band of frequencies is a reach, single lines are a share, a white force is reach = all
-//! and π = 1. The colour g_i = (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random
-//! walk. The numbers are not taken where the measurement is most likely, but averaged over all
-//! values that make it about as likely: a force that is given with its error must not depend on
-//! numbers that the measurement does not tell.
+//! Each component is y_i = s_i f_i + e_i with e of variance σ². Of the `reach` strongest components
+//! a share π carries a force of variance τ² g_i; the others and all weaker ones carry none. A band
+//! of frequencies is a reach, single lines are a share, a white force is reach = all and π = 1. The
+//! colour g_i = (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random walk. The
+//! result is averaged over all parameter values that are about as likely as the best: a force with
+//! a standard error must not depend on parameters that the measurement does not determine.
 
-use crate::ForceError;
-use crate::alike::alike;
 use crate::components::Components;
+use crate::error::ForceError;
+use crate::limits;
+use crate::posterior_points::posterior_points;
 
 /// Share, variances, reach and colour.
 #[derive(Debug, Clone, Copy)]
@@ -25,55 +25,32 @@ pub(crate) struct Evidence {
     likelihood: f64,
 }
 
-/// What a measurement says of the numbers: values with their weights.
+/// Posterior of the parameters: values with their weights.
 pub(crate) struct Posterior {
     best: Evidence,
     parts: Vec<(f64, Evidence)>,
 }
 
-/// Colours tried: white, random walk, integrated random walk.
-const COLOURS: [i32; 3] = [0, 1, 2];
-/// Fewest driven components of a white force that tell a colour by themselves: a few amplitudes lie near some slope by
-/// chance.
-const COLOURED_FROM: f64 = 16.0;
-/// Logarithm of the likelihood that a colour gains of fewer of them where that is no chance.
-const CLEARLY: f64 = 6.0;
-/// Reaches tried first: all components, then each 0.8 of the one before.
-const REACH_RATIO: f64 = 0.8;
-/// EM rounds at most; from the starts below it needs a few dozen.
-const ROUNDS: usize = 300;
-/// The likelihood has settled when a round adds less than this to its logarithm.
-const SETTLED: f64 = 1e-3;
-/// Logarithm of the likelihood below the greatest at which a reach or colour no longer counts.
-const NEGLIGIBLE: f64 = 6.0;
-/// Probability that a white force has no end, relative to all reaches.
-const ENDLESS: f64 = 0.25;
-/// Reaches on either side of the best that are averaged over.
-const BESIDE: usize = 16;
-/// Share of driven components below which a force is one of single lines: of those the silent components say
-/// where they are, and the reach says nothing more.
-const BAND_SHARE: f64 = 0.5;
-/// Driven components below which a force is one of single lines, whatever its share.
-const FEW: f64 = 6.0;
-
 impl Posterior {
-    /// Averages over reach, colour and, at the most likely of them, share and variances; the noise
-    /// is 1 where it is known.
-    pub fn of(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
+    /// Averages over reach, colour and, at the most likely of them, share and variances; a known
+    /// noise is 1.
+    pub fn from_components(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
-        let white = Evidence::of(components, COLOURS[0], noise);
-        let few = white.share * (white.reach as f64) < COLOURED_FROM;
-        let least = if few { white.likelihood + CLEARLY } else { f64::NEG_INFINITY };
+        let white = Evidence::most_likely(components, limits::COLOURS[0], noise);
+        let few = white.share * (white.reach as f64) < limits::COLOUR_COMPONENTS;
+        let least = if few { white.likelihood + limits::COLOUR_GAIN } else { f64::NEG_INFINITY };
         let mut bests = vec![white];
-        if components.transmitted() as f64 >= COLOURED_FROM {
-            let coloured = COLOURS[1..].iter();
-            let coloured = coloured.map(|colour| Evidence::of(components, *colour, noise));
+        if components.transmitted() as f64 >= limits::COLOUR_COMPONENTS {
+            let coloured = limits::COLOURS[1..].iter();
+            let coloured = coloured.map(|colour| Evidence::most_likely(components, *colour, noise));
             bests.extend(coloured.filter(|coloured| coloured.likelihood > least));
         }
         let best = bests[1..].iter().fold(bests[0], |best, other| best.better(*other));
         let greatest = best.likelihood;
         let mut near = Vec::new();
-        for best in bests.iter().filter(|best| best.likelihood > greatest - NEGLIGIBLE) {
+        for best in
+            bests.iter().filter(|best| best.likelihood > greatest - limits::NEGLIGIBLE_LIKELIHOOD)
+        {
             best.beside(components, noise, greatest, &mut near);
         }
         let weight =
@@ -82,7 +59,7 @@ impl Posterior {
         let mut parts = Vec::new();
         for part in &near {
             let share = weight(part) / sum;
-            for (weight, evidence) in part.1.alike(components, noise)? {
+            for (weight, evidence) in part.1.posterior_points(components, noise)? {
                 parts.push((share * weight, evidence));
             }
         }
@@ -94,31 +71,31 @@ impl Posterior {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.noise).sum()
     }
 
-    /// Factor φ_i of the mean of f_i given the measurement and the numbers that make it most
-    /// likely, f̄_i = φ_i y_i / s_i.
+    /// Returns the factor φ_i of the mean of f_i given the measurement and the most likely
+    /// parameters, f̄_i = φ_i y_i / s_i.
     pub fn best_factor(&self, components: &Components, i: usize) -> f64 {
         self.best.factor(components, i)
     }
 
-    /// Factor of the mean of f_i given the measurement alone.
+    /// Returns the factor of the mean of f_i given only the measurement.
     pub fn factor(&self, components: &Components, i: usize) -> f64 {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.factor(components, i)).sum()
     }
 
-    /// Variance of f_i given the measurement, per real unknown.
+    /// Returns the variance of f_i given the measurement, per real unknown.
     pub fn variance(&self, components: &Components, i: usize) -> f64 {
         let (s, mean) = (components.singular[i], self.factor(components, i));
         let energy = components.energy[i] / components.weight[i];
         let square = if s > 0.0 { energy / (s * s) } else { 0.0 };
-        let each = self.parts.iter().map(|(weight, evidence)| {
+        let weighted = self.parts.iter().map(|(weight, evidence)| {
             let apart = evidence.factor(components, i) - mean;
             weight * (evidence.variance(components, i) + apart * apart * square)
         });
-        each.sum()
+        weighted.sum()
     }
 
-    /// Frequency, in Hz, below which no component shows a force as strong as those found better
-    /// than noise; `None` where none does.
+    /// Returns the frequency, in Hz, below which no component shows a force as strong as the driven
+    /// ones better than noise; `None` if none does.
     pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
         components.lowest_hz(|i| {
@@ -128,14 +105,14 @@ impl Posterior {
 }
 
 impl Evidence {
-    /// The most likely of all reaches: a coarse descent, then ever smaller steps about the best.
-    fn of(components: &Components, colour: i32, noise: Option<f64>) -> Self {
+    /// Finds the most likely reach: a coarse descent, then smaller steps about the best.
+    fn most_likely(components: &Components, colour: i32, noise: Option<f64>) -> Self {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // A spectrum that falls has no end.
+        // A falling spectrum has no end.
         while colour == 0 && reach > 2 {
-            reach = ((reach as f64 * REACH_RATIO) as usize).max(2);
+            reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
         }
         let mut step = best.reach / 10;
@@ -154,8 +131,8 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// This and the reaches beside it as far as they count, with the number of reaches that each
-    /// stands for.
+    /// Returns this and the neighbouring reaches that count, with the number of reaches that each
+    /// represents.
     fn beside(
         self,
         components: &Components,
@@ -168,18 +145,20 @@ impl Evidence {
             near.push((most as f64, self));
             return;
         }
-        let stride = (self.reach / BESIDE).max(1);
+        let stride = (self.reach / limits::NEIGHBOURING_REACHES).max(1);
         near.push((stride as f64, self));
-        if self.share < BAND_SHARE || FEW > self.share * self.reach as f64 {
+        if self.share < limits::BAND_SHARE
+            || limits::BAND_COMPONENTS > self.share * self.reach as f64
+        {
             return;
         }
         if self.reach < most {
-            let all = Self::at_reach(components, most, 0, noise);
-            near.push((ENDLESS * most as f64, all));
+            let widest = Self::at_reach(components, most, 0, noise);
+            near.push((limits::ENDLESS_PRIOR * most as f64, widest));
         }
         for up in [false, true] {
             let mut last = self;
-            for _ in 0..BESIDE {
+            for _ in 0..limits::NEIGHBOURING_REACHES {
                 let reach =
                     if up { last.reach + stride } else { last.reach.saturating_sub(stride) };
                 if !(1..=most).contains(&reach) {
@@ -187,7 +166,9 @@ impl Evidence {
                 }
                 last = Self { reach, likelihood: f64::NEG_INFINITY, ..last }
                     .maximised(components, noise);
-                if last.likelihood.is_nan() || last.likelihood <= greatest - NEGLIGIBLE {
+                if last.likelihood.is_nan()
+                    || last.likelihood <= greatest - limits::NEGLIGIBLE_LIKELIHOOD
+                {
                     break;
                 }
                 near.push((stride as f64, last));
@@ -195,8 +176,8 @@ impl Evidence {
         }
     }
 
-    /// Share and variances as likely as these, with their weights; all shares are alike beforehand.
-    fn alike(
+    /// Returns posterior share and variances with their weights; the prior of the share is uniform.
+    fn posterior_points(
         self,
         components: &Components,
         noise: Option<f64>,
@@ -211,11 +192,11 @@ impl Evidence {
             noise: point.get(2).map_or(self.noise, |log| log.exp()),
             ..self
         };
-        let points = alike(&best, |point| {
+        let points = posterior_points(&best, |point| {
             let trial = at(point);
-            // In the logarithm of the odds, shares that are all alike are not.
-            let alike = trial.share.ln() + (1.0 - trial.share).ln();
-            Some(trial.log_likelihood(components) + alike).filter(|value| value.is_finite())
+            // A uniform prior of the share is not uniform in the logarithm of the odds.
+            let prior = trial.share.ln() + (1.0 - trial.share).ln();
+            Some(trial.log_likelihood(components) + prior).filter(|value| value.is_finite())
         })?;
         Ok(points.into_iter().map(|(weight, point)| (weight, at(&point))).collect())
     }
@@ -282,7 +263,7 @@ impl Evidence {
             .expect("there are starts")
     }
 
-    /// Noise variances to start from: that of the tail, or low quantiles where the tail is short.
+    /// Noise variances to start from: the tail, or low quantiles if the tail is short.
     fn first_noises(components: &Components, reach: usize) -> Vec<f64> {
         let tail_weight: f64 =
             components.weight[reach..].iter().sum::<f64>() + components.outside_weight;
@@ -295,7 +276,7 @@ impl Evidence {
         [50, 5].map(|part| per_datum[per_datum.len() / part].max(f64::MIN_POSITIVE)).to_vec()
     }
 
-    /// Every component within reach driven: the ratio σ/τ on a grid, both variances from it.
+    /// Drives every component within reach: the ratio σ/τ on a grid, both variances from it.
     fn white(self, components: &Components, noise: Option<f64>) -> Self {
         let (data, tail) = (components.data(), tail_energy(components, self.reach));
         let shown =
@@ -314,7 +295,7 @@ impl Evidence {
             log += (data - within) * ratio.ln();
             force /= data;
             let cost = match noise {
-                // The level says what the ratio makes of it.
+                // The level follows from the ratio.
                 Some(noise) => {
                     let given = noise / ratio;
                     data * given.ln() + log + data * force / given
@@ -329,15 +310,16 @@ impl Evidence {
         best.1
     }
 
-    /// Expectation and maximisation in turn until the likelihood settles.
+    /// Alternates expectation and maximisation until the likelihood converges.
     ///
     /// # Source
-    /// Dempster, Laird & Rubin (1977), Maximum likelihood from incomplete data via the EM algorithm.
+    /// Dempster, Laird & Rubin (1977), Maximum likelihood from incomplete data via the EM
+    /// algorithm.
     fn maximised(mut self, components: &Components, noise: Option<f64>) -> Self {
-        for _ in 0..ROUNDS {
+        for _ in 0..limits::EM_ROUNDS {
             let before = self.likelihood;
             self = self.round(components, noise);
-            if (self.likelihood - before).abs() < SETTLED {
+            if (self.likelihood - before).abs() < limits::EM_CHANGE {
                 break;
             }
         }
@@ -353,7 +335,7 @@ impl Evidence {
         likelihood
     }
 
-    /// One round; the likelihood is that of the values before it.
+    /// Takes one round; the likelihood belongs to the values before it.
     fn round(self, components: &Components, known: Option<f64>) -> Self {
         let likelihood = self.log_likelihood(components);
         let (mut driven, mut driven_weight, mut force) = (0.0, 0.0, 0.0);
@@ -380,7 +362,7 @@ impl Evidence {
         }
     }
 
-    /// Logarithm of the likelihood of y_i, and the probability that it is driven.
+    /// Returns the log-likelihood of y_i, and the probability that it is driven.
     fn component(&self, components: &Components, i: usize) -> (f64, f64) {
         let (weight, energy) = (components.weight[i], components.energy[i]);
         let log = |share: f64, variance: f64| {

@@ -5,9 +5,10 @@ use std::f64::consts::TAU;
 use mechid_numerics::linear_algebra::exponential;
 use nalgebra::DMatrix;
 
-use crate::ForceError;
+use crate::error::ForceError;
+use crate::limits;
 
-/// Spectrum of the forces as the Kalman smoother takes them before it sees the measurement.
+/// Prior spectrum of the forces in the Kalman smoother.
 ///
 /// ```text
 ///                 τ² g / ω_c
@@ -16,8 +17,8 @@ use crate::ForceError;
 /// ```
 ///
 /// Order 1 reverts to zero as an Ornstein–Uhlenbeck process does, and is a random walk over times
-/// short against 1/ω_c; higher orders are bands that end ever more sharply at the corner. None of
-/// them drifts: where the measurement says nothing, the force is 0 ± τ.
+/// short against 1/ω_c; higher orders are bands with a sharper end at the corner. None of them
+/// drifts: without information in the measurement, the force is 0 ± τ.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceModel {
@@ -30,7 +31,7 @@ pub struct ForceModel {
 }
 
 impl ForceModel {
-    /// Highest order: the end of the band is then as sharp as 256 samples can show.
+    /// Highest order: its band has the sharpest end that 256 samples can resolve.
     pub const MOST: usize = 16;
 
     pub(crate) fn check(&self, forces: usize) -> Result<(), ForceError> {
@@ -64,15 +65,12 @@ pub(crate) struct LowPass {
     pub rate: DMatrix<f64>,
     /// Intensity of the white noise.
     pub intensity: f64,
-    /// Stationary covariance of u; that of u₀ is 1.
+    /// Stationary covariance of u; the variance of u₀ is 1.
     pub covariance: DMatrix<f64>,
 }
 
 impl LowPass {
-    /// Time constants 1/ω_c after which nothing is left of the start: e^(−0.1·512) of order 16.
-    const FOREVER: f64 = 512.0;
-
-    /// Sections of second order, for an odd order one of first order, one driving the next.
+    /// Sections of second order, and one of first order for an odd order, one driving the next.
     ///
     /// # Source
     /// Butterworth (1930): poles at equal angles on a circle.
@@ -90,7 +88,7 @@ impl LowPass {
             rate[(at + 1, at + 1)] = -2.0 * angle.sin();
             at += 2;
         }
-        // Each section is driven by the first state of the one behind it.
+        // Each section is driven by the first state of the next.
         let firsts =
             (0..order).filter(|i| if order % 2 == 1 { *i == 0 || i % 2 == 1 } else { i % 2 == 0 });
         for first in firsts.skip(1) {
@@ -98,19 +96,15 @@ impl LowPass {
         }
         let mut noise = DMatrix::zeros(order, order);
         noise[(order - 1, order - 1)] = 1.0;
-        let covariance = step_noise(&(&rate * Self::FOREVER), &[noise * Self::FOREVER])?.remove(0);
+        let covariance =
+            step_noise(&(&rate * limits::DECAY_TIME), &[noise * limits::DECAY_TIME])?.remove(0);
         let intensity = covariance[(0, 0)].recip();
         Ok(Self { rate, intensity, covariance: covariance * intensity })
     }
 }
 
-/// Largest norm of a rate matrix over a sub-step; terms of the series then fall by half or more.
-const SUBSTEP: f64 = 0.25;
-/// Terms of the series: the next would be below rounding.
-const TERMS: usize = 18;
-
-/// Covariance that each white noise makes of the state u̇ = A u + noise within a unit of time: a
-/// series over a short step, doubled until the unit is reached. Sums of squares throughout.
+/// Returns the covariance of the state of u̇ = A u + noise due to the white noise within a unit of
+/// time: a series over a short step, doubled up to the unit. It only adds sums of squares.
 ///
 /// # Source
 /// Van Loan (1978) for the integral; doubling as in Higham (2008), *Functions of Matrices*, 10.3.
@@ -119,14 +113,15 @@ pub(crate) fn step_noise(
     noises: &[DMatrix<f64>],
 ) -> Result<Vec<DMatrix<f64>>, ForceError> {
     let norm = rate.column_iter().map(|c| c.lp_norm(1)).fold(0.0, f64::max);
-    let doublings = if norm > SUBSTEP { (norm / SUBSTEP).log2().ceil() as i32 } else { 0 };
+    let doublings =
+        if norm > limits::SUBSTEP { (norm / limits::SUBSTEP).log2().ceil() as i32 } else { 0 };
     let short = 0.5f64.powi(doublings);
     let a = rate * short;
     let mut sums: Vec<DMatrix<f64>> = Vec::with_capacity(noises.len());
     for noise in noises {
         let mut term = noise * short;
         let mut sum = term.clone();
-        for k in 1..TERMS {
+        for k in 1..limits::SERIES_TERMS {
             let product = &a * &term;
             term = (&product + product.transpose()) / (k + 1) as f64;
             sum += &term;

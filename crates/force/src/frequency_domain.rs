@@ -5,31 +5,33 @@ use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::band::{empty_band, is_within};
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
 use crate::lines::{check_lines, noise_weight};
+use crate::measurement::Measurement;
 use crate::noise::{Noise, channel_sizes};
 use crate::transfer::Transfer;
-use crate::unexplained::Rest;
-use crate::{ForceError, IdentifiedForce, Measurement};
+use crate::unexplained::Residual;
 
 /// F_n = (K − ω²M + iωC) X_n at the chosen lines of a whole period, zero at all others.
 ///
-/// Velocity and acceleration lines are divided by iω and −ω². When fewer forces are sought than
-/// channels were measured, or only some degrees of freedom were, each line is a weighted
-/// least-squares problem X_n = H_n F_n. Choosing only the lines that were excited keeps the noise
-/// of all others out. The Nyquist line of an even record holds no phase: leave it out.
+/// Velocity and acceleration lines are divided by iω and −ω². With fewer forces than channels, or
+/// some degrees of freedom only, each line is a weighted least-squares problem X_n = H_n F_n. The
+/// choice of only the excited lines excludes the noise of all others. The Nyquist line of an even
+/// record has no phase: leave it out.
 ///
-/// The standard error, where the noise level is known, is that of measurement noise alone; it is
-/// the same at every instant. No unbiased method does better at these lines (Cramér-Rao).
+/// The standard error, if the noise level is known, covers measurement noise only; it is the same
+/// at every instant. No unbiased method does better at these lines (Cramér-Rao).
 ///
 /// Cost: one transform per channel, one n×n solve and one small SVD per line.
 ///
 /// # Errors
 /// [`ForceError::NoLines`], [`ForceError::NoSuchLine`], [`ForceError::RepeatedLine`];
-/// [`ForceError::NotTransmitted`] at a line that does not show the forces in the channels, as
-/// DC does not in velocities; [`ForceError::MoreForcesThanMeasurements`],
-/// [`ForceError::NoForcedDof`], [`ForceError::NoSuchDof`], [`ForceError::Resonance`],
-/// [`ForceError::TooFewOutsideLines`], [`ForceError::NoNoise`], [`ForceError::NotPositive`];
-/// [`ForceError::EmptyBand`] where no line lies in the band of the measurement.
+/// [`ForceError::NotTransmitted`] at a line where the channels do not show the forces, as
+/// velocities at DC; [`ForceError::MoreForcesThanMeasurements`], [`ForceError::NoForcedDof`],
+/// [`ForceError::NoSuchDof`], [`ForceError::Resonance`], [`ForceError::TooFewOutsideLines`],
+/// [`ForceError::NoNoise`], [`ForceError::NotPositive`]; [`ForceError::EmptyBand`] if no line is in
+/// the band of the measurement.
 ///
 /// # Source
 /// Dissertation section 6.2 suggests it; eq. (4.6.9) is its real form for one degree of freedom.
@@ -62,30 +64,30 @@ pub fn frequency_domain(
     }
     let force = Spectrum::from_lines(sampling, force)?;
     let level = level.as_deref();
-    let rest = measured
+    let residual = measured
         .exceeds(forced)
-        .then(|| Rest::of_lines(system, measured, forced, &force, lines, level));
+        .then(|| Residual::from_lines(system, measured, forced, &force, lines, level));
     let standard_error = level.map(|_| {
         let constant =
             DMatrix::from_fn(sampling.len(), system.dof(), |_, dof| variance[dof].sqrt());
         Record::new(sampling, constant)
     });
-    let force = IdentifiedForce::of(force.to_record()?)
+    let force = IdentifiedForce::from_record(force.to_record()?)
         .with_standard_error(standard_error.transpose()?)
-        .with_rest(rest.transpose()?);
+        .with_residual(residual.transpose()?);
     Ok(match measured.band_hz() {
         Some(band_hz) => force.with_band(band_hz),
         None => force,
     })
 }
 
-/// The lines within the band of the measurement.
+/// Returns the lines within the band of the measurement.
 fn within(measured: &Measurement, lines: &[usize]) -> Result<Vec<usize>, ForceError> {
     let (sampling, Some(band_hz)) = (measured.sampling(), measured.band_hz()) else {
         return Ok(lines.to_vec());
     };
     let spacing = sampling.line_spacing_hz();
     let inside = |n: &&usize| is_within(band_hz, **n as f64 * spacing, spacing);
-    let kept: Vec<usize> = lines.iter().filter(inside).copied().collect();
-    if kept.is_empty() { Err(empty_band(band_hz, sampling)) } else { Ok(kept) }
+    let in_band: Vec<usize> = lines.iter().filter(inside).copied().collect();
+    if in_band.is_empty() { Err(empty_band(band_hz, sampling)) } else { Ok(in_band) }
 }

@@ -1,25 +1,25 @@
-//! The force that was found.
+//! The identified force.
 
 use std::sync::OnceLock;
 
 use mechid_signal::{Extent, Record, Spectrum};
 
-use crate::ForceError;
 use crate::band::{is_within, within_band};
+use crate::error::ForceError;
 use crate::lines::noise_weight;
-use crate::unexplained::{Rest, Unexplained};
+use crate::unexplained::{Residual, Unexplained};
 
-/// A reconstructed force: one channel per degree of freedom of the machine, in N.
+/// An identified force: one channel per degree of freedom of the system, in N.
 ///
-/// Channels of degrees of freedom that the method was told are not forced are zero.
+/// Channels of degrees of freedom without a force are zero.
 #[derive(Debug, Clone)]
 pub struct IdentifiedForce {
     record: Record,
-    /// Found when it is asked for: of the many forces behind a standard error nobody asks.
+    /// Computed on demand: a search over many forces does not need it.
     spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
-    /// Remainder of the measured channels; `None` where there are no more of them than forces.
-    rest: Option<Rest>,
+    /// Residual of the measured channels; `None` if there are no more of them than forces.
+    rest: Option<Residual>,
     /// Band of record and standard error; `None`: all frequencies.
     band_hz: Option<[f64; 2]>,
 }
@@ -31,46 +31,48 @@ impl PartialEq for IdentifiedForce {
 }
 
 impl IdentifiedForce {
-    /// A force whose uncertainty is not known.
-    pub(crate) fn of(record: Record) -> Self {
+    /// Creates a force of unknown uncertainty.
+    pub(crate) fn from_record(record: Record) -> Self {
         Self { record, spectrum: OnceLock::new(), standard_error: None, rest: None, band_hz: None }
     }
 
-    /// The same force with its standard error, on the same time axis.
+    /// Returns the same force with its standard error, on the same time axis.
     pub(crate) fn with_standard_error(mut self, standard_error: Option<Record>) -> Self {
         self.standard_error = standard_error;
         self
     }
 
-    /// The same force with what it leaves of the measured channels.
-    pub(crate) fn with_rest(mut self, rest: Option<Rest>) -> Self {
+    /// Returns the same force with the residual of the measured channels.
+    pub(crate) fn with_residual(mut self, rest: Option<Residual>) -> Self {
         self.rest = rest;
         self
     }
 
-    /// The same with another record.
+    /// Returns the same with another record.
     pub(crate) fn replaced(self, record: Record) -> Self {
         Self { record, spectrum: OnceLock::new(), ..self }
     }
 
-    /// The same, said to be the force of this band only.
+    /// Returns the same, restricted to this band.
     pub(crate) fn with_band(mut self, band_hz: [f64; 2]) -> Self {
         self.band_hz = Some(band_hz);
         self
     }
 
-    /// The part of the force between two frequencies in Hz, ends included, its error taken as white.
+    /// Returns the part of the force between two frequencies in Hz, including the ends, with a
+    /// white error.
     ///
-    /// The standard error, in N, is then that of as many lines as lie in the band. It is for the
-    /// equation of motion ([`continuous`](crate::continuous()) and its like), which makes white noise
-    /// of white noise; the other methods take the band of their measurement
+    /// The standard error, in N, then covers the lines in the band. It is for the equation of
+    /// motion ([`continuous`](crate::continuous()) and its variants), which turns white noise into
+    /// white noise; the other methods use the band of their measurement
     /// ([`Measurement::in_band`](crate::Measurement::in_band)).
     ///
     /// # Errors
     /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
     ///
     /// # Source
-    /// Brillinger, *Time Series: Data Analysis and Theory* (1981), chapter 4 (white noise on lines).
+    /// Brillinger, *Time Series: Data Analysis and Theory* (1981), chapter 4 (white noise on
+    /// lines).
     pub fn white_in_band(self, band_hz: [f64; 2], extent: Extent) -> Result<Self, ForceError> {
         let record = within_band(&self.record, band_hz, extent)?;
         let sampling = record.sampling();
@@ -92,7 +94,7 @@ impl IdentifiedForce {
         Ok(self.replaced(record).with_standard_error(error).with_band(band_hz))
     }
 
-    pub(crate) fn rest(&self) -> Option<&Rest> {
+    pub(crate) fn residual(&self) -> Option<&Residual> {
         self.rest.as_ref()
     }
 
@@ -101,32 +103,30 @@ impl IdentifiedForce {
         &self.record
     }
 
-    /// The lines of F̂, lines × degrees of freedom, in N; the record taken as one whole period.
+    /// Lines of F̂, lines × degrees of freedom, in N; the record must be one whole period.
     pub fn spectrum(&self) -> &Spectrum {
         self.spectrum.get_or_init(|| Spectrum::of(&self.record))
     }
 
-    /// One standard deviation of F̂(t), in N: samples × degrees of freedom; `None` where the
-    /// method had no way to know it.
+    /// One standard deviation of F̂(t), in N: samples × degrees of freedom; `None` if the method
+    /// cannot estimate it.
     pub fn standard_error(&self) -> Option<&Record> {
         self.standard_error.as_ref()
     }
 
-    /// Lowest and highest frequency, in Hz, between which force and standard error hold; `None`: at
-    /// all frequencies.
+    /// Lowest and highest frequency, in Hz, of force and standard error; `None`: all frequencies.
     ///
-    /// It is the band asked for ([`Measurement::in_band`](crate::Measurement::in_band)) or, where
-    /// no displacement was measured, the one in which the channels show more of a force than noise.
+    /// It is the requested band ([`Measurement::in_band`](crate::Measurement::in_band)) or, without
+    /// a measured displacement, the band in which the force exceeds the noise of the channels.
     pub fn band_hz(&self) -> Option<[f64; 2]> {
         self.band_hz
     }
 
-    /// Part of each measured channel that the force leaves unexplained.
+    /// Part of each measured channel that the force does not explain.
     ///
-    /// `None` where every channel is needed for a force of its own, and by
-    /// [`continuous`](crate::continuous()) and [`discretised`](crate::discretised()), which compare
-    /// nothing.
+    /// `None` if there are as many forces as channels, and by [`continuous`](crate::continuous())
+    /// and [`discretised`](crate::discretised()), which have no residual.
     pub fn unexplained(&self) -> Option<&[Unexplained]> {
-        self.rest.as_ref().map(Rest::channels)
+        self.rest.as_ref().map(Residual::channels)
     }
 }

@@ -6,12 +6,14 @@ use nalgebra::DMatrix;
 
 use crate::augmented::{Augmented, Tuned};
 use crate::band::{BandFilter, within_band};
-use crate::force_model::LowPass;
-use crate::noise::channel_sizes;
+use crate::error::ForceError;
+use crate::force_model::{ForceModel, LowPass};
+use crate::identified::IdentifiedForce;
+use crate::measurement::{Measurement, Start};
+use crate::noise::{Noise, channel_sizes};
 use crate::seen::ErrorSpectrum;
 use crate::transfer::Transfer;
-use crate::unexplained::Rest;
-use crate::{ForceError, ForceModel, IdentifiedForce, Measurement, Noise, Start};
+use crate::unexplained::Residual;
 
 /// Choice of the levels of noise and force.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,12 +21,12 @@ use crate::{ForceError, ForceModel, IdentifiedForce, Measurement, Noise, Start};
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Tuning {
-    /// Noise and model of the forces of maximum likelihood (innovations form of the likelihood).
+    /// Noise and model of the forces by maximum likelihood (innovations form).
     ///
-    /// The noise of the channels is in proportion to their size; each force has a size of its own.
+    /// The noise of the channels is proportional to their size; each force has its own size.
     Likelihood,
     /// The noise of each channel is known (one standard deviation, in the channel's unit); the
-    /// model of the forces makes the measurement most likely.
+    /// model of the forces has maximum likelihood.
     NoiseKnown(Vec<f64>),
     /// Noise and model given.
     Given {
@@ -35,7 +37,7 @@ pub enum Tuning {
     },
 }
 
-/// Force and motion found together, and the tuning they were found with.
+/// Identified force and motion, and their tuning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KalmanForce {
     /// The force, with its standard error.
@@ -46,43 +48,43 @@ pub struct KalmanForce {
     pub velocity: Record,
     /// Standard deviation of the noise, one per channel, in the unit of the channel.
     pub noise_std: Vec<f64>,
-    /// Spectrum of the forces before the measurement was seen.
+    /// Prior spectrum of the forces.
     pub model: ForceModel,
-    /// Frequency, in Hz, below which the channels show less of a force than noise; 0 where they
-    /// show it down to a constant one, `None` where they show it at no frequency.
+    /// Frequency, in Hz, below which the noise of the channels exceeds the force; 0 if they show it
+    /// down to a constant force, `None` if they show it at no frequency.
     pub seen_from_hz: Option<f64>,
-    /// Logarithm of the likelihood of the measurement, dimensionless, constants left out.
+    /// Log-likelihood of the measurement, dimensionless, without constants.
     pub log_likelihood: f64,
 }
 
-/// The augmented Kalman filter with smoother: forces and motion found together.
+/// Identifies forces and motion together by the augmented Kalman filter with smoother.
 ///
-/// Each force is a stationary process with a band from 0 up to a corner frequency
-/// ([`ForceModel`]), continuous in time: nothing is assumed to be linear between samples. Order and
-/// corner of the band, the sizes of the forces and the noise are those of greatest likelihood. The
-/// smoother uses the whole record for every instant. The standard error is that of the model.
+/// Each force is a stationary process with a band from 0 up to a corner frequency ([`ForceModel`]),
+/// continuous in time, without an assumption between samples. Order and corner of the band, the
+/// sizes of the forces and the noise are those of maximum likelihood. The smoother uses the whole
+/// record for every instant. The standard error comes from the model.
 ///
-/// Accelerations and velocities do not show a constant force of a machine that stands on springs,
-/// and show a slow one less than their noise. Without a displacement the force is therefore that
-/// above [`KalmanForce::seen_from_hz`], and so is its standard error
-/// ([`IdentifiedForce::band_hz`]), unless the measurement asks for a band of its own
-/// ([`Measurement::in_band`]). The standard error in a band is that far from the ends of the record,
-/// with what the whole force has more at each instant.
+/// For a structure on springs, accelerations and velocities do not show a constant force, and their
+/// noise exceeds a slow one. Without a displacement the force is therefore restricted to
+/// frequencies above [`KalmanForce::seen_from_hz`], as is its standard error
+/// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
+/// ([`Measurement::in_band`]). The standard error in a band is the one far from the ends of the
+/// record, plus the increase of the whole force's error at each instant.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
-/// about 2m³ + 2cm² operations per sample until the variances settle, then m² + 2cm; tuning takes
-/// some hundred passes. Memory is m numbers per sample, m² until the variances settle. No allocation
-/// per sample.
+/// about 2m³ + 2cm² operations per sample until the variances converge, then m² + 2cm; tuning takes
+/// some hundred passes. Memory is m numbers per sample, m² until the variances converge. No
+/// allocation per sample.
 ///
 /// # Errors
 /// [`ForceError::MoreForcesThanMeasurements`], [`ForceError::NoForcedDof`],
 /// [`ForceError::NoSuchDof`], [`ForceError::TooShort`]; [`ForceError::Unseen`] if the channels
-/// cannot tell the forces apart; [`ForceError::Silent`] if all channels are zero;
+/// cannot separate the forces; [`ForceError::Silent`] if all channels are zero;
 /// [`ForceError::NotPositive`], [`ForceError::ChannelCount`], [`ForceError::ModelCount`] and
 /// [`ForceError::ModelOrder`] for a given tuning; [`ForceError::NoLikelihood`],
-/// [`ForceError::StepTooLong`] and [`ForceError::Unstable`] where the filter or a step of it
-/// overflows (an unstable machine is no hindrance, a free response that grows by more than about e⁵
-/// within a step is).
+/// [`ForceError::StepTooLong`] and [`ForceError::Unstable`] if the filter or a step of it overflows
+/// (an unstable system is possible, but not a free response that grows by more than about e⁵ within
+/// a step).
 ///
 /// # Source
 /// Lourens, Reynders, De Roeck, Degrande & Lombaert (2012), An augmented Kalman filter for force
@@ -121,31 +123,31 @@ pub fn kalman(
     };
     let smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
     let known = *tuning != Tuning::Likelihood;
-    let rest = measured.exceeds(forced).then(|| {
+    let residual = measured.exceeds(forced).then(|| {
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
-        Rest::of_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
+        Residual::from_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
     });
-    let alike = augmented.alike(&tuned, known.then_some(1.0))?;
-    let force = match alike.len() {
+    let points = augmented.posterior_points(&tuned, known.then_some(1.0))?;
+    let force = match points.len() {
         0 | 1 => smoothed.force,
-        _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &alike)?,
+        _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &points)?,
     };
-    let force = force.with_rest(rest);
+    let force = force.with_residual(residual);
     let band_hz = measured.band_hz().or_else(|| measured.shown(smoothed.seen_from_hz));
     let force = match band_hz {
         None => force,
         Some(band_hz) => {
             let process = LowPass::new(tuned.model.order)?;
-            let errors = augmented.seen().errors(&tuned.model, &process, tuned.noise);
+            let errors = augmented.information().errors(&tuned.model, &process, tuned.noise);
             in_band(force, forced, band_hz, &errors)?
         }
     };
     Ok(KalmanForce { force, ..smoothed })
 }
 
-/// The part of the force in a band. Its variance is that far from the ends of the record, with what
-/// the whole force has more at an instant than in the middle, and what slower errors leave of
-/// themselves in the band where the record ends.
+/// Returns the part of the force in a band. Its variance is the one far from the ends of the
+/// record, plus the increase of the whole force's variance from the middle to each instant, plus
+/// the slower errors that leak into the band at the ends of the record.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],
@@ -154,7 +156,7 @@ fn in_band(
 ) -> Result<IdentifiedForce, ForceError> {
     let record = within_band(force.record(), band_hz, Extent::Open)?;
     let (sampling, len) = (record.sampling(), record.len());
-    // A slope of 1 at the first sample that is gone at the last: its mirror image has a corner.
+    // A slope of 1 at the first sample that decays to 0 at the last: its mirror image has a corner.
     let corner: Vec<f64> =
         (0..len).map(|k| sampling.time(k) * (1.0 - 0.5 * k as f64 / len as f64)).collect();
     let corner = BandFilter { sampling, band_hz, extent: Extent::Open }.apply(&corner)?;
@@ -174,14 +176,14 @@ fn in_band(
     Ok(force.replaced(record).with_standard_error(Some(error)).with_band(band_hz))
 }
 
-/// The stated noise levels, if they can be any.
+/// Returns the stated noise levels, if they are possible.
 fn known(measured: &Measurement, noise: &[f64]) -> Result<Vec<f64>, ForceError> {
     let spectrum = Spectrum::of(measured.record());
     let level = Noise::PerChannel(noise.to_vec()).resolve(measured, &spectrum, &[])?;
     Ok(level.unwrap_or_default())
 }
 
-/// Forces that cannot be told apart at an arbitrary frequency cannot be at any.
+/// Checks that the forces can be separated at an arbitrary frequency; otherwise they cannot at any.
 pub(crate) fn check_seen(
     system: &SecondOrderSystem,
     measured: &Measurement,
@@ -196,8 +198,8 @@ pub(crate) fn check_seen(
     }
 }
 
-/// Means and variances of every state at every sample under a tuning, sample after sample, and how
-/// many states there are.
+/// Returns mean and variance of every state at every sample under a tuning, sample after sample,
+/// and the number of states.
 fn states(augmented: &Augmented, tuned: &Tuned) -> Result<(Vec<f64>, Vec<f64>, usize), ForceError> {
     let process = LowPass::new(tuned.model.order)?;
     let space = augmented.started(augmented.space(&tuned.model, &process, tuned.noise, 10.0)?);
@@ -208,20 +210,20 @@ fn states(augmented: &Augmented, tuned: &Tuned) -> Result<(Vec<f64>, Vec<f64>, u
     Ok((mean, variance, space.states))
 }
 
-/// Forces of the whole record under models that are alike: mean and standard deviation of their
-/// mixture, from that of the best of them.
+/// Returns the forces of the whole record under posterior models: mean and standard deviation of
+/// their mixture, from the best of them.
 fn mixed(
     augmented: &Augmented,
     best: &IdentifiedForce,
     dofs: usize,
     forced: &[usize],
-    alike: &[(f64, Tuned)],
+    points: &[(f64, Tuned)],
 ) -> Result<IdentifiedForce, ForceError> {
     let reference = best.record();
     let shape = reference.data().shape();
     let mut shift = DMatrix::<f64>::zeros(shape.0, shape.1);
     let mut square = shift.clone();
-    for (weight, tuned) in alike {
+    for (weight, tuned) in points {
         let (means, variances, m) = states(augmented, tuned)?;
         for (f, (&dof, unit)) in forced.iter().zip(augmented.units()).enumerate() {
             let at = 2 * dofs + f * tuned.model.order;
@@ -233,11 +235,12 @@ fn mixed(
         }
     }
     let error = square.zip_map(&shift, |square, shift| (square - shift * shift).max(0.0).sqrt());
-    let force = IdentifiedForce::of(Record::new(reference.sampling(), reference.data() + shift)?);
+    let force =
+        IdentifiedForce::from_record(Record::new(reference.sampling(), reference.data() + shift)?);
     Ok(force.with_standard_error(Some(Record::new(reference.sampling(), error)?)))
 }
 
-/// Motion and forces of the whole record under a tuning, over all frequencies.
+/// Returns motion and forces of the whole record under a tuning, over all frequencies.
 fn smoothed(
     augmented: &Augmented,
     system: &SecondOrderSystem,
@@ -261,10 +264,10 @@ fn smoothed(
         let data = DMatrix::from_fn(sampling.len(), n, |k, i| mean[k * m + first + i] / unit);
         Record::new(sampling, data)
     };
-    let force = IdentifiedForce::of(Record::new(sampling, force)?);
+    let force = IdentifiedForce::from_record(Record::new(sampling, force)?);
     let scaling: f64 = scale.iter().map(|s| s.ln()).sum();
     let process = LowPass::new(tuned.model.order)?;
-    let errors = augmented.seen().errors(&tuned.model, &process, tuned.noise);
+    let errors = augmented.information().errors(&tuned.model, &process, tuned.noise);
     Ok(KalmanForce {
         force: force.with_standard_error(Some(Record::new(sampling, error)?)),
         displacement: motion(0, 1.0)?,

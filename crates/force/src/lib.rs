@@ -1,4 +1,4 @@
-//! The force that drove a known machine, from its measured response.
+//! Identification of the force on a known system from its measured response.
 //!
 //! | Function | Needs | Use it when |
 //! |---|---|---|
@@ -9,9 +9,9 @@
 //! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
 //! | [`kalman`] | any channels, any length | the record is no period |
 //!
-//! [`with_uncertain_system`] adds to any of them what the covariance of an identified machine means
-//! for the force. The book's chapter on forces has the reasons, and every method's error side by
-//! side.
+//! [`with_uncertain_system`] adds the covariance of an identified system to the standard error of
+//! any of them. The chapter on forces of the book has the reasons, and compares the errors of all
+//! methods.
 //!
 //! ```
 //! use mechid_force::{Measurement, Noise, frequency_domain, relative_error};
@@ -40,8 +40,8 @@
 //! let force = Spectrum::from_lines(period, force)?.to_record()?;
 //! let displacement = Spectrum::from_lines(period, motion)?.to_record()?;
 //!
-//! // Only the displacement of the first direction is measured: it tells the force all the same.
-//! let measured = Measurement::of_all(
+//! // Only the displacement of the first direction is measured: it determines the force.
+//! let measured = Measurement::from_record(
 //!     ResponseQuantity::Displacement,
 //!     Record::from_channel(period, displacement.channel(0).to_vec())?,
 //! );
@@ -50,7 +50,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod alike;
 mod augmented;
 mod band;
 mod components;
@@ -58,10 +57,12 @@ mod continuous;
 mod discretised;
 mod error;
 mod evidence;
+mod force_information;
 mod force_model;
 mod frequency_domain;
 mod identified;
 mod kalman;
+mod limits;
 mod lines;
 mod measurement;
 mod measures;
@@ -70,9 +71,9 @@ mod noise;
 mod nonlinear;
 mod open_operator;
 mod period_operator;
+mod posterior_points;
 mod regularised;
 mod rule;
-mod seen;
 mod smoother;
 mod state_space;
 mod transfer;

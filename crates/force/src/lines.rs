@@ -2,20 +2,20 @@
 
 use mechid_signal::Spectrum;
 
-use crate::measurement::first_repeated;
-use crate::{ForceError, Measurement};
+use crate::error::ForceError;
+use crate::measurement::{Measurement, first_repeated};
 
-/// Every line of the record that holds a whole complex amplitude: 1 up to, not at, Nyquist.
+/// Every line of the record with a complex amplitude: 1 up to, not including, Nyquist.
 pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
     (1..measured.sampling().len().div_ceil(2)).collect()
 }
 
-/// Variance that white noise of unit variance has in each part of a line's amplitude.
+/// Variance of each part of a line's amplitude under white noise of unit variance.
 pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
 }
 
-/// Checks that these lines are some lines of the spectrum, each named once.
+/// Checks that these are lines of the spectrum, without repetition.
 pub(crate) fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), ForceError> {
     if lines.is_empty() {
         return Err(ForceError::NoLines);

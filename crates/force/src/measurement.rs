@@ -4,8 +4,8 @@ use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
-use crate::ForceError;
 use crate::band::check_band;
+use crate::error::ForceError;
 
 /// One measured channel: a quantity at a degree of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -18,30 +18,30 @@ pub struct Channel {
     pub quantity: ResponseQuantity,
 }
 
-/// State of the machine at the first sample of an open record.
+/// State of the system at the first sample of an open record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Start {
-    /// Start at rest: neither displaced nor moving.
+    /// Start at rest: no displacement, no velocity.
     FromRest,
     /// Unknown: displacement and velocity are estimated with the force.
     InMotion,
 }
 
-/// A measured record and what each of its channels is.
+/// A measured record and the quantity of each of its channels.
 ///
-/// Any mixture will do: displacement of one degree of freedom only, accelerations of all, both.
+/// Any mixture is possible: displacement of one degree of freedom only, accelerations of all, both.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     record: Record,
     channels: Vec<Channel>,
-    /// Band in which the force is sought; `None`: all frequencies.
+    /// Band of the force to identify; `None`: all frequencies.
     band_hz: Option<[f64; 2]>,
 }
 
 impl Measurement {
-    /// A measurement from its record and the description of each channel.
+    /// Creates a measurement from its record and the description of each channel.
     ///
     /// # Errors
     /// [`ForceError::ChannelCount`] if the numbers of channels differ.
@@ -55,14 +55,15 @@ impl Measurement {
         Ok(Self { record, channels, band_hz: None })
     }
 
-    /// The same quantity on every channel, channel c at degree of freedom c.
-    pub fn of_all(quantity: ResponseQuantity, record: Record) -> Self {
+    /// Creates a measurement of the same quantity on every channel, channel c at degree of freedom
+    /// c.
+    pub fn from_record(quantity: ResponseQuantity, record: Record) -> Self {
         let channels = (0..record.channels()).map(|dof| Channel { dof, quantity }).collect();
         Self { record, channels, band_hz: None }
     }
 
-    /// Displacement, velocity and acceleration of every degree of freedom.
-    pub fn of_response(response: &Response) -> Self {
+    /// Creates a measurement of displacement, velocity and acceleration of every degree of freedom.
+    pub fn from_response(response: &Response) -> Self {
         let dof = response.dof();
         let parts = ResponseQuantity::ALL.map(|which| (which, response.quantity(which)));
         let data = DMatrix::from_fn(response.sampling().len(), 3 * dof, |k, c| {
@@ -85,11 +86,11 @@ impl Measurement {
         &self.channels
     }
 
-    /// Seeks the force between two frequencies in Hz, ends included, and nowhere else.
+    /// Restricts the force to the band between two frequencies in Hz, including the ends.
     ///
-    /// Force and standard error are then those of this band ([`within_band`](crate::within_band)
-    /// of the force); what the channels show outside of it counts for the noise and the spectrum of
-    /// the force, but is not returned.
+    /// Force and standard error then belong to this band ([`within_band`](crate::within_band) of
+    /// the force). The response outside of it contributes to the noise and the spectrum of the
+    /// force, but is not returned.
     ///
     /// # Errors
     /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
@@ -98,12 +99,13 @@ impl Measurement {
         Ok(Self { band_hz: Some(band_hz), ..self })
     }
 
-    /// Lowest and highest frequency at which the force is sought, in Hz; `None`: all.
+    /// Lowest and highest frequency of the force to identify, in Hz; `None`: all.
     pub fn band_hz(&self) -> Option<[f64; 2]> {
         self.band_hz
     }
 
-    /// The band in which channels without a displacement show a force, where it is not all of it.
+    /// Returns the band in which channels without a displacement show a force, unless it is the
+    /// whole band.
     pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
         let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
         let nyquist = 0.5 * self.sampling().rate_hz();
@@ -116,12 +118,12 @@ impl Measurement {
         self.record.sampling()
     }
 
-    /// Returns whether there are more channels than so many forces need: they can contradict one another.
+    /// Returns whether there are more channels than forces, so that they have a residual.
     pub(crate) fn exceeds(&self, forced: &[usize]) -> bool {
         self.channels.len() > forced.len()
     }
 
-    /// An error unless the forces at `forced` can be sought from these channels.
+    /// Returns an error unless these channels allow to identify the forces at `forced`.
     pub(crate) fn check(&self, dofs: usize, forced: &[usize]) -> Result<(), ForceError> {
         let named = self.channels.iter().map(|c| c.dof).chain(forced.iter().copied());
         if let Some(dof) = named.into_iter().find(|dof| *dof >= dofs) {
@@ -143,8 +145,8 @@ impl Measurement {
     }
 }
 
-/// The first index that was already there.
+/// Returns the first index that occurs twice.
 pub(crate) fn first_repeated(indices: &[usize]) -> Option<usize> {
-    let mut seen = std::collections::HashSet::new();
-    indices.iter().copied().find(|index| !seen.insert(*index))
+    let mut indices = std::collections::HashSet::new();
+    indices.iter().copied().find(|index| !indices.insert(*index))
 }

@@ -1,8 +1,8 @@
-//! Errors of a reconstructed force relative to the one it is compared with.
+//! Errors of an identified force relative to a reference.
 
 use mechid_signal::{Record, Spectrum};
 
-use crate::ForceError;
+use crate::error::ForceError;
 
 /// ‖F̂ − F‖ / ‖F‖ over all samples and channels, a pure number.
 ///
@@ -18,10 +18,10 @@ pub fn relative_error(estimate: &Record, truth: &Record) -> Result<f64, ForceErr
     Ok((estimate.data() - truth.data()).norm() / norm)
 }
 
-/// ‖F̂ − F‖ / ‖F‖, a pure number, of each channel; `None` for channels on which no force acts.
+/// ‖F̂ − F‖ / ‖F‖, a pure number, for each channel; `None` for channels without a force.
 ///
 /// # Errors
-/// As [`relative_error`], but for [`ForceError::NoForce`].
+/// The errors of [`relative_error`], except [`ForceError::NoForce`].
 pub fn channel_errors(estimate: &Record, truth: &Record) -> Result<Vec<Option<f64>>, ForceError> {
     check_records(estimate, truth)?;
     let channels = estimate.data().column_iter().zip(truth.data().column_iter());
@@ -33,7 +33,7 @@ pub fn channel_errors(estimate: &Record, truth: &Record) -> Result<Vec<Option<f6
 /// |F̂_n − F_n| / |F_n|, a pure number, at each of the lines, for one channel.
 ///
 /// # Errors
-/// [`ForceError::NoForceAtLine`] where F_n is zero; [`ForceError::NoSuchLine`],
+/// [`ForceError::NoForceAtLine`] if F_n is zero; [`ForceError::NoSuchLine`],
 /// [`ForceError::NoSuchDof`], [`ForceError::Compared`].
 pub fn line_errors(
     estimate: &Spectrum,
@@ -47,7 +47,7 @@ pub fn line_errors(
 /// The ratio |F̂_n| / |F_n| at each of the lines, for one channel: 1 is perfect.
 ///
 /// # Errors
-/// As [`line_errors`].
+/// The errors of [`line_errors`].
 pub fn spectrum_ratio(
     estimate: &Spectrum,
     truth: &Spectrum,
@@ -57,11 +57,11 @@ pub fn spectrum_ratio(
     ratios(estimate, truth, channel, channel, lines, |e, _| e.norm())
 }
 
-/// The ratio of |F̂_n| on a channel where no force acts to |F_n| on one where it does, at each of
-/// the lines: 0 is perfect.
+/// Ratio of |F̂_n| on a channel without a force to |F_n| on one with a force, at each of the lines:
+/// 0 is perfect.
 ///
 /// # Errors
-/// As [`line_errors`].
+/// The errors of [`line_errors`].
 pub fn spurious_ratio(
     estimate: &Spectrum,
     truth: &Spectrum,

@@ -6,8 +6,10 @@ use mechid_model::{Discretisation, Response, SecondOrderSystem};
 use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::{DMatrix, DVector};
 
-use crate::discretised::Solution;
-use crate::{ForceError, IdentifiedForce, continuous, discretised};
+use crate::continuous::continuous;
+use crate::discretised::{Solution, discretised};
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
 
 /// Standard deviation of the noise in each channel of a complete motion; the noise is white and
 /// independent from channel to channel.
@@ -19,19 +21,18 @@ pub struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// Standard deviations of the displacement (m), velocity (m/s) and acceleration (m/s²) of every
-    /// degree of freedom;
-    /// no acceleration where none was measured.
+    /// Creates standard deviations of the displacement (m), velocity (m/s) and acceleration (m/s²)
+    /// of every degree of freedom; none for an acceleration that was not measured.
     ///
     /// # Errors
-    /// [`ForceError::NotPositive`] for a level that is not, or not finite.
+    /// [`ForceError::NotPositive`] for a level that is not positive and finite.
     pub fn new(
         displacement: Vec<f64>,
         velocity: Vec<f64>,
         acceleration: Vec<f64>,
     ) -> Result<Self, ForceError> {
-        let mut all = displacement.iter().chain(&velocity).chain(&acceleration);
-        if let Some(&value) = all.find(|level| !(**level > 0.0 && level.is_finite())) {
+        let mut levels = displacement.iter().chain(&velocity).chain(&acceleration);
+        if let Some(&value) = levels.find(|level| !(**level > 0.0 && level.is_finite())) {
             return Err(ForceError::NotPositive { what: "noise level", value });
         }
         Ok(Self {
@@ -49,16 +50,16 @@ impl MotionNoise {
     }
 }
 
-/// [`continuous`], with the standard error that noise in the motion leads to.
+/// Computes [`continuous`], with the standard error due to noise in the response.
 ///
 /// ```text
 /// var F̂ᵢ = Σⱼ (Mᵢⱼ² σ²_ẍⱼ + Cᵢⱼ² σ²_ẋⱼ + Kᵢⱼ² σ²_xⱼ)
 /// ```
 ///
-/// in N², at every sample; exact, for the force is linear in the motion.
+/// in N², at every sample; exact, since the force is linear in the response.
 ///
 /// # Errors
-/// As [`continuous`]; [`ForceError::ChannelCount`] if a noise level is missing.
+/// The errors of [`continuous`]; [`ForceError::ChannelCount`] if a noise level is missing.
 ///
 /// # Source
 /// Dissertation eq. (4.8.1), and the variance of a sum of independent parts.
@@ -99,14 +100,14 @@ pub fn continuous_with_noise(
     Ok(force.with_standard_error(Some(Record::new(sampling, error)?)))
 }
 
-/// [`discretised`], with the standard error that noise in displacement and velocity leads to.
+/// Computes [`discretised`], with the standard error due to noise in displacement and velocity.
 ///
-/// The force of a sample is linear in the samples beside it, F̂(k) = Σₗ Aₗ z(k+l); its variance is
-/// the sum of the squares of all Aₗ times those of the noise. The first and last sample of an open
-/// record, with a step on one side only, have a larger one than the others.
+/// The force of a sample is linear in the neighbouring samples, F̂(k) = Σₗ Aₗ z(k+l); its variance
+/// is the sum of the squares of all Aₗ times the variances of the noise. The first and last sample
+/// of an open record, with a step on one side only, have a larger variance than the others.
 ///
 /// # Errors
-/// As [`discretised`]; [`ForceError::ChannelCount`] if a noise level is missing.
+/// The errors of [`discretised`]; [`ForceError::ChannelCount`] if a noise level is missing.
 ///
 /// # Source
 /// The equations of [`discretised`], and the variance of a sum of independent parts.
@@ -121,13 +122,13 @@ pub fn discretised_with_noise(
     for levels in [&noise.displacement, &noise.velocity] {
         MotionNoise::check(levels, system.dof())?;
     }
-    let sides = sides(&Solution::of_rule(system, response.sampling().dt(), discretisation)?);
+    let sides = sides(&Solution::from_rule(system, response.sampling().dt(), discretisation)?);
     let samples = force.record().len();
     let at = |k: usize| error(system, response.sampling(), &sides, extent, noise, k);
-    // All samples between the ends are alike, and there is one of them if there are three.
-    let alike = [at(0), at(1.min(samples - 1)), at(samples - 1)];
+    // All samples between the ends are equal; three samples have one of them.
+    let distinct = [at(0), at(1.min(samples - 1)), at(samples - 1)];
     let error = DMatrix::from_fn(samples, system.dof(), |k, i| {
-        alike[if k == 0 { 0 } else { 1 + usize::from(k + 1 == samples) }][i]
+        distinct[if k == 0 { 0 } else { 1 + usize::from(k + 1 == samples) }][i]
     });
     let error = Record::new(force.record().sampling(), error)?;
     Ok(force.with_standard_error(Some(error)))
@@ -135,16 +136,17 @@ pub fn discretised_with_noise(
 
 /// Estimate of the force in a step, from the motion at its ends.
 struct Side {
-    /// Number of the step, counted from that which begins with the sample: 0 or, the one before, −1.
+    /// Number of the step, relative to the one that begins with the sample: 0 or, the one before,
+    /// −1.
     step: isize,
-    /// n × 2n: what the states at its two ends count.
+    /// n × 2n: weights of the states at its two ends.
     of_ends: [DMatrix<f64>; 2],
 }
 
 fn sides(solution: &Solution) -> Vec<Side> {
-    let (start, end) = solution.of(-&solution.state);
+    let (start, end) = solution.inputs(-&solution.state);
     let (order, _) = solution.state.shape();
-    let (next_start, next_end) = solution.of(DMatrix::identity(order, order));
+    let (next_start, next_end) = solution.inputs(DMatrix::identity(order, order));
     let mut sides = vec![Side { step: 0, of_ends: [start, next_start] }];
     if let (Some(end), Some(next)) = (end, next_end) {
         sides.push(Side { step: -1, of_ends: [end, next] });
@@ -167,8 +169,8 @@ fn error(
         extent == Extent::WholePeriod || (0..len - 1).contains(&step)
     };
     let sides: Vec<&Side> = sides.iter().filter(within).collect();
-    // A sample of a short period may be both before and after another: what it adds to the force
-    // is added before it is squared.
+    // A sample of a short period may be both before and after another: its contributions are added
+    // before they are squared.
     let mut parts: BTreeMap<isize, DMatrix<f64>> = BTreeMap::new();
     for side in &sides {
         for (sample, part) in (k as isize + side.step..).zip(&side.of_ends) {

@@ -2,25 +2,26 @@
 
 use mechid_signal::{Record, Spectrum};
 
+use crate::error::ForceError;
 use crate::lines::inner_lines;
-use crate::{ForceError, Measurement};
+use crate::measurement::Measurement;
 
-/// Knowledge of the noise in the measured channels, taken as white.
+/// Knowledge of the noise in the measured channels, which is assumed white.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Noise {
-    /// Unknown noise: no standard error, and channels count by their size.
+    /// Unknown noise: no standard error, and channels are weighted by their size.
     Unknown,
     /// One standard deviation per channel, in the channel's unit.
     PerChannel(Vec<f64>),
-    /// Measured on the lines that were not chosen (DC and Nyquist apart): there the force is
-    /// taken as zero and what is seen is noise. Needs at least [`MIN_OUTSIDE_LINES`] of them.
+    /// Measured on the lines that were not chosen (without DC and Nyquist): the force is zero there
+    /// and the response is noise. Needs at least [`MIN_OUTSIDE_LINES`] of them.
     OutsideLines,
 }
 
-/// Fewest lines that [`Noise::OutsideLines`] measures a noise level on: each gives two
-/// degrees of freedom, so the level is known to about 20 % or better.
+/// Minimum number of lines for a noise level by [`Noise::OutsideLines`]: each gives two degrees of
+/// freedom, so that the level is known to about 20 % or better.
 pub const MIN_OUTSIDE_LINES: usize = 8;
 
 impl Noise {
@@ -75,7 +76,7 @@ fn outside_level(
         .collect()
 }
 
-/// Root mean square of each channel, 1 for a channel that is zero.
+/// Root mean square of each channel, or 1 for a channel of zeros.
 pub(crate) fn channel_sizes(record: &Record) -> Vec<f64> {
     let rms = |norm: f64| norm / (record.len() as f64).sqrt();
     record

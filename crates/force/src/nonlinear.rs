@@ -5,15 +5,16 @@ use mechid_signal::Record;
 use nalgebra::DMatrix;
 
 use crate::continuous::check_dof;
-use crate::motion_noise::through;
-use crate::{ForceError, IdentifiedForce, MotionNoise};
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
+use crate::motion_noise::{MotionNoise, through};
 
 /// F̂ = M ẍ + C ẋ + K x + Σ θ f(q, q̇) at every sample.
 ///
-/// Exact when the response satisfies equilibrium at the sampled instants, as for
+/// Exact if the response satisfies equilibrium at the sampled instants, as for
 /// [`continuous`](crate::continuous()).
 ///
-/// Cost: three products of samples × n by n × n, and one value of each term a sample.
+/// Cost: three products of samples × n by n × n, and one value of each term for each sample.
 ///
 /// # Errors
 /// [`ForceError::Dof`] if the response has another number of degrees of freedom.
@@ -49,18 +50,19 @@ pub fn continuous_nonlinear(
     response: &Response,
 ) -> Result<IdentifiedForce, ForceError> {
     check_dof(system.linear(), response)?;
-    Ok(IdentifiedForce::of(system.force(response)?))
+    Ok(IdentifiedForce::from_record(system.force(response)?))
 }
 
-/// [`continuous_nonlinear`], with the standard error that noise in the motion leads to: that of
+/// Computes [`continuous_nonlinear`], with the standard error due to noise in the response: like
 /// [`continuous_with_noise`](crate::continuous_with_noise) with the
-/// [tangents](NonlinearSystem::tangents) of each sample in the place of C and K.
+/// [tangents](NonlinearSystem::tangents) of each sample instead of C and K.
 ///
-/// To first order in the noise: where the force bends within one standard deviation of it the mean of
-/// the force moves, too.
+/// The standard error is of first order in the noise: if the force is curved within one standard
+/// deviation, its mean changes, too.
 ///
 /// # Errors
-/// As [`continuous_nonlinear`]; [`ForceError::ChannelCount`] if a noise level is missing.
+/// The errors of [`continuous_nonlinear`]; [`ForceError::ChannelCount`] if a noise level is
+/// missing.
 ///
 /// # Source
 /// Dissertation eq. (4.8.1), and the delta method.
@@ -131,7 +133,7 @@ mod tests {
         }
         for (sum, stated) in squares.iter().zip(found.standard_error().unwrap().channel(0)) {
             let scatter = (sum / runs as f64).sqrt();
-            // A standard deviation of 4000 runs is known to 1.1 %.
+            // The standard deviation of 4000 runs has an error of 1.1 %.
             assert!((scatter / stated - 1.0).abs() < 0.045, "{scatter}, {stated}");
         }
     }

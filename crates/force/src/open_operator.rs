@@ -7,22 +7,20 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::band::BandFilter;
 use crate::components::{Components, Operator};
+use crate::error::ForceError;
+use crate::limits;
+use crate::measurement::{Measurement, Start};
 use crate::state_space::{Machine, growth_rate};
-use crate::{ForceError, Measurement, Start};
 
-/// Most unknowns (samples × forces) of an open record: the dense problem then takes seconds.
+/// Maximum number of unknowns (samples × forces) of an open record: the dense problem then takes
+/// seconds.
 pub const OPEN_UNKNOWNS: usize = 512;
-
-/// Largest growth of the free response over the record, as a natural logarithm: a factor of 10⁶.
-/// Impulse responses that grow more leave too few digits for those that begin late: beyond 10⁸ the
-/// force found is wrong as a whole.
-const MOST_GROWTH: f64 = 14.0;
 
 pub(crate) struct OpenOperator {
     components: Components,
     /// Undamped coefficient y_i / s_i of each component.
     coefficients: Vec<f64>,
-    /// Unknowns × components; the unknowns are force after force, sample after sample.
+    /// Unknowns × components; the unknowns are ordered by force, then by sample.
     shapes: DMatrix<f64>,
     samples: usize,
     forces: usize,
@@ -46,7 +44,7 @@ impl OpenOperator {
             return Err(ForceError::TooLarge { unknowns, limit });
         }
         let (rate, duration) = (growth_rate(system)?, measured.sampling().duration());
-        if rate * duration > MOST_GROWTH {
+        if rate * duration > limits::FREE_GROWTH {
             return Err(ForceError::Unstable { rate, duration });
         }
         let machine = Machine::new(system, measured, forced, scale)?;
@@ -57,7 +55,7 @@ impl OpenOperator {
         let rows = data.len();
         let mut freed = 0;
         if start == Start::InMotion {
-            // What any state at the first sample explains is taken out of both sides.
+            // The response to any state at the first sample is removed from both sides.
             let free = machine.free_responses(samples).qr().q();
             freed = free.ncols();
             matrix -= &free * free.tr_mul(&matrix);
@@ -112,8 +110,8 @@ impl Operator for OpenOperator {
         let filter = BandFilter { sampling: self.sampling, band_hz, extent: Extent::Open };
         for mut shape in self.shapes.column_iter_mut() {
             for force in shape.as_mut_slice().chunks_mut(self.samples) {
-                let kept = filter.apply(force)?;
-                force.copy_from_slice(&kept);
+                let filtered = filter.apply(force)?;
+                force.copy_from_slice(&filtered);
             }
         }
         Ok(())

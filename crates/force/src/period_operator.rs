@@ -7,15 +7,16 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::band::{empty_band, is_within};
 use crate::components::{Components, Operator};
+use crate::error::ForceError;
 use crate::lines::{check_lines, noise_weight};
+use crate::measurement::Measurement;
 use crate::transfer::Transfer;
-use crate::{ForceError, Measurement};
 
-/// Lines are taken in units in which white noise of variance σ² in time has variance σ² in each
-/// real part: amplitude times √(N/2), at DC √N. Then ‖F‖² is the same in time and over the lines.
+/// Lines are in units in which white noise of variance σ² in time has variance σ² in each real
+/// part: amplitude times √(N/2), at DC √N. Then ‖F‖² is the same in time and over the lines.
 pub(crate) struct PeriodOperator {
     components: Components,
-    /// Place of each component and the shape of its force.
+    /// Index of each component and the shape of its force.
     places: Vec<Place>,
     sampling: Sampling,
     forces: usize,
@@ -77,8 +78,8 @@ impl PeriodOperator {
     }
 }
 
-/// Frequency of a line as the samples have it: change from sample to sample over size, times half the
-/// period in samples. A mean is taken to be as strong as the first line.
+/// Frequency of a line: change from sample to sample over size, times half the period in samples.
+/// The mean is assumed to be as strong as the first line.
 fn frequency(line: usize, len: usize) -> f64 {
     let half = std::f64::consts::PI / len as f64;
     (half * line.max(1) as f64).sin() / half
@@ -102,15 +103,15 @@ impl Operator for PeriodOperator {
 
     fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError> {
         let spacing = self.sampling.line_spacing_hz();
-        let mut kept = false;
+        let mut is_in_band = false;
         for place in &mut self.places {
             let inside = is_within(band_hz, place.line as f64 * spacing, spacing);
-            kept |= inside;
+            is_in_band |= inside;
             if !inside {
                 place.shape.fill(Complex::ZERO);
             }
         }
-        if kept { Ok(()) } else { Err(empty_band(band_hz, self.sampling)) }
+        if is_in_band { Ok(()) } else { Err(empty_band(band_hz, self.sampling)) }
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

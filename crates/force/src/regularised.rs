@@ -1,4 +1,4 @@
-//! Force from few or noisy channels: the weakly transmitted part of it is damped.
+//! Force from few or noisy channels: its weakly transmitted part is damped.
 
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
@@ -6,13 +6,16 @@ use nalgebra::DMatrix;
 use statrs::function::erf::erfc;
 
 use crate::components::Operator;
+use crate::error::ForceError;
 use crate::evidence::Posterior;
-use crate::noise::channel_sizes;
+use crate::identified::IdentifiedForce;
+use crate::limits;
+use crate::measurement::{Measurement, Start};
+use crate::noise::{Noise, channel_sizes};
 use crate::open_operator::OpenOperator;
 use crate::period_operator::PeriodOperator;
-use crate::rule::{choose, factor};
-use crate::unexplained::Rest;
-use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise, Start};
+use crate::rule::{Filter, choose, factor};
+use crate::unexplained::Residual;
 
 /// Unknowns of a force: its lines in a whole period, or its samples in an open record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,49 +31,51 @@ pub enum ForceUnknowns {
     Samples(Start),
 }
 
-/// A regularised force and how it was chosen.
+/// A regularised force and its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegularisedForce {
     /// The force, with its standard error.
     pub force: IdentifiedForce,
     /// λ, in the unit of a scaled channel per N; `None` for [`Filter::Shrinkage`], which has none.
     pub parameter: Option<f64>,
-    /// Effective number of real unknowns that pass the filter, a pure number and rarely a whole one.
+    /// Effective number of real unknowns of the filter, a pure number and rarely an integer.
     pub unknowns: f64,
-    /// Standard deviation of the noise in each channel, in the channel's unit: as stated, or as the
-    /// measurement makes it likely.
+    /// Standard deviation of the noise in each channel, in the channel's unit: stated, or estimated
+    /// by maximum likelihood.
     pub noise_std: Vec<f64>,
-    /// Frequency, in Hz, below which the channels show less of a force as strong as this one than
-    /// noise; `None` where they show it at no frequency.
+    /// Frequency, in Hz, below which the noise of the channels exceeds a force as strong as this
+    /// one; `None` if they show it at no frequency.
     pub seen_from_hz: Option<f64>,
 }
 
-/// The force that explains the measured channels without amplifying their noise.
+/// Identifies the force that explains the measured channels without amplifying their noise.
 ///
-/// Solves y = H F + noise in singular vectors, channels divided by their noise level (or, where
-/// it is not stated, by their size). A period falls apart into its lines; an open record is one
-/// dense problem, the force linear between samples.
+/// Solves y = H F + noise in singular vectors, with channels divided by their noise level (or, if
+/// it is unknown, by their size). A period separates into its lines; an open record is one dense
+/// problem with a force linear between samples.
 ///
-/// The standard error is such that 1.96 of it to either side hold the force with a probability of
-/// 95 % given the measurement: noise let through, force held back, and all that the measurement does
-/// not tell of the sizes of force and noise. A noise level that is stated or measured apart
-/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. Of a given λ ([`Rule::Given`](crate::Rule::Given))
-/// it is that of a force of variance (noise/λ)² in every component, and of truncation that of the
-/// noise: there nothing else is asked of the measurement.
+/// The standard error is such that the force is within 1.96 of it with a probability of 95 % given
+/// the measurement. It includes transmitted noise, the damped part of the force, and the
+/// uncertainty of the sizes of force and noise. A noise level that is stated or measured separately
+/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. For a given λ
+/// ([`Rule::Given`](crate::Rule::Given)) the standard error belongs to a force of variance
+/// (noise/λ)² in every component, and for truncation to the noise.
 ///
-/// Channels without a displacement do not show a constant force. The force is then that above
-/// [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the measurement asks
-/// for a band of its own ([`Measurement::in_band`]).
+/// Channels without a displacement do not show a constant force. The force is then restricted to
+/// frequencies above [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the
+/// measurement has its own band ([`Measurement::in_band`]).
 ///
 /// Cost: a period takes one small SVD per line; an open record of N samples and p forces takes
-/// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`](crate::OPEN_UNKNOWNS) unknowns. Longer open
-/// records are for [`kalman`](crate::kalman()), linear in their length.
+/// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`](crate::OPEN_UNKNOWNS)
+/// unknowns. Longer open records are for [`kalman`](crate::kalman()), whose cost is linear in their
+/// length.
 ///
 /// # Errors
-/// As [`frequency_domain`](crate::frequency_domain()); [`ForceError::TooLarge`] for an open record
-/// beyond the limit; [`ForceError::Unstable`] for one over which the free response of an unstable
-/// machine grows by more than 10⁶ (a period asks for no stability); [`ForceError::Silent`] where no
-/// force reaches any channel, or all are zero; [`ForceError::EmptyBand`].
+/// The errors of [`frequency_domain`](crate::frequency_domain()); [`ForceError::TooLarge`] for an
+/// open record beyond the limit; [`ForceError::Unstable`] if the free response of an unstable
+/// system grows by more than 10⁶ over the record (a period needs no stability);
+/// [`ForceError::Silent`] if no force reaches any channel, or all are zero;
+/// [`ForceError::EmptyBand`].
 ///
 /// # Source
 /// Tikhonov & Arsenin (1977); Hansen (1998), Rank-Deficient and Discrete Ill-Posed Problems.
@@ -99,13 +104,13 @@ pub fn regularised(
         let mut operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
         solve(&mut operator, system, measured, forced, filter, &scale, level.is_some())?
     };
-    let rest = measured.exceeds(forced).then(|| match unknowns {
+    let residual = measured.exceeds(forced).then(|| match unknowns {
         ForceUnknowns::Samples(start) => {
-            Rest::of_open(system, measured, forced, &whole, *start, &scale, level)
+            Residual::from_open_record(system, measured, forced, &whole, *start, &scale, level)
         }
-        _ => Rest::of_lines(system, measured, forced, &Spectrum::of(&whole), &lines, level),
+        _ => Residual::from_lines(system, measured, forced, &Spectrum::of(&whole), &lines, level),
     });
-    let force = solution.force.with_rest(rest.transpose()?);
+    let force = solution.force.with_residual(residual.transpose()?);
     Ok(RegularisedForce { force, ..solution })
 }
 
@@ -118,90 +123,114 @@ fn solve(
     scale: &[f64],
     noise_known: bool,
 ) -> Result<(RegularisedForce, Record), ForceError> {
-    let components = operator.components();
-    if components.singular.first().is_none_or(|s| *s == 0.0)
-        || components.energy.iter().all(|energy| *energy == 0.0)
-    {
-        return Err(ForceError::Silent);
-    }
-    let count = components.singular.len();
-    let given = filter.given();
-    let posterior = match given {
-        Some(_) => None,
-        None => Some(Posterior::of(components, noise_known)?),
-    };
-    let parameter = given.or_else(|| choose(filter, components, posterior.as_ref()?));
-    let factors: Vec<f64> = (0..count)
-        .map(|i| match (parameter, &posterior) {
-            (Some(lambda), _) => factor(filter, components, i, lambda),
-            (None, Some(posterior)) => posterior.best_factor(components, i),
-            (None, None) => 0.0,
-        })
-        .collect();
-    let fit = components.fit(|i| factors[i]);
-    let noise = match &posterior {
-        Some(posterior) => posterior.noise(),
-        None if noise_known => 1.0,
-        None => fit.noise(components),
-    };
-    // A given λ is a prior of its own: a force of variance σ²/λ² in every component.
-    let lambda = given.unwrap_or(0.0);
-    let mean: Vec<f64> = (0..count)
-        .map(|i| posterior.as_ref().map_or(factors[i], |posterior| posterior.factor(components, i)))
-        .collect();
-    let variance: Vec<f64> = (0..count)
-        .map(|i| match &posterior {
-            Some(posterior) => posterior.variance(components, i),
-            None if factors[i] == 0.0 => 0.0,
-            None if factors[i] == 1.0 => noise / components.singular[i].powi(2),
-            None => noise / (components.singular[i].powi(2) + lambda * lambda),
-        })
-        .collect();
-    let seen_from_hz = match &posterior {
-        Some(posterior) => posterior.seen_from_hz(components),
-        None => components.lowest_hz(|i| components.singular[i] >= lambda),
-    };
-    let unknowns = fit.unknowns;
-    let whole = operator.force(&factors)?;
-    let band_hz = measured.band_hz().or_else(|| measured.shown(seen_from_hz));
+    let choice = Choice::new(operator.components(), filter, noise_known)?;
+    let whole = operator.force(&choice.factors)?;
+    let band_hz = measured.band_hz().or_else(|| measured.shown(choice.seen_from_hz));
     if let Some(band_hz) = band_hz {
         operator.keep(band_hz)?;
     }
-
     let spread = |part: DMatrix<f64>| {
-        let mut all = DMatrix::zeros(part.nrows(), system.dof());
+        let mut channels = DMatrix::zeros(part.nrows(), system.dof());
         for (column, dof) in part.column_iter().zip(forced) {
-            all.set_column(*dof, &column);
+            channels.set_column(*dof, &column);
         }
-        Record::new(measured.sampling(), all)
+        Record::new(measured.sampling(), channels)
     };
-    let found = operator.force(&factors)?;
-    let mut error = operator.variance(&variance).map(f64::sqrt);
-    let apart = operator.force(&mean)? - &found;
+    let filtered = operator.force(&choice.factors)?;
+    let mut error = operator.variance(&choice.variance).map(f64::sqrt);
+    let apart = operator.force(&choice.mean)? - &filtered;
     error.zip_apply(&apart, |error, apart| *error = half_width(apart, *error) / TWO_SIDED);
-    let force = IdentifiedForce::of(spread(found)?).with_standard_error(Some(spread(error)?));
+    let force =
+        IdentifiedForce::from_record(spread(filtered)?).with_standard_error(Some(spread(error)?));
     let force = match band_hz {
         Some(band_hz) => force.with_band(band_hz),
         None => force,
     };
-    let noise_std = scale.iter().map(|s| s * noise.sqrt()).collect();
-    let found = RegularisedForce { force, parameter, unknowns, noise_std, seen_from_hz };
-    Ok((found, spread(whole)?))
+    let noise_std = scale.iter().map(|s| s * choice.noise.sqrt()).collect();
+    let Choice { parameter, unknowns, seen_from_hz, .. } = choice;
+    let solution = RegularisedForce { force, parameter, unknowns, noise_std, seen_from_hz };
+    Ok((solution, spread(whole)?))
 }
 
-/// Standard errors to either side that hold a normal variable with probability [`CONFIDENCE`].
+/// The filter factors that a rule chooses, and the posterior of the force that they approximate.
+struct Choice {
+    parameter: Option<f64>,
+    factors: Vec<f64>,
+    /// Factors of the posterior mean.
+    mean: Vec<f64>,
+    /// Posterior variance of each component, per real unknown.
+    variance: Vec<f64>,
+    /// Noise variance, relative to the channel scales.
+    noise: f64,
+    /// Effective number of real unknowns.
+    unknowns: f64,
+    seen_from_hz: Option<f64>,
+}
+
+impl Choice {
+    fn new(components: &Components, filter: Filter, noise_known: bool) -> Result<Self, ForceError> {
+        if components.singular.first().is_none_or(|s| *s == 0.0)
+            || components.energy.iter().all(|energy| *energy == 0.0)
+        {
+            return Err(ForceError::Silent);
+        }
+        let Some(lambda) = filter.given() else {
+            return Self::from_posterior(components, filter, noise_known);
+        };
+        let count = components.singular.len();
+        let factors: Vec<f64> = (0..count).map(|i| factor(filter, components, i, lambda)).collect();
+        let fit = components.fit(|i| factors[i]);
+        let noise = if noise_known { 1.0 } else { fit.noise(components) };
+        // A given λ is a prior: a force of variance σ²/λ² in every component.
+        let variance = |i: usize| match factors[i] {
+            0.0 => 0.0,
+            1.0 => noise / components.singular[i].powi(2),
+            _ => noise / (components.singular[i].powi(2) + lambda * lambda),
+        };
+        Ok(Self {
+            parameter: Some(lambda),
+            mean: factors.clone(),
+            variance: (0..count).map(variance).collect(),
+            noise,
+            unknowns: fit.unknowns,
+            seen_from_hz: components.lowest_hz(|i| components.singular[i] >= lambda),
+            factors,
+        })
+    }
+
+    fn from_posterior(
+        components: &Components,
+        filter: Filter,
+        noise_known: bool,
+    ) -> Result<Self, ForceError> {
+        let posterior = Posterior::from_components(components, noise_known)?;
+        let parameter = choose(filter, components, &posterior);
+        let count = components.singular.len();
+        let factors: Vec<f64> = (0..count)
+            .map(|i| match parameter {
+                Some(lambda) => factor(filter, components, i, lambda),
+                None => posterior.best_factor(components, i),
+            })
+            .collect();
+        Ok(Self {
+            parameter,
+            mean: (0..count).map(|i| posterior.factor(components, i)).collect(),
+            variance: (0..count).map(|i| posterior.variance(components, i)).collect(),
+            noise: posterior.noise(),
+            unknowns: components.fit(|i| factors[i]).unknowns,
+            seen_from_hz: posterior.seen_from_hz(components),
+            factors,
+        })
+    }
+}
+
+/// Standard errors of the two-sided interval of a normal variable with probability [`CONFIDENCE`].
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
-/// The same to one side alone.
+/// Standard errors of the one-sided interval.
 const ONE_SIDED: f64 = 1.644_853_626_951_472;
 const CONFIDENCE: f64 = 0.95;
-/// Steps of the search for a half width: halvings of an interval of one standard error would leave no digit of it, and
-/// Newton's steps are far fewer.
-const STEPS: usize = 50;
-/// Change of a half width, in standard deviations, that ends the search.
-const SETTLED: f64 = 1e-12;
-
-/// Half the width of the interval about 0 that holds a normal variable of this mean and standard
-/// deviation with probability [`CONFIDENCE`].
+/// Returns half the width of the interval about 0 that contains a normal variable of this mean and
+/// standard deviation with probability [`CONFIDENCE`].
 fn half_width(mean: f64, deviation: f64) -> f64 {
     let mean = mean.abs();
     if deviation <= 1e-9 * mean {
@@ -216,14 +245,14 @@ fn half_width(mean: f64, deviation: f64) -> f64 {
     let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let (mut low, mut high) = (offset.max(TWO_SIDED - offset), offset + TWO_SIDED);
     let mut width = offset + ONE_SIDED;
-    for _ in 0..STEPS {
+    for _ in 0..limits::HALF_WIDTH_STEPS {
         let missing = missing(width);
         *(if missing < 0.0 { &mut low } else { &mut high }) = width;
         let next = width - missing / (density(width - offset) + density(width + offset));
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
         let change = next - width;
         width = next;
-        if change.abs() <= SETTLED {
+        if change.abs() <= limits::HALF_WIDTH_CHANGE {
             break;
         }
     }
@@ -243,7 +272,7 @@ mod tests {
         let width = half_width(1.0, 1.0);
         assert!((2.6..2.7).contains(&width), "{width}");
         assert_eq!(half_width(3.0, 0.0), 3.0);
-        // Wherever the interval stands, it holds 95 %.
+        // The interval contains 95 % at any offset.
         let below = |x: f64| 0.5 * erfc(-x * std::f64::consts::FRAC_1_SQRT_2);
         for step in 0..=400 {
             let offset = 0.02 * f64::from(step);

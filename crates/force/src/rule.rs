@@ -1,38 +1,40 @@
-//! Choosing how strongly to regularise.
+//! Choice of the regularisation parameter.
 
-use crate::ForceError;
 use crate::components::{Components, Fit};
+use crate::error::ForceError;
 use crate::evidence::Posterior;
+use crate::limits;
 
 /// Rule for the regularisation parameter λ.
 ///
 /// λ is in the unit of a singular value: scaled channel per newton. Tikhonov damps the components
-/// of the force that the machine transmits more weakly than λ, truncation drops them.
+/// of the force that the system transmits more weakly than λ; truncation removes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Rule {
-    /// The λ whose force is nearest to the mean of the force given the measurement.
+    /// The λ whose force is nearest to the posterior mean of the force.
     ///
-    /// That mean needs the variances of force and noise, the colour of the force, the share of
-    /// components that are driven and how far down the singular values they reach; all are
-    /// taken where the measurement is most likely. It is the rule to use: the only one here that looks at the error of the
-    /// force and not at the fit of the response. The book (`choose/force.md`) compares the others.
+    /// This mean needs the variances of force and noise, the colour of the force, the share of
+    /// driven components and the number of singular values they cover; all are those of maximum
+    /// likelihood. It is the recommended rule, and the only one here that minimises the error of
+    /// the force, not of the response. The book (`choose/force.md`) compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///
-    /// Aims at the response, not the force: it lets too much through when the driven lines are few.
+    /// It minimises the error of the response, not of the force: with few driven lines it damps too
+    /// little.
     ///
     /// # Source
     /// Golub, Heath & Wahba (1979).
     Gcv,
     /// The corner of an L-curve, log of the residual per remaining datum against log ‖force‖,
-    /// sought only where that residual is at most twice the noise (in variance).
+    /// searched only where this residual is at most twice the noise (in variance).
     ///
-    /// The textbook curve has ‖residual‖, which falls to nothing as the unknowns use up the data:
-    /// with as many data as unknowns its corner is where nothing is damped. Far above the noise it
-    /// has others, where the resonance is fitted and nothing else.
+    /// The textbook curve has ‖residual‖, which vanishes as the unknowns use up the data: with as
+    /// many data as unknowns its corner is at no damping. Far above the noise it has other corners,
+    /// where only the resonance is fitted.
     ///
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
@@ -49,15 +51,15 @@ pub enum Rule {
 pub enum Filter {
     /// f̂ = s y/(s² + λ²): least ‖y − H f‖² + λ²‖f‖².
     Tikhonov(Rule),
-    /// The components with s ≥ λ as they are, the others zero.
+    /// Components with s ≥ λ unchanged, the others zero.
     TruncatedSvd(Rule),
-    /// The mean of the force given the measurement, each component with its own factor, as
-    /// [`Rule::Likelihood`] finds it: driven lines are kept, silent ones suppressed.
+    /// The posterior mean of the force, with a factor for each component, as in
+    /// [`Rule::Likelihood`]: driven lines are kept, silent ones suppressed.
     Shrinkage,
 }
 
 impl Filter {
-    /// λ, if it is given.
+    /// Returns λ, if it is given.
     pub(crate) fn given(self) -> Option<f64> {
         match self {
             Filter::Tikhonov(Rule::Given(lambda)) | Filter::TruncatedSvd(Rule::Given(lambda)) => {
@@ -67,7 +69,7 @@ impl Filter {
         }
     }
 
-    /// An error for a given λ that cannot be one.
+    /// Returns an error for an impossible λ.
     pub(crate) fn check(self) -> Result<(), ForceError> {
         match self {
             Filter::Tikhonov(Rule::Given(value)) | Filter::TruncatedSvd(Rule::Given(value))
@@ -80,25 +82,7 @@ impl Filter {
     }
 }
 
-/// λ runs over eight decades below the largest singular value, this many values per decade.
-const PER_DECADE: usize = 25;
-const DECADES: usize = 8;
-/// The L-curve's corner is sought where the residual variance is at most this over the noise.
-const NEAR_NOISE: f64 = 2.0;
-/// Relative change of residual and force below which a step of λ counts as none.
-const STANDING_STILL: f64 = 1e-3;
-/// Truncation leaves at least this share of the data to judge by: where nearly all are used up,
-/// a few that happen to be small would look like a perfect fit.
-const LEFT_TO_JUDGE: f64 = 0.1;
-
-/// Tikhonov's factors leave at least this share of the data: below it the residual of data
-/// without noise sinks to rounding, and rounding would choose.
-const LEFT_BY_TIKHONOV: f64 = 1e-4;
-
-/// Costs that differ by less than this share of themselves are equal.
-const TIE: f64 = 1e-6;
-
-/// The λ that a rule chooses; infinity means that no force at all is nearest.
+/// Returns the λ of a rule; infinity means that zero is the nearest force.
 pub(crate) fn choose(
     filter: Filter,
     components: &Components,
@@ -139,13 +123,14 @@ pub(crate) fn factor(filter: Filter, components: &Components, i: usize, lambda: 
 
 /// λ from the largest singular value down, evenly in its logarithm.
 fn grid(largest: f64) -> Vec<f64> {
-    (0..=PER_DECADE * DECADES)
-        .map(|step| largest * 10f64.powf(-(step as f64) / PER_DECADE as f64))
+    (0..=limits::LAMBDAS_PER_DECADE * limits::LAMBDA_DECADES)
+        .map(|step| largest * 10f64.powf(-(step as f64) / limits::LAMBDAS_PER_DECADE as f64))
         .collect()
 }
 
-/// One threshold per distinct singular value that is more than rounding, halfway (in its logarithm)
-/// to the next: the least change of the machine would cut off a value that is its own threshold.
+/// Returns one threshold per distinct singular value above rounding, halfway (in its logarithm) to
+/// the next: with the value itself as its threshold the least change of the system would exclude
+/// it.
 fn thresholds(components: &Components) -> Vec<f64> {
     let transmitted = components.transmitted();
     let mut values = components.singular[..transmitted].to_vec();
@@ -155,10 +140,13 @@ fn thresholds(components: &Components) -> Vec<f64> {
     values.iter().zip(next).map(|(s, next)| (s * next.max(1e-3 * s)).sqrt()).collect()
 }
 
-/// Least residual²/left², where enough is left to judge by.
+/// Returns the least residual²/remaining², if the remaining data are enough.
 fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
-    let share =
-        if matches!(filter, Filter::TruncatedSvd(_)) { LEFT_TO_JUDGE } else { LEFT_BY_TIKHONOV };
+    let share = if matches!(filter, Filter::TruncatedSvd(_)) {
+        limits::TRUNCATION_RESIDUAL
+    } else {
+        limits::TIKHONOV_RESIDUAL
+    };
     least(fits.iter().map(|fit| {
         let freedom = components.data() - fit.unknowns;
         if freedom < share * components.data() {
@@ -169,19 +157,19 @@ fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     }))
 }
 
-/// The first candidate, the most regularised one, whose cost is the least but for rounding.
+/// Returns the first candidate, the most regularised one, whose cost is minimal up to rounding.
 ///
-/// Where the cost levels out towards λ = 0 only rounding would tell the candidates apart.
+/// If the cost is flat towards λ = 0, only rounding would decide between the candidates.
 fn least(costs: impl Iterator<Item = f64>) -> usize {
     let costs: Vec<f64> = costs.collect();
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
-    costs.iter().position(|cost| *cost <= least * (1.0 + TIE)).unwrap_or(0)
+    costs.iter().position(|cost| *cost <= least * (1.0 + limits::EQUAL_COSTS)).unwrap_or(0)
 }
 
-/// The point of greatest curvature near the noise level, which is taken where GCV is least.
+/// Returns the point of largest curvature near the noise level, as GCV estimates it.
 fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let reference = least_gcv(filter, components, fits);
-    let limit = NEAR_NOISE * fits[reference].noise(components);
+    let limit = limits::CORNER_NOISE_RATIO * fits[reference].noise(components);
     let points: Vec<(f64, f64)> =
         fits.iter().map(|fit| (fit.noise(components).ln(), fit.size.ln())).collect();
     let near = |i: usize| fits[i].noise(components) <= limit;
@@ -193,11 +181,11 @@ fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
 }
 
 /// Curvature through three points, by the circle through them (4·area over the three sides),
-/// positive where the L bends as an L does when λ falls: first left, then up. Where λ moves
-/// nothing there is no corner, only rounding.
+/// positive where the L bends as λ falls: first left, then up. If λ has no effect there is no
+/// corner, only rounding.
 fn curvature(p: [(f64, f64); 3]) -> f64 {
     let side = |a: usize, b: usize| (p[b].0 - p[a].0).hypot(p[b].1 - p[a].1);
-    if side(0, 1).min(side(1, 2)) < STANDING_STILL {
+    if side(0, 1).min(side(1, 2)) < limits::LAMBDA_EFFECT {
         return f64::NEG_INFINITY;
     }
     let cross = (p[1].0 - p[0].0) * (p[2].1 - p[1].1) - (p[1].1 - p[0].1) * (p[2].0 - p[1].0);

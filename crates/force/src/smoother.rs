@@ -1,15 +1,17 @@
 //! The Kalman filter and fixed-interval smoother, one scalar measurement at a time.
 //!
-//! Taking the channels of a sample one after the other needs no matrix inverse, and the smoother
-//! in the form of backward sums r and N needs none either; nothing is allocated in their loops.
-//! The estimates are those of the Rauch-Tung-Striebel smoother.
+//! Processing the channels of a sample one after the other avoids matrix inverses, as does the
+//! smoother in the form of backward sums r and N; their loops do not allocate. The estimates are
+//! those of the Rauch-Tung-Striebel smoother.
 //!
 //! # Source
 //! Durbin & Koopman (2012), Time Series Analysis by State Space Methods, sections 4.4 and 6.4.
 
+use crate::limits;
+
 /// a(k+1) = T a(k) + noise of covariance Q, y_c(k) = Z_c a(k) + noise of variance R.
 ///
-/// Square matrices are stored row after row.
+/// Square matrices are stored row by row.
 pub(crate) struct StateSpace {
     pub states: usize,
     pub channels: usize,
@@ -23,15 +25,8 @@ pub(crate) struct StateSpace {
     pub start: Vec<f64>,
 }
 
-/// Relative change of every variance over a step below which the covariance counts as settled.
-///
-/// Variances that approach their end by a part of 10⁻⁴ per step are then within 10⁻⁸ of it.
-const SETTLED: f64 = 1e-12;
-/// The same where only the likelihood is asked for.
-const NEARLY_SETTLED: f64 = 1e-7;
-
-/// Data for the backward pass: one block per sample, laid out once; covariance and gains up to the
-/// sample at which they settle, and no more.
+/// Data for the backward pass: one block per sample, allocated once; covariance and gains only up
+/// to the sample at which they converge.
 pub(crate) struct Passage {
     mean: Vec<f64>,
     covariance: Vec<f64>,
@@ -39,7 +34,7 @@ pub(crate) struct Passage {
     gain: Vec<f64>,
     /// Innovation and its variance.
     innovation: Vec<(f64, f64)>,
-    /// Last sample with a covariance and gains of its own.
+    /// Last sample with its own covariance and gains.
     last: usize,
 }
 
@@ -51,7 +46,7 @@ impl Passage {
     }
 }
 
-/// How well a model predicts the samples, each from those before it.
+/// Prediction error of a model: each sample from those before it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Innovations {
     /// Sum of the logarithms of their variances.
@@ -61,7 +56,7 @@ pub(crate) struct Innovations {
 }
 
 impl Innovations {
-    /// Log-likelihood, constants left out.
+    /// Log-likelihood, without constants.
     pub fn log_likelihood(self) -> f64 {
         -0.5 * (self.log_variance + self.energy)
     }
@@ -73,7 +68,7 @@ struct Filter {
     /// P Zᵀ of each channel, and its innovation's variance, at the last sample.
     gain: Vec<f64>,
     variance: Vec<f64>,
-    /// Whether covariance, gains and variances are those of the sample before.
+    /// Whether covariance, gains and variances have converged to those of the sample before.
     settled: bool,
     tolerance: f64,
     /// Variances before the measurements of the last sample.
@@ -84,9 +79,9 @@ struct Filter {
 }
 
 impl StateSpace {
-    /// How well the samples (channels of a sample side by side) are predicted.
+    /// Returns the prediction error of the samples (channels of a sample side by side).
     pub fn innovations(&self, samples: &[f64]) -> Innovations {
-        let mut filter = Filter::new(self, NEARLY_SETTLED);
+        let mut filter = Filter::new(self, limits::CONVERGED_LIKELIHOOD);
         for sample in samples.chunks_exact(self.channels) {
             for (c, y) in sample.iter().enumerate() {
                 filter.measure(self, c, *y);
@@ -96,7 +91,7 @@ impl StateSpace {
         filter.innovations
     }
 
-    /// The forward pass with what the smoother needs of it.
+    /// Runs the forward pass and stores the data of the smoother.
     pub fn filter(&self, samples: &[f64]) -> Passage {
         let (m, len) = (self.states, samples.len() / self.channels);
         let mut passage = Passage {
@@ -106,7 +101,7 @@ impl StateSpace {
             innovation: Vec::with_capacity(samples.len()),
             last: 0,
         };
-        let mut filter = Filter::new(self, SETTLED);
+        let mut filter = Filter::new(self, limits::CONVERGED_COVARIANCE);
         for (k, sample) in samples.chunks_exact(self.channels).enumerate() {
             passage.mean.extend_from_slice(&filter.mean);
             if !filter.settled {
@@ -125,8 +120,8 @@ impl StateSpace {
         passage
     }
 
-    /// Mean and variance of every state at every sample given the whole record, sample after
-    /// sample, written over the filter's own.
+    /// Returns mean and variance of every state at every sample given the whole record, sample
+    /// after sample, in place of the results of the filter.
     pub fn smooth(&self, mut passage: Passage) -> (Vec<f64>, Vec<f64>) {
         let (m, channels) = (self.states, self.channels);
         let len = passage.mean.len() / m;
@@ -134,15 +129,15 @@ impl StateSpace {
         let (mut r, mut n) = (vec![0.0; m], vec![0.0; m * m]);
         let (mut vector, mut product) = (vec![0.0; m], vec![0.0; m * m]);
         for k in (0..len).rev() {
-            let own = k.min(passage.last);
+            let stored = k.min(passage.last);
             for c in (0..channels).rev() {
-                let gain = &passage.gain[(own * channels + c) * m..][..m];
+                let gain = &passage.gain[(stored * channels + c) * m..][..m];
                 let (z, innovation) =
                     (&self.output[c * m..][..m], passage.innovation[k * channels + c]);
                 back_over_measurement(&mut r, &mut n, &mut vector, z, gain, innovation);
             }
             let mean = &mut passage.mean[k * m..][..m];
-            let p = &passage.covariance[own * m * m..][..m * m];
+            let p = &passage.covariance[stored * m * m..][..m * m];
             for i in 0..m {
                 let row = &p[i * m..][..m];
                 mean[i] += dot(row, &r);
@@ -195,7 +190,7 @@ impl Filter {
         }
     }
 
-    /// Takes in one scalar measurement; returns the innovation and its variance.
+    /// Updates the state with one scalar measurement; returns the innovation and its variance.
     fn measure(&mut self, space: &StateSpace, channel: usize, y: f64) -> (f64, f64) {
         let m = space.states;
         let z = &space.output[channel * m..][..m];
@@ -235,7 +230,7 @@ impl Filter {
                 self.covariance[j * m + i] = p;
             }
         }
-        // What the filter knew before the measurements of the last sample and of this one.
+        // Variances of the filter before the measurements of the last sample and of this one.
         self.settled = true;
         for (before, now) in self.before.iter_mut().zip(self.covariance.iter().step_by(m + 1)) {
             self.settled &= (now - *before).abs() <= self.tolerance * now.abs();
@@ -294,7 +289,7 @@ mod tests {
 
     const M: usize = 3;
     const CHANNELS: usize = 2;
-    /// So many that the variances settle.
+    /// The record is long enough for the variances to converge.
     const LEN: usize = 90;
 
     fn space() -> StateSpace {
@@ -314,7 +309,7 @@ mod tests {
         (0..LEN * CHANNELS).map(|i| (1.3 * i as f64).sin() + 0.1 * i as f64).collect()
     }
 
-    /// Solution all at once: the joint covariance of all states, conditioned on all samples.
+    /// Solves all samples at once: the joint covariance of all states, conditioned on all samples.
     fn conditioned() -> (DVector<f64>, DVector<f64>, f64) {
         let s = space();
         let t = DMatrix::from_row_slice(M, M, &s.transition);

@@ -1,9 +1,10 @@
-//! The machine between unknown forces and measured channels, sample by sample.
+//! The system between unknown forces and measured channels, sample by sample.
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use nalgebra::{DMatrix, DVector};
 
-use crate::{ForceError, Measurement};
+use crate::error::ForceError;
+use crate::measurement::Measurement;
 
 /// Returns the exact transition over a step, for the input q.
 pub(crate) fn exact_transition(
@@ -23,7 +24,7 @@ pub(crate) fn growth_rate(system: &SecondOrderSystem) -> Result<f64, ForceError>
     Ok(system.eigenvalues()?.iter().map(|l| l.re).fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
+/// Outputs of the system in step units: y = out·z + through·q, with a force linear over a step.
 pub(crate) struct Machine {
     pub transition: StateTransition,
     /// Channels × 2n, divided by the channel's scale.
@@ -64,10 +65,10 @@ impl Machine {
         Ok(Self { transition, out, through, input })
     }
 
-    /// Channels × samples from rest, of a force given as forces × samples.
+    /// Channels × samples from rest, for a force given as forces × samples.
     pub fn response(&self, force: &DMatrix<f64>) -> DMatrix<f64> {
         let samples = force.ncols();
-        let held = &self.transition.held * &self.input;
+        let held_input = &self.transition.held * &self.input;
         let ramp = &self.transition.ramp * &self.input;
         let mut motion = &self.through * force;
         let mut state = DVector::zeros(self.transition.state.ncols());
@@ -76,21 +77,21 @@ impl Machine {
             at += &self.out * &state;
             if k + 1 < samples {
                 let (now, next) = (force.column(k), force.column(k + 1));
-                state = &self.transition.state * state + &held * now + &ramp * (next - now);
+                state = &self.transition.state * state + &held_input * now + &ramp * (next - now);
             }
         }
         motion
     }
 
-    /// Rows channel after channel, columns force after force, of unit forces at each sample.
+    /// Rows ordered by channel, columns by force: the responses to unit forces at each sample.
     pub fn impulse_responses(&self, samples: usize) -> DMatrix<f64> {
         let (channels, forces) = self.through.shape();
         let ramp = &self.transition.ramp * &self.input;
         let fall = (&self.transition.held - &self.transition.ramp) * &self.input;
-        // An impulse at sample 0 has no rising flank inside the record.
+        // The rising flank of an impulse at sample 0 is before the record.
         let (mut first, mut inner) = (fall.clone(), &self.transition.state * &ramp + &fall);
         let mut matrix = DMatrix::zeros(channels * samples, forces * samples);
-        let mut place = |lag: usize, first: &DMatrix<f64>, inner: &DMatrix<f64>| {
+        let mut set_block = |lag: usize, first: &DMatrix<f64>, inner: &DMatrix<f64>| {
             for c in 0..channels {
                 for f in 0..forces {
                     matrix[(c * samples + lag, f * samples)] = first[(c, f)];
@@ -100,9 +101,9 @@ impl Machine {
                 }
             }
         };
-        place(0, &self.through, &(&self.out * &ramp + &self.through));
+        set_block(0, &self.through, &(&self.out * &ramp + &self.through));
         for lag in 1..samples {
-            place(lag, &(&self.out * &first), &(&self.out * &inner));
+            set_block(lag, &(&self.out * &first), &(&self.out * &inner));
             first = &self.transition.state * first;
             inner = &self.transition.state * inner;
         }

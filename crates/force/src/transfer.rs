@@ -4,20 +4,18 @@ use mechid_model::SecondOrderSystem;
 use mechid_numerics::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix};
 
-use crate::{Channel, ForceError};
+use crate::error::ForceError;
+use crate::limits;
+use crate::measurement::Channel;
 
 type Line = Complex<f64>;
 
-/// Below this ratio of singular values a line is taken as not transmitted: 16 digits of the
-/// response would leave fewer than four for the force.
-const NOT_TRANSMITTED: f64 = 1e-12;
-
-/// The machine between the forced degrees of freedom and the measured channels.
+/// The system between the forced degrees of freedom and the measured channels.
 pub(crate) struct Transfer<'a> {
     pub system: &'a SecondOrderSystem,
     pub channels: &'a [Channel],
     pub forced: &'a [usize],
-    /// Standard deviation of each channel's noise, or its size: rows are divided by it.
+    /// Standard deviation of each channel's noise, or its size: the divisor of its row.
     pub scale: &'a [f64],
 }
 
@@ -41,10 +39,10 @@ impl Transfer<'_> {
         }))
     }
 
-    /// Forces × measured channels: what to multiply the measured line by to get the forces.
+    /// Forces × measured channels: the matrix that turns a measured line into forces.
     ///
-    /// With every degree of freedom forced and measured once this is the dynamic stiffness
-    /// itself; otherwise the weighted least-squares inverse of the transfer matrix.
+    /// With every degree of freedom forced and measured once this is the dynamic stiffness itself;
+    /// otherwise the weighted least-squares inverse of the transfer matrix.
     pub fn inverse(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
         if self.measures_everything_once() {
             return self.direct(line, omega);
@@ -53,7 +51,7 @@ impl Transfer<'_> {
         let svd = svd(transfer.clone())?;
         let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
         let reciprocal_condition = if largest > 0.0 { smallest / largest } else { 0.0 };
-        if reciprocal_condition < NOT_TRANSMITTED {
+        if reciprocal_condition < limits::NOT_TRANSMITTED {
             return Err(self.not_transmitted(line, omega, &transfer, reciprocal_condition));
         }
         let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
@@ -91,7 +89,7 @@ impl Transfer<'_> {
         Ok(inverse)
     }
 
-    /// Blames the force with the smallest effect on the measured channels.
+    /// Returns the error with the force that has the smallest effect on the measured channels.
     fn not_transmitted(
         &self,
         line: usize,

@@ -1,30 +1,29 @@
-//! Propagation of the uncertainty of an identified machine to the force.
+//! Propagation of the uncertainty of an identified system to the force.
 
 use mechid_model::{NonlinearSystem, SecondOrderSystem, UncertainNonlinearSystem, UncertainSystem};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 
-use crate::{ForceError, IdentifiedForce};
+use crate::error::ForceError;
+use crate::identified::IdentifiedForce;
+use crate::limits;
 
-/// Part of a standard error by which an entry is changed for a derivative.
-const STEP: f64 = 0.1;
-
-/// The force that `find` gives for `system`, the uncertainty of the system added to its standard
-/// error: variance + gᵀ Σ g at every sample, g the derivatives of the force with respect to the
-/// uncertain entries (delta method). Likewise what it may leave of the measured channels
-/// ([`Unexplained::machine`](crate::Unexplained)).
+/// Returns the force that `find` gives for `system`, with the uncertainty of the system added to
+/// its standard error: variance + gᵀ Σ g at every sample, with g the derivatives of the force with
+/// respect to the uncertain entries (delta method). The residual of the measured channels is
+/// treated likewise ([`Unexplained::machine`](crate::Unexplained)).
 ///
 /// The derivatives are central differences over a tenth of a standard error: exact for
-/// [`continuous`](crate::continuous()), in which the force is linear in the entries. Where `find`
-/// chooses a parameter of its own, give it the parameter once chosen ([`Rule::Given`],
-/// [`Tuning::Given`]): what is wanted is the effect of the machine, not of another choice.
+/// [`continuous`](crate::continuous()), for which the force is linear in the entries. If `find`
+/// chooses a parameter, fix it at the value of the first call ([`Rule::Given`], [`Tuning::Given`]):
+/// the derivative should be the effect of the system, not of another choice.
 ///
-/// It is the uncertainty that the covariance describes; a biased identification is biased still.
+/// The result covers the covariance only, not the bias of an identification.
 ///
 /// Cost: 2 p + 1 calls of `find` for p uncertain entries.
 ///
 /// # Errors
-/// What `find` returns; [`ForceError::Model`] if a changed mass matrix is singular.
+/// The errors of `find`; [`ForceError::Model`] if a changed mass matrix is singular.
 ///
 /// ```
 /// use mechid_force::{continuous, with_uncertain_system};
@@ -58,11 +57,12 @@ pub fn with_uncertain_system(
     })
 }
 
-/// The force that `find` gives for a system with nonlinear terms, the uncertainty of all its parameters
-/// added to its standard error, as [`with_uncertain_system`] does for a linear one.
+/// Returns the force that `find` gives for a system with nonlinear terms, with the uncertainty of
+/// all its parameters added to its standard error, as [`with_uncertain_system`] does for a linear
+/// one.
 ///
 /// # Errors
-/// What `find` returns; [`ForceError::Model`] if a changed system is impossible.
+/// The errors of `find`; [`ForceError::Model`] if a changed system is impossible.
 ///
 /// ```
 /// use mechid_force::{continuous_nonlinear, with_uncertain_nonlinear_system};
@@ -96,8 +96,8 @@ pub fn with_uncertain_nonlinear_system(
     })
 }
 
-/// A force with the uncertainty of parameters of this covariance; `changed` gives it with one of them
-/// larger.
+/// Returns a force with the uncertainty of parameters of this covariance; `changed` gives it with
+/// one of them larger.
 fn propagate(
     force: IdentifiedForce,
     covariance: &DMatrix<f64>,
@@ -105,16 +105,16 @@ fn propagate(
 ) -> Result<IdentifiedForce, ForceError> {
     let (mut forces, mut rests) = (Vec::new(), Vec::new());
     for at in 0..covariance.nrows() {
-        let step = STEP * covariance[(at, at)].sqrt();
+        let step = limits::PARAMETER_STEP * covariance[(at, at)].sqrt();
         if step == 0.0 {
             forces.push(force.record().data() * 0.0);
-            rests.extend(force.rest().map(|rest| rest.residual() * 0.0));
+            rests.extend(force.residual().map(|residual| residual.matrix() * 0.0));
             continue;
         }
         let (above, below) = (changed(at, step)?, changed(at, -step)?);
         forces.push((above.record().data() - below.record().data()) / (2.0 * step));
-        if let (Some(above), Some(below)) = (above.rest(), below.rest()) {
-            rests.push((above.residual() - below.residual()) / (2.0 * step));
+        if let (Some(above), Some(below)) = (above.residual(), below.residual()) {
+            rests.push((above.matrix() - below.matrix()) / (2.0 * step));
         }
     }
     let mut variance = propagated(covariance, force.record().data().shape(), &forces);
@@ -122,15 +122,15 @@ fn propagate(
         variance.zip_apply(error.data(), |sum, noise| *sum += noise * noise);
     }
     let error = Record::new(force.record().sampling(), variance.map(f64::sqrt))?;
-    let rest = force.rest().cloned().map(|rest| {
-        let variance = propagated(covariance, rest.residual().shape(), &rests);
-        rest.with_machine(&variance)
+    let residual = force.residual().cloned().map(|residual| {
+        let variance = propagated(covariance, residual.matrix().shape(), &rests);
+        residual.with_machine(&variance)
     });
-    Ok(force.with_standard_error(Some(error)).with_rest(rest))
+    Ok(force.with_standard_error(Some(error)).with_residual(residual))
 }
 
-/// gᵀ Σ g at every place of a matrix of this shape, g the derivatives there, one matrix per
-/// parameter.
+/// Returns gᵀ Σ g for every entry of a matrix of this shape; g are the derivatives there, one
+/// matrix per parameter.
 fn propagated(
     covariance: &DMatrix<f64>,
     (rows, columns): (usize, usize),

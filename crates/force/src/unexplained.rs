@@ -1,55 +1,57 @@
 //! Part of the measured response that a force does not explain.
 //!
-//! Where fewer forces are sought than channels were measured, the channels contradict one another
-//! if another force acts, if a sensor is dead or two are exchanged, or if the machine is another.
+//! With fewer forces than channels there is a residual: it shows another force, a dead sensor, two
+//! exchanged sensors, or a wrong system.
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
+use crate::error::ForceError;
 use crate::lines::noise_weight;
+use crate::measurement::{Measurement, Start};
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
-use crate::{ForceError, Measurement, Start};
 
-/// Part of one measured channel that the reconstructed force leaves unexplained.
+/// Part of one measured channel that the identified force does not explain.
 ///
-/// All are root mean squares over the record; where it is a period, of the lines used.
+/// All values are root mean squares over the record; for a period, over the lines used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unexplained {
-    /// Measured motion less that which the force found makes, in the unit of the channel.
+    /// Measured response minus the response to the identified force, in the unit of the channel.
     pub rest: f64,
-    /// Measured motion, or that which the force found makes, whichever is larger, in the unit of
+    /// The larger of the measured response and the response to the identified force, in the unit of
     /// the channel.
     pub motion: f64,
-    /// Part that noise alone may leave, its level on the lines used, in the unit of the channel. `None`
-    /// where the level was neither stated nor measured apart from the fit.
+    /// Residual expected from noise alone, from its level on the lines used, in the unit of the
+    /// channel. `None` if the level was neither stated nor measured separately from the fit.
     pub noise: Option<f64>,
-    /// Part that the uncertainty of the machine leaves, in the unit of the channel, as
-    /// [`with_uncertain_system`](crate::with_uncertain_system) counts it; `None` without that.
+    /// Residual expected from the uncertainty of the system, in the unit of the channel, from
+    /// [`with_uncertain_system`](crate::with_uncertain_system); otherwise `None`.
     pub machine: Option<f64>,
 }
 
 impl Unexplained {
-    /// Rest over motion, a pure number: 0 where all is explained, up to 1 where nothing is (2
-    /// where the motion is the opposite).
+    /// Residual over response, a pure number: 0 if all is explained, 1 if none is (2 if the
+    /// response has the opposite sign).
     ///
-    /// Not measured against the measured motion alone: of a dead sensor there is none.
+    /// The larger of the two responses is the reference, since the response of a dead sensor is
+    /// zero.
     pub fn share(&self) -> f64 {
         if self.motion > 0.0 { self.rest / self.motion } else { 0.0 }
     }
 }
 
-/// The rest of every channel, and what it is judged by.
+/// The residual of every channel, and its expected size.
 #[derive(Debug, Clone)]
-pub(crate) struct Rest {
-    /// Measured less predicted, samples × channels, in the units of the channels.
+pub(crate) struct Residual {
+    /// Measured minus predicted, samples × channels, in the units of the channels.
     residual: DMatrix<f64>,
     channels: Vec<Unexplained>,
 }
 
-impl Rest {
-    fn of(measured: &DMatrix<f64>, residual: DMatrix<f64>, noise: Option<Vec<f64>>) -> Self {
+impl Residual {
+    fn new(measured: &DMatrix<f64>, residual: DMatrix<f64>, noise: Option<Vec<f64>>) -> Self {
         let channels = (0..residual.ncols())
             .map(|c| {
                 let (rest, seen) = (residual.column(c), measured.column(c));
@@ -67,11 +69,11 @@ impl Rest {
         Self { residual, channels }
     }
 
-    /// Measures on lines of a period: Y_n − S H_n F_n of each.
+    /// Computes the residual on lines of a period: Y_n − S H_n F_n for each line.
     ///
-    /// White noise of standard deviation σ has the RMS value σ √(Σ w) on them, w the variance that
-    /// noise of unit variance has in each part of a line.
-    pub fn of_lines(
+    /// White noise of standard deviation σ has the RMS value σ √(Σ w) on them, with w the variance
+    /// of each part of a line under noise of unit variance.
+    pub fn from_lines(
         system: &SecondOrderSystem,
         measured: &Measurement,
         forced: &[usize],
@@ -99,12 +101,12 @@ impl Rest {
         }
         let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines)?.to_record();
         let noise = level.map(|level| level.iter().map(|sigma| sigma * weight.sqrt()).collect());
-        Ok(Self::of(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
+        Ok(Self::new(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
     }
 
-    /// Measures in an open record what no force of these samples, linear between them, and no motion at the
-    /// first sample explain; the latter in least squares of channels divided by `scale`.
-    pub fn of_open(
+    /// Computes the residual in an open record that no force of these samples, linear between them,
+    /// and no initial state explain; the latter in least squares of channels divided by `scale`.
+    pub fn from_open_record(
         system: &SecondOrderSystem,
         measured: &Measurement,
         forced: &[usize],
@@ -122,26 +124,27 @@ impl Rest {
         });
         if start == Start::InMotion {
             let free = machine.free_responses(samples).qr().q();
-            let rest =
+            let vector =
                 residual.reshape_generic(nalgebra::Dyn(samples * channels), nalgebra::Const::<1>);
-            let rest = &rest - &free * free.tr_mul(&rest);
-            residual = rest.reshape_generic(nalgebra::Dyn(samples), nalgebra::Dyn(channels));
+            let vector = &vector - &free * free.tr_mul(&vector);
+            residual = vector.reshape_generic(nalgebra::Dyn(samples), nalgebra::Dyn(channels));
         }
         for (mut column, scale) in residual.column_iter_mut().zip(scale) {
             column *= *scale;
         }
-        Ok(Self::of(measured.record().data(), residual, level.map(<[f64]>::to_vec)))
+        Ok(Self::new(measured.record().data(), residual, level.map(<[f64]>::to_vec)))
     }
 
-    /// Measures where displacement, velocity and force of every degree of freedom were found together.
-    pub fn of_motion(
+    /// Computes the residual if displacement, velocity and force of every degree of freedom were
+    /// identified together.
+    pub fn from_motion(
         system: &SecondOrderSystem,
         measured: &Measurement,
         [displacement, velocity, force]: [&Record; 3],
         level: Option<&[f64]>,
     ) -> Self {
-        let seen = measured.record().data();
-        let mut residual = seen.clone();
+        let response = measured.record().data();
+        let mut residual = response.clone();
         let accelerated = measured
             .channels()
             .iter()
@@ -162,10 +165,10 @@ impl Rest {
             };
             column -= made;
         }
-        Self::of(seen, residual, level.map(<[f64]>::to_vec))
+        Self::new(response, residual, level.map(<[f64]>::to_vec))
     }
 
-    pub fn residual(&self) -> &DMatrix<f64> {
+    pub fn matrix(&self) -> &DMatrix<f64> {
         &self.residual
     }
 
@@ -173,7 +176,7 @@ impl Rest {
         &self.channels
     }
 
-    /// The same, with the variance of each entry that the machine's uncertainty leads to.
+    /// Returns the same, with the variance of each entry due to the uncertainty of the system.
     pub fn with_machine(mut self, variance: &DMatrix<f64>) -> Self {
         for (channel, variance) in self.channels.iter_mut().zip(variance.column_iter()) {
             channel.machine = Some(rms(variance.sum(), variance.len()));

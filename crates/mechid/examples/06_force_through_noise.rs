@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let truth = Multisine::flat(lines, 20.0, Phases::Schroeder)?.sample(sampling)?;
     let motion = mechid::exact_periodic(&machine, &truth)?;
     let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.01), 5)?;
-    let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
+    let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
 
     let (all, unknown) = ((1..128).collect::<Vec<_>>(), Noise::Unknown);
     // On all lines the noise of the high ones comes back multiplied by ω²m.

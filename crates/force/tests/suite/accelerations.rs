@@ -45,7 +45,7 @@ fn period(system: &SecondOrderSystem) -> (Record, [Measurement; 2]) {
     let response = exact_harmonic_periodic(system, &truth).unwrap();
     let noisy =
         |record: &Record| noise::add_white(record, NoiseLevel::FractionOfRms(0.01), 4).unwrap();
-    let of = |quantity| Measurement::of_all(quantity, noisy(response.quantity(quantity)));
+    let of = |quantity| Measurement::from_record(quantity, noisy(response.quantity(quantity)));
     let measured = [ResponseQuantity::Acceleration, ResponseQuantity::Displacement].map(of);
     (truth, measured)
 }
@@ -81,7 +81,7 @@ fn without_a_spring_accelerations_show_a_constant_force() {
     let force = Record::from_fn(sampling, |t| 300.0 + 50.0 * (7.0 * t).sin()).unwrap();
     let exact = Record::new(sampling, force.data() / 20.0).unwrap();
     let noisy = noise::add_white(&exact, NoiseLevel::FractionOfRms(0.01), 2).unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Acceleration, noisy);
+    let measured = Measurement::from_record(ResponseQuantity::Acceleration, noisy);
     let found = kalman(&system, &measured, &[0], Start::InMotion, &Tuning::Likelihood).unwrap();
     assert_eq!((found.seen_from_hz, found.force.band_hz()), (Some(0.0), None));
     let error = mechid_force::relative_error(found.force.record(), &force).unwrap();

@@ -58,7 +58,7 @@ const QUANTITIES: [ResponseQuantity; 3] =
 fn every_quantity_of_every_degree_of_freedom_gives_both_forces() {
     let (force, motion) = harmonic(&rotor(), [3.0, 100.0]);
     for (quantity, record) in QUANTITIES.into_iter().zip(motion) {
-        let measured = Measurement::of_all(quantity, record);
+        let measured = Measurement::from_record(quantity, record);
         let all = inner_lines(&measured);
         for lines in [&LINES[..], &all] {
             let found =
@@ -103,7 +103,7 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
         dmatrix![40.0, 50.0 * 1.1; -20.0, 60.0],
     )
     .unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Displacement, x.clone());
+    let measured = Measurement::from_record(ResponseQuantity::Displacement, x.clone());
     let found = frequency_domain(&wrong, &measured, &[0, 1], &LINES, &Noise::Unknown).unwrap();
     let spurious = spurious_ratio(found.spectrum(), &Spectrum::of(&force), 0, 1, &LINES).unwrap();
     let motion = Spectrum::of(&x);
@@ -121,7 +121,7 @@ fn lines_the_machine_does_not_transmit_are_named() {
     for (quantity, record) in
         [(ResponseQuantity::Velocity, v.clone()), (ResponseQuantity::Acceleration, a)]
     {
-        let measured = Measurement::of_all(quantity, record);
+        let measured = Measurement::from_record(quantity, record);
         for forced in [&[0, 1][..], &[1]] {
             let error =
                 frequency_domain(&rotor(), &measured, forced, &[3, 0], &unknown).unwrap_err();
@@ -136,7 +136,7 @@ fn lines_the_machine_does_not_transmit_are_named() {
     )
     .unwrap();
     let first = Record::from_channel(period(), x.channel(0).to_vec()).unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Displacement, first);
+    let measured = Measurement::from_record(ResponseQuantity::Displacement, first);
     let error = frequency_domain(&apart, &measured, &[1], &[2], &unknown).unwrap_err();
     assert!(matches!(error, ForceError::NotTransmitted { line: 2, dof: 1, .. }), "{error}");
     let undamped = SecondOrderSystem::new(
@@ -163,9 +163,9 @@ fn lines_the_machine_does_not_transmit_are_named() {
 #[test]
 fn impossible_requests_are_refused_with_their_numbers() {
     let (_, [x, ..]) = harmonic(&rotor(), [3.0, 100.0]);
-    let both = Measurement::of_all(ResponseQuantity::Displacement, x.clone());
+    let both = Measurement::from_record(ResponseQuantity::Displacement, x.clone());
     let first = Record::from_channel(period(), x.channel(0).to_vec()).unwrap();
-    let one = Measurement::of_all(ResponseQuantity::Displacement, first.clone());
+    let one = Measurement::from_record(ResponseQuantity::Displacement, first.clone());
     let ask = |measured: &Measurement, forced: &[usize], lines: &[usize], noise: &Noise| {
         frequency_domain(&rotor(), measured, forced, lines, noise).unwrap_err()
     };
@@ -207,7 +207,7 @@ fn the_standard_error_is_the_scatter_over_noise() {
     let draws = 200;
     for seed in 0..draws {
         let noisy = noise::add_white(&x, level, seed).unwrap();
-        let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
+        let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
         let find =
             |noise: &Noise| frequency_domain(&rotor(), &measured, &[1], &LINES, noise).unwrap();
         let found = find(&Noise::PerChannel(sigma.clone()));

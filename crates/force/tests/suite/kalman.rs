@@ -30,7 +30,7 @@ fn walking(sampling: Sampling, dof: usize, forced: usize, walk: f64, seed: u64) 
 fn displacements(response: &Response, level: f64, seed: u64) -> Measurement {
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.displacement(), level, seed).unwrap();
-    Measurement::of_all(ResponseQuantity::Displacement, noisy)
+    Measurement::from_record(ResponseQuantity::Displacement, noisy)
 }
 
 /// Intensity, in N/√s, of the random walk that a force of order 1 is over short times: τ √(2 ω_c).
@@ -122,7 +122,7 @@ fn bad_requests_are_refused_with_their_numbers() {
     let system = random_stable(2, 4);
     let sampling = Sampling::new(0.01, 50).unwrap();
     let record = Record::from_channel(sampling, (0..50).map(|k| f64::from(k).sin()).collect());
-    let one = Measurement::of_all(ResponseQuantity::Displacement, record.unwrap());
+    let one = Measurement::from_record(ResponseQuantity::Displacement, record.unwrap());
     let ask = |system: &SecondOrderSystem, m: &Measurement, forced: &[usize], tuning: &Tuning| {
         kalman(system, m, forced, Start::InMotion, tuning).unwrap_err()
     };
@@ -133,11 +133,11 @@ fn bad_requests_are_refused_with_their_numbers() {
     );
     let short = one.record().window(0, 2).unwrap();
     assert_eq!(
-        ask(&system, &Measurement::of_all(ResponseQuantity::Displacement, short), &[0], &auto),
+        ask(&system, &Measurement::from_record(ResponseQuantity::Displacement, short), &[0], &auto),
         ForceError::TooShort { samples: 2, needed: 3 }
     );
     let silent = Record::new(sampling, DMatrix::zeros(50, 1)).unwrap();
-    let silent = Measurement::of_all(ResponseQuantity::Displacement, silent);
+    let silent = Measurement::from_record(ResponseQuantity::Displacement, silent);
     assert_eq!(ask(&system, &silent, &[0], &auto), ForceError::Silent);
     let given = |order: usize, corner_hz: f64, rms: Vec<f64>| {
         let model = ForceModel { order, corner_hz, rms };

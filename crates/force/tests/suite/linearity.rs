@@ -27,7 +27,7 @@ fn response(values: &[f64]) -> Response {
 }
 
 fn measured(values: &[f64]) -> Measurement {
-    Measurement::of_all(ResponseQuantity::Velocity, record(&values[..LEN * DOF]))
+    Measurement::from_record(ResponseQuantity::Velocity, record(&values[..LEN * DOF]))
 }
 
 fn discretised_by(s: &SecondOrderSystem, v: &[f64], how: Discretisation) -> IdentifiedForce {

@@ -187,10 +187,10 @@ fn the_standard_error_is_what_is_seen() {
             let truth = force(len, 2, &[1], |k, _| drive.channel(0)[k]);
             let exact = exact_harmonic_periodic(&system, &truth).unwrap();
             let exact =
-                Measurement::of_all(ResponseQuantity::Displacement, exact.displacement().clone());
+                Measurement::from_record(ResponseQuantity::Displacement, exact.displacement().clone());
             let noisy =
                 noise::add_white(exact.record(), NoiseLevel::FractionOfRms(0.02), seed).unwrap();
-            let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
+            let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
             let noise = Noise::Unknown;
             let found =
                 regularised(&system, &measured, &[1], &ForceUnknowns::EveryLine, filter, &noise)
@@ -236,7 +236,7 @@ fn velocities_leave_the_mean_force_at_zero() {
     let system = random_stable(2, 5);
     let truth = force(63, 2, &[1], |k, i| 3.0 + wobble(k, i));
     let response = exact_harmonic_periodic(&system, &truth).unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Velocity, response.velocity().clone());
+    let measured = Measurement::from_record(ResponseQuantity::Velocity, response.velocity().clone());
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::TruncatedSvd(Rule::Gcv)] {
         let noise = Noise::Unknown;
         let found =
@@ -257,7 +257,7 @@ fn bad_requests_are_refused_with_their_numbers() {
         Record::new(sampling(len), data).unwrap()
     };
     let ask = |record: Record, forced: &[usize], extent: &ForceUnknowns, filter: Filter| {
-        let measured = Measurement::of_all(ResponseQuantity::Displacement, record);
+        let measured = Measurement::from_record(ResponseQuantity::Displacement, record);
         regularised(&system, &measured, forced, extent, filter, &Noise::Unknown).unwrap_err()
     };
     let (open, period) = (ForceUnknowns::Samples(Start::InMotion), ForceUnknowns::EveryLine);
@@ -302,7 +302,7 @@ proptest! {
         let find = |by: f64, filter: Filter| {
             let scaled = values.iter().map(|v| v * by).collect();
             let record = Record::from_channel(sampling(30), scaled).unwrap();
-            let measured = Measurement::of_all(ResponseQuantity::Displacement, record);
+            let measured = Measurement::from_record(ResponseQuantity::Displacement, record);
             regularised(&system, &measured, &[0], &extent, filter, &Noise::Unknown).unwrap()
         };
         for filter in [
@@ -327,7 +327,7 @@ proptest! {
         let system = random_stable(2, 3);
         let find = |values: Vec<f64>| {
             let record = Record::from_channel(sampling(24), values).unwrap();
-            let measured = Measurement::of_all(ResponseQuantity::Acceleration, record);
+            let measured = Measurement::from_record(ResponseQuantity::Acceleration, record);
             let filter = Filter::Tikhonov(Rule::Given(0.03));
             let (extent, noise) = (ForceUnknowns::Samples(Start::InMotion), Noise::PerChannel(vec![1.0]));
             let found = regularised(&system, &measured, &[1], &extent, filter, &noise).unwrap();

@@ -78,7 +78,7 @@ fn assert_close(stated: &Record, seen: &DMatrix<f64>, tolerance: f64, what: &str
 fn the_stated_error_is_the_scatter_over_machines() {
     let response = response();
     let measured =
-        Measurement::of_all(ResponseQuantity::Displacement, response.displacement().clone());
+        Measurement::from_record(ResponseQuantity::Displacement, response.displacement().clone());
     // 2,000 draws know a standard deviation to 1.6 %; the second order of the regularised
     // method adds about as much.
     let draws = 2000;
@@ -105,7 +105,7 @@ fn the_stated_error_is_the_scatter_over_machines() {
 #[test]
 fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     let measured =
-        Measurement::of_all(ResponseQuantity::Displacement, response().displacement().clone());
+        Measurement::from_record(ResponseQuantity::Displacement, response().displacement().clone());
     let noise = Noise::Unknown;
     let extent = ForceUnknowns::Lines(LINES.to_vec());
     let ask = |s: &SecondOrderSystem, rule| {
@@ -130,7 +130,7 @@ fn a_truncation_is_not_at_the_mercy_of_the_machine() {
 #[test]
 fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let measured =
-        Measurement::of_all(ResponseQuantity::Displacement, response().displacement().clone());
+        Measurement::from_record(ResponseQuantity::Displacement, response().displacement().clone());
     let noise = Noise::PerChannel(vec![1e-3, 2e-3]);
     // The motions that a force on the second direction makes are in proportion by the first row.
     let uncertain = uncertain(&["c11", "k12"], &dmatrix![0.2, 0.0; 0.3, 0.4]);
@@ -162,7 +162,7 @@ fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
 fn both_uncertainties_add_in_variance() {
     let response = response();
     let measured =
-        Measurement::of_all(ResponseQuantity::Displacement, response.displacement().clone());
+        Measurement::from_record(ResponseQuantity::Displacement, response.displacement().clone());
     let find = |s: &SecondOrderSystem| {
         let filter = Filter::Tikhonov(Rule::Given(1e-6));
         let noise = Noise::PerChannel(vec![0.01, 0.01]);

@@ -31,7 +31,7 @@ fn displacement(sizes: [f64; 2]) -> Record {
 }
 
 fn measured(record: Record) -> Measurement {
-    Measurement::of_all(ResponseQuantity::Displacement, record)
+    Measurement::from_record(ResponseQuantity::Displacement, record)
 }
 
 /// Displacements under a unit force on the first direction, by Cramer's rule.

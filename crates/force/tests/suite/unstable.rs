@@ -26,7 +26,7 @@ fn held_up(rate: f64, sampling: Sampling) -> (Measurement, Record) {
     };
     let force = Record::from_fn(sampling, |t| 1e-3 * MASS * (a(t) - rate * rate * x(t)));
     let seen = Record::from_fn(sampling, |t| 1e-3 * x(t)).unwrap();
-    (Measurement::of_all(ResponseQuantity::Displacement, seen), force.unwrap())
+    (Measurement::from_record(ResponseQuantity::Displacement, seen), force.unwrap())
 }
 
 const FILTERS: [Filter; 3] =
@@ -93,7 +93,7 @@ fn a_whole_period_asks_for_no_stability() {
         .unwrap()
     };
     let force = wave(|w| MASS * (-w * w - 4e4));
-    let seen = Measurement::of_all(ResponseQuantity::Displacement, wave(|_| 1.0));
+    let seen = Measurement::from_record(ResponseQuantity::Displacement, wave(|_| 1.0));
     let found = frequency_domain(&system, &seen, &[0], &[2, 5], &Noise::Unknown).unwrap();
     assert!(relative_error(found.record(), &force).unwrap() < 1e-12);
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::Shrinkage] {

@@ -1,4 +1,4 @@
-//! Proposals of the dissertation for later work, and what the library does about them.
+//! Proposals of the dissertation for later work, and the library's answer to them.
 
 use mechid::force::{Measurement, Noise, frequency_domain, inner_lines};
 use mechid::model::{Discretisation, ResponseQuantity};
@@ -14,7 +14,7 @@ use super::rerun::{Domain, Equation, Parameters, force, sdof};
 /// The section of the page.
 ///
 /// # Errors
-/// The words of the computation that fails.
+/// The message of the computation that fails.
 pub fn section() -> Result<String, String> {
     let rows = [noise(), taylor()?, spectra()?, splines()?, criterion(), experiment()];
     Ok(format!(
@@ -44,8 +44,8 @@ fn noise() -> Vec<String> {
 
 fn taylor() -> Result<Vec<String>, String> {
     let rms = |equation| {
-        let found = force(Source::Corrected, sdof(3.4), Rk4, Parameters::Exact, equation)?;
-        Ok::<String, String>(number(found.rms()))
+        let identified = force(Source::Corrected, sdof(3.4), Rk4, Parameters::Exact, equation)?;
+        Ok::<String, String>(number(identified.rms()))
     };
     Ok(row(
         "S2",
@@ -66,15 +66,15 @@ fn taylor() -> Result<Vec<String>, String> {
 fn spectra() -> Result<Vec<String>, String> {
     let case = sdof(8.0);
     let sequences = correct(case, Rk4)?;
-    let measured = Measurement::of_all(
+    let measured = Measurement::from_record(
         ResponseQuantity::Displacement,
         sequences.response.displacement().clone(),
     );
     let machine = case.machine.system();
     let lines = inner_lines(&measured);
-    let found = frequency_domain(&machine, &measured, &[0], &lines, &Noise::Unknown)
+    let identified = frequency_domain(&machine, &measured, &[0], &lines, &Noise::Unknown)
         .map_err(|e| e.to_string())?;
-    let spectral = mechid::force::relative_error(found.record(), &sequences.force)
+    let spectral = mechid::force::relative_error(identified.record(), &sequences.force)
         .map_err(|e| e.to_string())?;
     let stepped =
         force(Source::Corrected, case, Rk4, Parameters::From(Domain::Time), Equation::Continuous)?;

@@ -44,7 +44,7 @@ pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     let response = exact_harmonic_periodic(&system, &truth).unwrap();
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.acceleration(), level, seed).unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Acceleration, noisy);
+    let measured = Measurement::from_record(ResponseQuantity::Acceleration, noisy);
     let found =
         kalman(&system, &measured, &[dof - 1], Start::InMotion, &Tuning::Likelihood).unwrap().force;
     let band_hz = found.band_hz().expect("accelerations do not show all of it");

@@ -109,7 +109,7 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) ->
     let noise_std = exact.data().column_iter().map(|x| level * rms(x)).collect();
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.displacement(), level, seed).unwrap();
-    let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
+    let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
     Draw { measured, truth, noise: noise_std, forced: [dof - 1] }
 }
 

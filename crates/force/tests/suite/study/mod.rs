@@ -70,7 +70,7 @@ impl Case {
     pub fn measured(&self, seed: u64) -> Measurement {
         let level = NoiseLevel::FractionOfRms(self.level);
         let noisy = noise::add_white(&self.exact, level, seed).unwrap();
-        Measurement::of_all(ResponseQuantity::Displacement, noisy)
+        Measurement::from_record(ResponseQuantity::Displacement, noisy)
     }
 
     /// ‖F̂ − F‖ / ‖F‖; a held force has its last step's value at the last sample.

@@ -1,29 +1,23 @@
-//! Sensitivity of the measured channels to a force at each frequency.
+//! Information of the measured channels on the force at each frequency.
 
 use std::f64::consts::{PI, TAU};
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
 
-use crate::force_model::LowPass;
+use crate::error::ForceError;
+use crate::force_model::{ForceModel, LowPass};
+use crate::limits;
+use crate::measurement::Measurement;
 use crate::transfer::Transfer;
-use crate::{ForceError, ForceModel, Measurement};
-
-/// Most frequencies at which the machine is looked at; between them nothing is narrow but the
-/// resonances, at which the force is known best.
-const FREQUENCIES: usize = 1024;
-
-/// Periods in the record of the slowest force that is told from a constant one, where that is not
-/// shown: what is not known of the mean reaches into lines below.
-const PERIODS: f64 = 2.0;
 
 /// The information HᴴH of the scaled channels on forces, at frequencies from 0 to Nyquist.
-pub(crate) struct Seen {
+pub(crate) struct ForceInformation {
     terms: Vec<Term>,
     channels: f64,
     dt: f64,
-    /// Lowest frequency that a record of this length tells from a constant one, in Hz; 0 where the
-    /// channels show a constant force.
+    /// Lowest frequency that a record of this length distinguishes from a constant force, in Hz; 0
+    /// if the channels show a constant force.
     least_hz: f64,
 }
 
@@ -31,22 +25,22 @@ pub(crate) struct Seen {
 struct Term {
     omega: f64,
     width: f64,
-    /// HᴴH of the scaled channels; `None` at an undamped resonance, where any force would show.
+    /// HᴴH of the scaled channels; `None` at an undamped resonance, which would show any force.
     information: Option<DMatrix<Complex<f64>>>,
 }
 
-/// Part of a force that a measurement shows, by frequency.
+/// Information of a measurement on a force, by frequency.
 pub(crate) struct ErrorSpectrum {
     /// Lower and upper end of each interval, in Hz.
     edges: Vec<[f64; 2]>,
     /// Variance of each force's error within it, forces × intervals, in N².
     pub variance: DMatrix<f64>,
-    /// Whether the interval tells more of every force than the model of it does.
-    seen: Vec<bool>,
+    /// Whether the interval determines every force better than its model does.
+    is_determined: Vec<bool>,
     least_hz: f64,
 }
 
-impl Seen {
+impl ForceInformation {
     pub fn new(
         system: &SecondOrderSystem,
         measured: &Measurement,
@@ -55,10 +49,11 @@ impl Seen {
     ) -> Result<Self, ForceError> {
         let sampling = measured.sampling();
         let transfer = Transfer { system, channels: measured.channels(), forced, scale };
-        let (count, nyquist) = (sampling.len().min(FREQUENCIES), PI / sampling.dt());
+        let (count, nyquist) =
+            (sampling.len().min(limits::INFORMATION_FREQUENCIES), PI / sampling.dt());
         // Half a line apart where they are few; where they are many, ever closer towards 0.
         let lowest = 0.5 * sampling.omega0();
-        let bend = if sampling.len() > FREQUENCIES { 3 } else { 1 };
+        let bend = if sampling.len() > limits::INFORMATION_FREQUENCIES { 3 } else { 1 };
         let at = |i: usize| {
             let part = (i as f64 / count as f64).powi(bend);
             (part * nyquist).max(i as f64 * lowest / count as f64)
@@ -71,14 +66,15 @@ impl Seen {
                 Term { omega, width: high - low, information }
             })
             .collect();
-        // A machine without springs has no static response, and accelerates all the more.
+        // A system without springs has no static response, and accelerates instead.
         let constant =
             transfer.scaled(0, 0.0).map_or(true, |h| h.column_iter().all(|f| f.camax() > 0.0));
-        let least_hz = if constant { 0.0 } else { PERIODS * sampling.line_spacing_hz() };
+        let least_hz =
+            if constant { 0.0 } else { limits::SLOWEST_PERIODS * sampling.line_spacing_hz() };
         Ok(Self { terms, channels: scale.len() as f64, dt: sampling.dt(), least_hz })
     }
 
-    /// RMS value of the scaled channels, their mean, that a force of this spectrum makes alone.
+    /// Returns the mean RMS value of the scaled channels due to a force of this spectrum alone.
     pub fn gain(&self, model: &ForceModel, process: &LowPass, f: usize) -> f64 {
         let shown = self.terms.iter().filter_map(|Term { omega, width, information }| {
             let power = information.as_ref()?[(f, f)].re / self.channels;
@@ -87,20 +83,20 @@ impl Seen {
         shown.sum::<f64>().sqrt()
     }
 
-    /// What is left unknown of each force under a model and a noise (in channel scales) far from
-    /// the ends of a record: S_e = (S_f⁻¹ + Hᴴ S_n⁻¹ H)⁻¹.
+    /// Returns the remaining uncertainty of each force under a model and a noise (in channel
+    /// scales), far from the ends of a record: S_e = (S_f⁻¹ + Hᴴ S_n⁻¹ H)⁻¹.
     ///
     /// # Source
     /// Wiener (1949), the smoother of stationary processes.
     pub fn errors(&self, model: &ForceModel, process: &LowPass, noise: f64) -> ErrorSpectrum {
         let forces = model.rms.len();
         let mut variance = DMatrix::zeros(forces, self.terms.len());
-        let mut seen = Vec::with_capacity(self.terms.len());
+        let mut is_determined = Vec::with_capacity(self.terms.len());
         let mut edges = Vec::with_capacity(self.terms.len());
         for (i, Term { omega, width, information }) in self.terms.iter().enumerate() {
             edges.push([(omega - 0.5 * width) / TAU, (omega + 0.5 * width) / TAU]);
             let Some(information) = information else {
-                seen.push(true);
+                is_determined.push(true);
                 continue;
             };
             // In units of each force's density: (I + D HᴴH D)⁻¹ with D² = S_f/S_n.
@@ -110,21 +106,21 @@ impl Seen {
             let mut matrix = information.map_with_location(|f, g, h| h * root(f) * root(g));
             (0..forces).for_each(|f| matrix[(f, f)] += 1.0);
             let inverse = matrix.lu().try_inverse();
-            let left = |f: usize| inverse.as_ref().map_or(1.0, |inverse| inverse[(f, f)].re);
-            seen.push((0..forces).all(|f| left(f) <= 0.5));
+            let remaining = |f: usize| inverse.as_ref().map_or(1.0, |inverse| inverse[(f, f)].re);
+            is_determined.push((0..forces).all(|f| remaining(f) <= 0.5));
             for f in 0..forces {
-                variance[(f, i)] = left(f).clamp(0.0, 1.0) * density[f] * width / PI;
+                variance[(f, i)] = remaining(f).clamp(0.0, 1.0) * density[f] * width / PI;
             }
         }
-        ErrorSpectrum { edges, variance, seen, least_hz: self.least_hz }
+        ErrorSpectrum { edges, variance, is_determined, least_hz: self.least_hz }
     }
 }
 
 impl ErrorSpectrum {
-    /// Frequency below which the channels show less of a force than noise, in Hz; 0 where they
-    /// show it down to a constant one, `None` where they show it nowhere.
+    /// Returns the frequency below which the noise of the channels exceeds the force, in Hz; 0 if
+    /// they show it down to a constant force, `None` if they show it at no frequency.
     pub fn lowest_hz(&self) -> Option<f64> {
-        let first = self.seen.iter().position(|seen| *seen)?;
+        let first = self.is_determined.iter().position(|is| *is)?;
         Some(self.edges[first][0].max(self.least_hz))
     }
 

@@ -1,0 +1,153 @@
+//! Limits of this crate: the numbers that decide how long to search, when to stop and what counts
+//! as shown.
+
+// Posterior points
+
+/// Step for the curvature of the likelihood, whose parameters are logarithms.
+pub(crate) const CURVATURE_STEP: f64 = 0.15;
+
+/// Standard deviation of a logarithm that the measurement does not determine.
+pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
+
+/// Standard deviation of a logarithm whose effect on a standard error is at most a hundredth; the
+/// best point alone is then enough.
+pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
+
+/// Largest logarithm of the ratio of the likelihood of a point to its approximation.
+pub(crate) const POINT_WEIGHT: f64 = 1.0;
+
+// Kalman filter
+
+/// Orders of the force model tried, each starting from the best point of the one before; the first
+/// two start from a grid.
+pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
+
+/// Smallest gain in the log-likelihood by a higher order for which the next order is tried.
+pub(crate) const ORDER_GAIN: f64 = 1.0;
+
+/// Maximum number of states of all forces; with more, long records take too long.
+pub(crate) const FORCE_STATES: usize = 16;
+
+/// Ratio between the corner frequencies of the grid, from half a period in the record up.
+pub(crate) const CORNER_RATIO: f64 = 4.0;
+
+/// Highest corner, in radians per sample: the Nyquist frequency.
+pub(crate) const HIGHEST_CORNER: f64 = std::f64::consts::PI;
+
+/// Signal-to-noise ratios of the grid.
+pub(crate) const GRID_RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
+
+/// Range of the ratio: above it the noise has no digits, below it the measurement is only noise.
+pub(crate) const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
+
+/// Relative change of every variance over a step at which the covariance has converged. Variances
+/// that converge by a factor of 1 − 10⁻⁴ per step are then within 10⁻⁸ of their limit.
+pub(crate) const CONVERGED_COVARIANCE: f64 = 1e-12;
+
+/// The same limit if only the likelihood is needed.
+pub(crate) const CONVERGED_LIKELIHOOD: f64 = 1e-7;
+
+/// Number of time constants 1/ω_c after which the start of a force has decayed: e^(−0.1·512) for
+/// order 16.
+pub(crate) const DECAY_TIME: f64 = 512.0;
+
+/// Largest norm of a rate matrix over a sub-step; terms of the series then fall by half or more.
+pub(crate) const SUBSTEP: f64 = 0.25;
+
+/// Number of terms of the series; the next would be below rounding.
+pub(crate) const SERIES_TERMS: usize = 18;
+
+/// Maximum number of frequencies at which the system is evaluated; only resonances are narrower,
+/// and there the force is known best.
+pub(crate) const INFORMATION_FREQUENCIES: usize = 1024;
+
+/// Number of periods in the record of the slowest force that is distinguishable from a constant
+/// one, if a constant force is not shown: the unknown mean affects the lines below.
+pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
+
+// Likelihood of the components
+
+/// Colours tried: white, random walk, integrated random walk.
+pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
+
+/// Minimum number of driven components of a white force for a colour; the amplitudes of fewer may
+/// follow some slope by chance.
+pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
+
+/// Gain in the log-likelihood by a colour that is not chance with fewer components.
+pub(crate) const COLOUR_GAIN: f64 = 6.0;
+
+/// Ratio of successive reaches of the first search, from all components down.
+pub(crate) const REACH_RATIO: f64 = 0.8;
+
+/// Maximum number of EM rounds; a few dozen are typical.
+pub(crate) const EM_ROUNDS: usize = 300;
+
+/// Change of the log-likelihood in a round at which the iteration ends.
+pub(crate) const EM_CHANGE: f64 = 1e-3;
+
+/// Difference to the largest log-likelihood above which a reach or colour no longer counts.
+pub(crate) const NEGLIGIBLE_LIKELIHOOD: f64 = 6.0;
+
+/// Prior probability that a white force has no end, relative to all reaches.
+pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
+
+/// Number of reaches on either side of the best in the average.
+pub(crate) const NEIGHBOURING_REACHES: usize = 16;
+
+/// Share of driven components of a band; with less the force consists of single lines. The silent
+/// components then determine where they are, and the reach adds no information.
+pub(crate) const BAND_SHARE: f64 = 0.5;
+
+/// Number of driven components of a band; with fewer the force consists of single lines, at any
+/// share.
+pub(crate) const BAND_COMPONENTS: f64 = 6.0;
+
+// Regularisation
+
+/// Number of values of λ per decade.
+pub(crate) const LAMBDAS_PER_DECADE: usize = 25;
+
+/// Number of decades of λ below the largest singular value.
+pub(crate) const LAMBDA_DECADES: usize = 8;
+
+/// Ratio of the residual variance to the noise for the corner of the L-curve; no higher residual
+/// is searched.
+pub(crate) const CORNER_NOISE_RATIO: f64 = 2.0;
+
+/// Smallest relative change of residual and force that makes a step of λ effective.
+pub(crate) const LAMBDA_EFFECT: f64 = 1e-3;
+
+/// Smallest fraction of the data that truncation must leave as a residual: with fewer, some small
+/// data by chance would look like a perfect fit.
+pub(crate) const TRUNCATION_RESIDUAL: f64 = 0.1;
+
+/// Smallest fraction of the data that Tikhonov's factors must leave: with less, the residual of
+/// data without noise is rounding, which would decide.
+pub(crate) const TIKHONOV_RESIDUAL: f64 = 1e-4;
+
+/// Relative difference up to which costs are equal.
+pub(crate) const EQUAL_COSTS: f64 = 1e-6;
+
+/// Maximum number of Newton steps to the half width of an interval; they converge in far fewer.
+pub(crate) const HALF_WIDTH_STEPS: usize = 50;
+
+/// Change of a half width, in standard deviations, that ends the search.
+pub(crate) const HALF_WIDTH_CHANGE: f64 = 1e-12;
+
+// Transmission and uncertainty
+
+/// Reciprocal condition at which a line or a step does not transmit a force: 16 digits of the
+/// response would leave fewer than four for the force.
+pub(crate) const NOT_TRANSMITTED: f64 = 1e-12;
+
+/// Largest growth of the free response over the record, as a natural logarithm: a factor of 10⁶.
+/// With more growth the impulse responses that begin late have too few digits: above 10⁸ the
+/// identified force is entirely wrong.
+pub(crate) const FREE_GROWTH: f64 = 14.0;
+
+/// Tolerance of the ends of a band, in line spacings, for rounding.
+pub(crate) const BAND_TOLERANCE: f64 = 1e-9;
+
+/// Change of an entry for a derivative, in standard errors.
+pub(crate) const PARAMETER_STEP: f64 = 0.1;
