@@ -25,19 +25,19 @@ enum Task {
         /// Only the table or figure of this number, for example 5.6.4 or figure-5.2.4.
         #[arg(long, value_name = "NUMBER")]
         only: Option<String>,
-        /// Compare with the golden files (to 1e-9), tables, figures and pages of the repository, and write
-        /// nothing; files that belong to none of them fail, too.
+        /// Compare with the golden files (to 1e-9), tables, figures and pages of the repository,
+        /// and write nothing; files that belong to none of them fail, too.
         #[arg(long, conflicts_with = "bless")]
         check: bool,
         /// Rewrite the golden files on purpose.
         #[arg(long)]
         bless: bool,
-        /// Folder the tables and figures go to [default: docs/thesis].
+        /// Folder of the tables and figures [default: docs/thesis].
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
-    /// Measure how time grows with degrees of freedom and samples, and write the page of the book about it
-    /// (with --release, on a machine with nothing else to do).
+    /// Measure how time grows with degrees of freedom and samples, and write the page of the book
+    /// about it (with --release, on an idle machine).
     MeasureCost {
         /// Seconds for each point.
         #[arg(long, default_value_t = 0.5)]
@@ -86,14 +86,14 @@ fn reproduce_thesis(
 fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {
     let start = Instant::now();
     let bar = ProgressBar::new(reproduce::ticks(root)? as u64);
-    let all = reproduce::all(root, || bar.inc(1))?;
+    let artefacts = reproduce::all(root, || bar.inc(1))?;
     bar.finish_and_clear();
     println!(
         "{} tables and figures in {:.1} s",
-        all.artefacts.len(),
+        artefacts.artefacts.len(),
         start.elapsed().as_secs_f64()
     );
-    only.map_or(Ok(all.clone()), |number| all.only(number))
+    only.map_or(Ok(artefacts.clone()), |number| artefacts.only(number))
 }
 
 fn compared(root: &Path, reproduction: &Reproduction, whole: bool) -> Result<(), String> {

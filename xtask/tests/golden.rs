@@ -1,4 +1,5 @@
-//! Today's numbers are yesterday's. On purpose changed ones: `cargo xtask reproduce-thesis --bless`.
+//! Today's numbers are yesterday's. On purpose changed ones:
+//! `cargo xtask reproduce-thesis --bless`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -19,11 +19,11 @@ const PERIODS: usize = 4;
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let mut least_squares = Growth::new("least squares, 2,048 samples");
     for n in [2, 5, 10, 20, 50] {
-        least_squares.push(n, of_samples(n, seconds)?);
+        least_squares.push(n, least_squares_time(n, seconds)?);
     }
     let mut likelihood = Growth::new("maximum likelihood, 500 lines");
     for n in [2, 5, 10, 20] {
-        likelihood.push(n, of_lines(n, seconds).map_err(|e| e.to_string())?);
+        likelihood.push(n, likelihood_time(n, seconds).map_err(|e| e.to_string())?);
     }
     Ok(vec![least_squares, likelihood])
 }
@@ -37,7 +37,7 @@ fn scattered(rows: usize, columns: usize) -> DMatrix<f64> {
     })
 }
 
-fn of_samples(n: usize, seconds: f64) -> Result<f64, String> {
+fn least_squares_time(n: usize, seconds: f64) -> Result<f64, String> {
     let motions = scattered(ROWS, 3 * n);
     let truth = DMatrix::from_fn(3 * n, n, |i, j| if i % n == j { 2.0 } else { 0.1 });
     let force = &motions * truth + scattered(ROWS, n) * 0.01;
@@ -51,7 +51,7 @@ fn of_samples(n: usize, seconds: f64) -> Result<f64, String> {
     Ok(shortest(seconds, || solve().is_ok()))
 }
 
-fn of_lines(n: usize, seconds: f64) -> Result<f64, Box<dyn std::error::Error>> {
+fn likelihood_time(n: usize, seconds: f64) -> Result<f64, Box<dyn std::error::Error>> {
     let test = steady_test("held chain", chain(n, Support::Held, 0.02, 1), false, LINES, 1)?;
     let response = repeated(&test.displacement, PERIODS)?;
     let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1)?;

@@ -1,12 +1,12 @@
-//! Times, and the power of the size that they grow with.
+//! Times, and the power of the size with which they grow.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// How the time of something grows with its size.
+/// Growth of a time with the size of its task.
 #[derive(Debug, Clone)]
 pub struct Growth {
-    /// Name of what is timed.
+    /// Name of the task.
     pub name: &'static str,
     /// Sizes, pure numbers.
     pub sizes: Vec<f64>,
@@ -24,8 +24,8 @@ impl Growth {
         self.seconds.push(seconds);
     }
 
-    /// The exponent of the size in the time, by least squares on the logarithms of the larger half of the
-    /// sizes, three at least: what small ones take has other reasons.
+    /// Returns the exponent of the size in the time, by least squares on the logarithms of the
+    /// larger half of the sizes, at least three: small sizes have other costs.
     pub fn slope(&self) -> f64 {
         let from = self.sizes.len() - (self.sizes.len() / 2 + 1).max(3).min(self.sizes.len());
         let logs = |values: &[f64]| values[from..].iter().map(|v| v.ln()).collect::<Vec<_>>();
@@ -43,7 +43,7 @@ impl Growth {
     }
 }
 
-/// Shortest of several runs, in s: for about `seconds` together, three at least.
+/// Returns the shortest of several runs, in s: for about `seconds` together, at least three.
 pub fn shortest<T>(seconds: f64, mut run: impl FnMut() -> T) -> f64 {
     let begin = Instant::now();
     let mut shortest = f64::INFINITY;

@@ -1,4 +1,5 @@
-//! How the cost of stepping, identification and reading grows: measured, drawn and told in the book.
+//! Cost of stepping, identification and reading as it grows with size: measured, drawn and written
+//! into the book.
 
 mod identification;
 mod measure;
@@ -12,17 +13,18 @@ use mechid::plot::{Axis, Curve, Figure, Panel};
 
 use self::measure::Growth;
 
-/// What is measured against what, with its curves.
+/// The sizes and the curves of one measurement.
 struct Group {
     title: &'static str,
     against: &'static str,
     growths: Vec<Growth>,
 }
 
-/// Measures everything, for `seconds` at every point, and writes the figure and the page of the book.
+/// Measures everything, for `seconds` at every point, and writes the figure and the page of the
+/// book.
 ///
 /// # Errors
-/// What keeps a measurement from being done or a file from being written.
+/// A measurement that failed, or a file that could not be written.
 pub fn write(root: &Path, seconds: f64) -> Result<(), String> {
     let groups = [
         Group {

@@ -27,7 +27,7 @@ Over samples everything is linear beyond what a run costs at all.
 Where time grows faster than that, the numbers have left the caches of the processor, or others used it.
 ";
 
-/// What kept the machine busy, where the system tells.
+/// Load of the machine, if the system reports it.
 fn load() -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let average = std::fs::read_to_string("/proc/loadavg").ok();
@@ -56,11 +56,11 @@ pub fn text(groups: &[Group]) -> String {
 fn row(growth: &Growth) -> String {
     let (sizes, last) = (&growth.sizes, growth.seconds[growth.seconds.len() - 1]);
     let (from, to) = (grouped(sizes[0]), grouped(sizes[sizes.len() - 1]));
-    format!("| {} | {from} | {to} | {} | {} |\n", growth.name, told(last), growth.power())
+    format!("| {} | {from} | {to} | {} | {} |\n", growth.name, with_unit(last), growth.power())
 }
 
 /// A time with two digits and a unit.
-fn told(seconds: f64) -> String {
+fn with_unit(seconds: f64) -> String {
     let (value, unit) = match seconds {
         s if s < 1e-6 => (1e9 * s, "ns"),
         s if s < 1e-3 => (1e6 * s, "µs"),

@@ -1,4 +1,4 @@
-//! Records of many samples: stepped, read, and identified from.
+//! Records of many samples: simulation, reading, identification.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use super::measure::{Growth, shortest};
 
-/// Rows of a text that are held.
+/// Number of buffered rows of a text.
 const HELD: usize = 1 << 18;
 
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {

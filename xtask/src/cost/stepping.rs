@@ -26,7 +26,7 @@ pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let mut growths = Vec::new();
     growths.extend(both(["step, dense", "preparation, dense"], &dense, seconds, full)?);
     growths.extend(both(["step, chain", "preparation, chain"], &chain, seconds, of_chain)?);
-    growths.extend(both(["step, grid", "preparation, grid"], &grid, seconds, of_grid)?);
+    growths.extend(both(["step, grid", "preparation, grid"], &grid, seconds, grid_system)?);
     Ok(growths)
 }
 
@@ -37,7 +37,7 @@ fn sparse(
     SparseSystem::new(mass, &stiffness * 1e-4, stiffness)
 }
 
-fn of_grid(side: usize) -> Result<SparseSystem, mechid::model::ModelError> {
+fn grid_system(side: usize) -> Result<SparseSystem, mechid::model::ModelError> {
     let at = |i: usize, j: usize| i * side + j;
     let mut entries = vec![];
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
@@ -69,7 +69,7 @@ fn both<S: System, E: std::fmt::Display>(
     Ok([step, prepare])
 }
 
-/// A long record less a short one.
+/// Difference of the times of a long and a short record.
 fn per_step(system: &dyn System, seconds: f64) -> Result<f64, String> {
     let n = system.dof();
     let steps = (20_000_000 / (n * n.min(100))).clamp(20, 200_000);
@@ -80,10 +80,10 @@ fn per_step(system: &dyn System, seconds: f64) -> Result<f64, String> {
     };
     let (short, long) = (force(2)?, force(steps + 2)?);
     let dofs = SelectedDofs { forced: &[0], observed: &[0, n - 1] };
-    let rest = InitialState::rest(n);
+    let initial = InitialState::rest(n);
     let scheme = AllowUnstable(&Newmark::AVERAGE_ACCELERATION);
     let time = |force: &Record| {
-        shortest(seconds, || integrate_selected(&scheme, system, dofs, force, &rest).is_ok())
+        shortest(seconds, || integrate_selected(&scheme, system, dofs, force, &initial).is_ok())
     };
     let begin = time(&short);
     Ok((time(&long) - begin) / steps as f64)

@@ -21,7 +21,7 @@ pub enum Role {
     Data,
     /// Something computed from what comes in.
     Process,
-    /// Quantity that the diagram is there to find.
+    /// Result of the diagram.
     Result,
     /// Comparison of a result with the truth.
     Comparison,
@@ -109,7 +109,7 @@ impl BlockDiagram {
         self.arrows.push(Arrow { from, to, route, both_ends: false });
     }
 
-    /// Joins two boxes that are held against each other.
+    /// Joins two boxes that are compared.
     pub fn double_arrow(&mut self, from: BoxId, to: BoxId) {
         self.arrows.push(Arrow { from, to, route: Route::Straight, both_ends: true });
     }
@@ -183,7 +183,8 @@ impl Grid {
         (self.columns[block.column].0, y)
     }
 
-    /// Returns the point where a line from the middle of a box towards `next` crosses the box's edge.
+    /// Returns the point where a line from the middle of a box towards `next` crosses the box's
+    /// edge.
     fn leave(&self, block: &Block, next: Point) -> Point {
         let (x, y) = self.center(block);
         let (dx, dy) = (next.0 - x, next.1 - y);

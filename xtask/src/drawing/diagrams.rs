@@ -1,4 +1,4 @@
-//! The dissertation's block diagrams, drawn from what its text says flows where.
+//! The dissertation's block diagrams, drawn from the description in its text.
 
 use super::block_diagram::{BlockDiagram, BoxId, Role, Route};
 
@@ -20,7 +20,7 @@ pub enum Domain {
     Frequency,
 }
 
-/// Equation that gives the force back.
+/// Equation of the identified force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForceEquation {
     /// M̂ ẍ + Ĉ ẋ + K̂ x, sample by sample.
@@ -65,7 +65,7 @@ impl Machine {
         }
     }
 
-    fn found(self) -> &'static str {
+    fn unknowns(self) -> &'static str {
         match self {
             Machine::Sdof => "Ĉ, K̂ (M known)",
             Machine::Bearing => "Ĉ_{xx} … Ĉ_{yy}, K̂_{xx} … K̂_{yy}",
@@ -91,7 +91,7 @@ impl Machine {
     }
 }
 
-/// The boxes every diagram starts with.
+/// The first boxes of every diagram.
 struct Simulation {
     truth: BoxId,
     excitation: BoxId,
@@ -120,8 +120,8 @@ fn simulation(diagram: &mut BlockDiagram, machine: Machine) -> Simulation {
     Simulation { truth, excitation, response }
 }
 
-/// Part of a diagram that estimation adds: the force it reads, the parameters it finds, and the row they
-/// stand in.
+/// Part of a diagram that estimation adds: the force it uses, the parameters it identifies, and
+/// their row.
 struct Estimation {
     force: BoxId,
     found: BoxId,
@@ -148,21 +148,22 @@ fn estimation(
     };
     let estimator =
         diagram.block((2, row), Role::Process, "Least squares", &[machine.estimator(domain)]);
-    let found = diagram.block((3, row), Role::Result, "Identified parameters", &[machine.found()]);
+    let parameters =
+        diagram.block((3, row), Role::Result, "Identified parameters", &[machine.unknowns()]);
     diagram.arrow(response, estimator, Route::Straight);
     diagram.arrow(force, estimator, Route::ColumnFirst);
-    diagram.arrow(estimator, found, Route::Straight);
-    Estimation { force, found, row }
+    diagram.arrow(estimator, parameters, Route::Straight);
+    Estimation { force, parameters, row }
 }
 
 /// Identification of parameters.
 pub fn identification(machine: Machine, domain: Domain) -> String {
-    let place = match domain {
+    let equation = match domain {
         Domain::Time => "time domain",
         Domain::Frequency => "frequency domain",
     };
     let mut diagram = BlockDiagram::new(format!(
-        "Identification of parameters in the {place}: {}",
+        "Identification of parameters in the {equation}: {}",
         machine.name()
     ));
     let simulated = simulation(&mut diagram, machine);
@@ -174,7 +175,7 @@ pub fn identification(machine: Machine, domain: Domain) -> String {
     diagram.to_svg()
 }
 
-/// Identification of the exciting force with parameters identified before.
+/// Identification of the exciting force with identified parameters.
 pub fn force(machine: Machine, domain: Domain, equation: ForceEquation) -> String {
     let (name, needs) = match equation {
         ForceEquation::Continuous => ("continuous equation", "M Ẍ + Ĉ Ẋ + K̂ X"),
@@ -236,7 +237,7 @@ pub fn modal() -> String {
     let response =
         diagram.block((2, 1), Role::Data, "Response", &["displacements", "and velocities"]);
     let estimator = diagram.block((2, 2), Role::Process, "Least squares", &["eq. (4.5.28)"]);
-    let found = diagram.block((3, 2), Role::Data, "State matrix", &["M^{−1}K̂ and M^{−1}Ĉ"]);
+    let state_matrix = diagram.block((3, 2), Role::Data, "State matrix", &["M^{−1}K̂ and M^{−1}Ĉ"]);
     let eigen = diagram.block((3, 1), Role::Process, "Eigenvalue problem", &["A ψ = λ ψ"]);
     let modes = diagram.block((4, 1), Role::Result, "Identified modes", &["f_{d}, ζ, y_{2}/y_{1}"]);
     diagram.arrow(truth, integration, Route::Straight);
@@ -245,8 +246,8 @@ pub fn modal() -> String {
     diagram.arrow(integration, response, Route::Straight);
     diagram.arrow(response, estimator, Route::Straight);
     diagram.arrow(excitation, estimator, Route::ColumnFirst);
-    diagram.arrow(estimator, found, Route::Straight);
-    diagram.arrow(found, eigen, Route::Straight);
+    diagram.arrow(estimator, state_matrix, Route::Straight);
+    diagram.arrow(state_matrix, eigen, Route::Straight);
     diagram.arrow(eigen, modes, Route::Straight);
     diagram.double_arrow(theory, modes);
     diagram.to_svg()

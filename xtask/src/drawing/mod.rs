@@ -1,4 +1,4 @@
-//! The dissertation's drawings that show no data: model sketches and block diagrams.
+//! The dissertation's drawings without data: model sketches and block diagrams.
 
 mod block_diagram;
 mod diagrams;

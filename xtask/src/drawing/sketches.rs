@@ -1,4 +1,5 @@
-//! The dissertation's model sketches, figures 4.2.1 to 4.2.3, drawn from what its text says of the models.
+//! The dissertation's model sketches, figures 4.2.1 to 4.2.3, drawn from the description of the
+//! models in its text.
 
 use mechid::plot::{Anchor, Canvas, Color, Point, Stroke, TextStyle};
 
@@ -88,7 +89,7 @@ fn cross_section(sheet: &mut Canvas) {
     spring(sheet, (wall, y), (x - 62.0, y));
     hatched(sheet, (x - 62.0, y - 62.0), (124.0, 124.0), STEEL);
     sheet.circle((x, y), 46.0, Some(OIL), Some(PART));
-    // The journal runs off centre: that is where the film takes its load.
+    // The journal runs off centre, where the film carries its load.
     sheet.circle((x + 5.0, y + 7.0), 34.0, Some(Color("#eef2f6")), Some(PART));
     turning(sheet, (x + 5.0, y + 7.0), 22.0);
     sheet.text((x + 16.0, 332.0), "K_{sy}", &LABEL.anchored(Anchor::Start));
@@ -131,7 +132,7 @@ pub fn bearing_scheme() -> String {
     sheet.finish("The bearing as eight linear coefficients")
 }
 
-/// Draws what the springs and dashpots of the scheme cannot show.
+/// Draws what springs and dashpots do not show: the housing, the shaft and the coordinates.
 fn coupling(sheet: &mut Canvas, (x, y): Point) {
     let start = NOTE.anchored(Anchor::Start);
     let lines = [

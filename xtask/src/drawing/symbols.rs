@@ -7,7 +7,8 @@ pub const PART: Stroke = Stroke::solid(Color::DARK, 1.6);
 /// Thin lines: hatching, axes, dimensions.
 pub const THIN: Stroke = Stroke::solid(Color::DARK, 0.9);
 
-/// A frame of reference along a line: a point is `along` px from the start and `across` px to its right.
+/// A frame of reference along a line: a point is `along` px from the start and `across` px to its
+/// right.
 #[derive(Debug, Clone, Copy)]
 struct Rail {
     start: Point,
@@ -18,7 +19,8 @@ struct Rail {
 impl Rail {
     fn new(from: Point, to: Point) -> Self {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        // Two equal points have no direction; a millionth of a pixel draws nothing and divides.
+        // Two equal points have no direction; a millionth of a pixel is invisible and avoids a
+        // division by zero.
         let length = dx.hypot(dy).max(1e-6);
         Rail { start: from, unit: (dx / length, dy / length), length }
     }
@@ -95,7 +97,7 @@ pub fn arrow_head(sheet: &mut Canvas, from: Point, tip: Point, length: f64, colo
 pub fn arrow(sheet: &mut Canvas, from: Point, to: Point, color: Color, width: f64) {
     let head = 5.0 + 3.0 * width;
     let rail = Rail::new(from, to);
-    // The shaft ends inside the head, or its blunt end would show at the tip.
+    // The shaft ends inside the head, since its blunt end would show at the tip.
     sheet.line(
         from,
         rail.at((rail.length - 0.7 * head).max(0.0), 0.0),

@@ -2,15 +2,15 @@
 
 use mechid::plot::{Curve, Figure, Panel};
 
-/// Significant digits written: enough for a comparison to 1e-9, and no more than a change of
-/// compiler leaves alone.
+/// Significant digits written: enough for a comparison to 1e-9, and few enough not to depend on the
+/// compiler.
 const DIGITS: usize = 12;
 
 /// One row for each abscissa of each panel, one column for each curve and each horizontal
 /// reference line; a curve that has no point at an abscissa leaves its cell empty.
 ///
 /// # Errors
-/// The words of the CSV writer.
+/// The message of the CSV writer.
 pub fn table(figure: &Figure) -> Result<String, String> {
     let columns = columns(figure);
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -42,7 +42,7 @@ fn columns(figure: &Figure) -> Vec<String> {
     columns
 }
 
-/// A curve that needs no legend goes by what its axis shows.
+/// A curve without a legend has the name of its axis.
 fn name(panel: &Panel, curve: &Curve) -> String {
     if curve.label().is_empty() { panel.y_axis().caption() } else { curve.label().to_owned() }
 }

@@ -7,7 +7,8 @@ use super::Plan;
 use super::series::BEARING;
 use crate::thesis::case::{Case, Machine};
 
-/// The dissertation does not state the NPI of these figures; it scales both axes and leaves the shape alone.
+/// The dissertation does not state the NPI of these figures; it scales both axes without a change
+/// of the shape.
 const NPI: f64 = 2.0;
 
 /// The force over its period, with the first sample of the next period to close it.

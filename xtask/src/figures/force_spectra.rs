@@ -1,4 +1,5 @@
-//! Spectra of identified forces: figures 5.4.x, 5.5.x, 5.8.x, 5.9.x, of Appendix A and of the papers.
+//! Spectra of identified forces: figures 5.4.x, 5.5.x, 5.8.x, 5.9.x, of Appendix A and of the
+//! papers.
 
 use mechid::plot::{Axis, Curve, Dash, Figure, Panel, Reference};
 
@@ -8,7 +9,7 @@ use super::sweeps::slot;
 use crate::thesis::case::{Case, Machine};
 use crate::thesis::published::Method;
 
-/// One simulation and how its force is found again.
+/// One simulation and the method that identifies its force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Spectra {
     case: Case,
@@ -57,7 +58,7 @@ impl Spectra {
     }
 
     fn panel(self, reading: Reading, lines: &[ForceLines], dof: usize, name: &str) -> Panel {
-        // The discretised equation misses by factors, the continuous one by parts.
+        // The error of the discretised equation is a factor, of the continuous one a fraction.
         let ordinate = match self.equation {
             Equation::Continuous => Axis::linear(name, "N"),
             Equation::Discretised => Axis::log10(name, "N"),

@@ -16,8 +16,8 @@ struct Receptance {
     value: Vec<Complex<f64>>,
 }
 
-/// Receptance of the machine as the scheme simulates it: X(ω)/F(ω) of the degree of freedom `dof`, driven in
-/// the last.
+/// Receptance of the machine as the scheme simulates it: X(ω)/F(ω) of the degree of freedom `dof`,
+/// driven in the last.
 fn simulated(
     reading: Reading,
     case: Case,
@@ -56,20 +56,22 @@ fn exact(case: Case, dof: usize) -> Result<Receptance, String> {
 fn panels(case: Case, dof: usize, name: &str) -> Result<[Panel; 2], String> {
     let omega = || Axis::log10("Angular frequency ω", "rad/s");
     let truth = exact(case, dof)?;
-    let size = |found: &Receptance| found.value.iter().map(|h| h.norm()).collect::<Vec<f64>>();
+    let size =
+        |estimates: &Receptance| estimates.value.iter().map(|h| h.norm()).collect::<Vec<f64>>();
     let sizes = size(&truth);
     let (low, high) =
         sizes.iter().fold((f64::INFINITY, 0.0f64), |(low, high), h| (low.min(*h), high.max(*h)));
-    // Schemes with a zero at the Nyquist frequency fall out of the picture there.
+    // Schemes with a zero at the Nyquist frequency leave the picture there.
     let mut magnitude = Panel::new(omega(), Axis::log10(name, "m/N").range(low / 5.0, high * 2.0))
         .curve(exact_look(Curve::line("exact", &truth.omega, &sizes)));
     let mut phase = Panel::new(omega(), Axis::linear("Phase", "°").step(90.0))
         .curve(exact_look(Curve::line("exact", &truth.omega, &unwrapped(&truth.value))));
     for method in Method::ALL {
-        let found = simulated(Reading::Corrected, case, method, dof)?;
-        let points = |y: &[f64]| Curve::points(method.name(), &found.omega, y).slot(slot(method));
-        magnitude = magnitude.curve(points(&size(&found)));
-        phase = phase.curve(points(&unwrapped(&found.value)));
+        let estimates = simulated(Reading::Corrected, case, method, dof)?;
+        let points =
+            |y: &[f64]| Curve::points(method.name(), &estimates.omega, y).slot(slot(method));
+        magnitude = magnitude.curve(points(&size(&estimates)));
+        phase = phase.curve(points(&unwrapped(&estimates.value)));
     }
     Ok([magnitude, phase])
 }

@@ -69,7 +69,8 @@ mod tests {
 
     use super::*;
 
-    /// The numbered figures that show data, those of Appendices A and C, and those of the first paper.
+    /// The numbered figures that show data, those of Appendices A and C, and those of the first
+    /// paper.
     #[test]
     fn no_figure_is_missing() {
         let mut expected: Vec<String> =

@@ -54,7 +54,8 @@ impl Domain {
         }
     }
 
-    /// The parameters from the sequences of one simulation, in the order of [`Machine::parameters`].
+    /// The parameters from the sequences of one simulation, in the order of
+    /// [`Machine::parameters`].
     pub(crate) fn estimate(
         self,
         reading: Reading,
@@ -83,7 +84,8 @@ pub(crate) enum Equation {
     Discretised,
 }
 
-/// Amplitudes of the identified force (N), one column for each degree of freedom, on the lines 1 … Nt/2 − 1.
+/// Amplitudes of the identified force (N), one column for each degree of freedom, on the lines 1 …
+/// Nt/2 − 1.
 pub(crate) struct ForceLines {
     pub(crate) omega: Vec<f64>,
     pub(crate) amplitude: Vec<Vec<f64>>,
@@ -100,13 +102,13 @@ pub(crate) fn force_lines(
     let sequences = reading.sequences(case, method)?;
     let listed = domain.estimate(reading, case, method, &sequences)?;
     let machine = identified(&sequences, &listed)?;
-    let found = match equation {
+    let force = match equation {
         Equation::Continuous => continuous(&machine, &sequences.response),
         Equation::Discretised => {
             discretised(&machine, &sequences.response, Discretisation::Euler, Extent::WholePeriod)
         }
     };
-    let spectrum = Spectrum::of(found.map_err(|error| error.to_string())?.record());
+    let spectrum = Spectrum::of(force.map_err(|error| error.to_string())?.record());
     let lines = 1..case.nt.div_ceil(2);
     let column = |dof| lines.clone().map(|n| spectrum.line(n, dof).norm()).collect();
     Ok(ForceLines {
@@ -129,7 +131,7 @@ fn identified(sequences: &Sequences, listed: &[f64]) -> Result<SecondOrderSystem
         .map_err(|error| error.to_string())
 }
 
-/// Gives panels that stand side by side one range of ordinates.
+/// Gives panels side by side one range of ordinates.
 pub(crate) fn same_ordinates(panels: Vec<Panel>) -> Vec<Panel> {
     let values = |panel: &Panel| {
         let curves = panel.data().iter().flat_map(|curve| curve.y().iter().copied());

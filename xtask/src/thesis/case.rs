@@ -39,7 +39,7 @@ impl Machine {
 
     /// The "natural frequency" the step size follows from, in rad/s.
     ///
-    /// For the bearing it is the largest damped frequency of the system with −Kyx, whatever the
+    /// For the bearing it is the largest damped frequency of the system with −Kyx, for any
     /// sign the simulation itself uses.
     pub fn omega_n(self) -> f64 {
         match self {

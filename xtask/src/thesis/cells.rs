@@ -1,4 +1,4 @@
-//! Printed cells beside computed ones, with a verdict on each.
+//! Printed and computed cells, with a verdict on each.
 
 use super::case::Machine;
 use super::misprints::{self, Field, MeanMisprint, Misprint};
@@ -6,7 +6,7 @@ use super::published::{Cell, Method, Published};
 use super::results::{Key, Results};
 use super::verdict::{Verdict, compare};
 
-/// A printed number beside ours.
+/// A printed number and ours.
 #[derive(Debug, Clone)]
 pub struct Judged {
     /// Value as printed.
@@ -44,7 +44,7 @@ pub fn rows(table: &str, published: &Published, results: &Results) -> Vec<Row> {
 }
 
 fn row(cell: &Cell, results: &Results) -> Option<Row> {
-    let key = Key::of(cell)?;
+    let key = Key::from_cell(cell)?;
     let estimates = results.get(key)?;
     let machine = key.case().machine;
     let at = machine.parameters().iter().position(|p| *p == cell.parameter)?;
@@ -112,7 +112,7 @@ fn judge_error(
     judged
 }
 
-/// A printed mean error beside the mean of the printed errors and beside ours.
+/// A printed mean error, the mean of the printed errors, and our mean error.
 #[derive(Debug, Clone)]
 pub struct Mean {
     /// Estimated parameter.
@@ -148,9 +148,9 @@ pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
         .collect()
 }
 
-/// Judges a mean: as for a cell, a listed misprint is believed only if a mean of the column confirms the
-/// number it ought to be: of the errors as printed, as printed but for their own misprints, or as we compute
-/// them.
+/// Judges a mean: as for a cell, a listed misprint is believed only if a mean of the column
+/// confirms the number it ought to be: of the errors as printed, as printed but for their own
+/// misprints, or as we compute them.
 fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMisprint>) -> Judged {
     let digits = |r: &&Row| r.error.printed.parse::<f64>().ok();
     let value = average(column.iter().filter_map(digits));

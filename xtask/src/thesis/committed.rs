@@ -1,4 +1,4 @@
-//! Tables, figures and pages as they stand in the repository.
+//! Tables, figures and pages as they are in the repository.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -6,8 +6,9 @@ use std::path::Path;
 /// Difference of two coordinates, in px, that rounding on another processor may make.
 const PIXELS: f64 = 0.1;
 
-/// Returns whether two texts have the same words, and two drawings points that differ by rounding at most.
-pub fn alike(ours: &str, committed: &str) -> bool {
+/// Returns whether two texts have the same words, and two drawings points that differ by rounding
+/// at most.
+pub fn agree(ours: &str, committed: &str) -> bool {
     if ours == committed || !ours.starts_with("<svg") {
         return ours == committed;
     }
@@ -23,21 +24,21 @@ pub fn alike(ours: &str, committed: &str) -> bool {
 /// A drawing cut into numbers and the text between them.
 fn parts(svg: &str) -> Vec<&str> {
     let mut parts = Vec::new();
-    let mut rest = svg;
+    let mut remaining = svg;
     let number = |c: char| c.is_ascii_digit() || c == '.' || c == '-';
-    while let Some(first) = rest.chars().next() {
+    while let Some(first) = remaining.chars().next() {
         let numeric = number(first);
-        let end = rest.find(|c| number(c) != numeric).unwrap_or(rest.len());
-        parts.push(&rest[..end]);
-        rest = &rest[end..];
+        let end = remaining.find(|c| number(c) != numeric).unwrap_or(remaining.len());
+        parts.push(&remaining[..end]);
+        remaining = &remaining[end..];
     }
     parts
 }
 
-/// Files of these kinds in a folder of the repository that nothing makes.
+/// Files of these kinds in a folder of the repository that no task makes.
 ///
 /// # Errors
-/// A sentence naming the folder that cannot be read.
+/// A message with the folder that cannot be read.
 pub fn strays(
     root: &Path,
     folder: &str,
@@ -45,14 +46,14 @@ pub fn strays(
     made: &BTreeSet<String>,
 ) -> Result<Vec<String>, String> {
     let entries = std::fs::read_dir(root.join(folder)).map_err(|e| format!("{folder}: {e}"))?;
-    let mut found: Vec<String> = entries
+    let mut files: Vec<String> = entries
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| endings.iter().any(|ending| name.ends_with(&format!(".{ending}"))))
         .filter(|name| !made.contains(name))
         .map(|name| format!("{folder}/{name} belongs to no table, figure or page"))
         .collect();
-    found.sort();
-    Ok(found)
+    files.sort();
+    Ok(files)
 }
 
 #[cfg(test)]
@@ -61,12 +62,12 @@ mod tests {
 
     #[test]
     fn points_may_move_a_little_and_words_not_at_all() {
-        assert!(!alike("in 1950", "in 1938"));
+        assert!(!agree("in 1950", "in 1938"));
         let drawing = "<svg><path d=\"M1.50 -2.25L3 4\"/><text>12 Hz</text></svg>";
-        assert!(alike(drawing, &drawing.replace("1.50", "1.51")));
+        assert!(agree(drawing, &drawing.replace("1.50", "1.51")));
         for (from, to) in [("1.50", "1.70"), ("L3", "L4"), ("Hz", "N"), ("12", "13"), ("L3 4", "")]
         {
-            assert!(!alike(drawing, &drawing.replace(from, to)), "{from} {to}");
+            assert!(!agree(drawing, &drawing.replace(from, to)), "{from} {to}");
         }
     }
 

@@ -37,7 +37,7 @@ pub fn frequency_offset(sequences: &Sequences) -> Listed {
 }
 
 /// The harmonic offset together with a free coefficient of the force:
-/// K x + i ω C x − g F = ω² M x, with g found beside K and C.
+/// K x + i ω C x − g F = ω² M x, with g estimated together with K and C.
 pub fn frequency_offset_free_force(sequences: &Sequences) -> Listed {
     free_force(sequences, 1)
 }
@@ -95,8 +95,8 @@ pub fn time(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::Euler)
 }
 
-/// Our best estimator on one noise-free period with a known force: exact for a force that is
-/// linear between samples. What error it leaves is the integrator's.
+/// Our best estimator on one noise-free period with a known force: exact for a force that is linear
+/// between samples. The remaining error is the integrator's.
 pub fn best(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::FirstOrderHold)
 }

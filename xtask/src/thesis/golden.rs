@@ -1,14 +1,14 @@
-//! Golden files: our own numbers, many digits, a tripwire and no evidence.
+//! Golden files: our own numbers with many digits, to detect changes; they are not evidence.
 
 use std::path::{Path, PathBuf};
 
-/// Relative difference from which two numbers count as different.
+/// Relative difference above which two numbers differ.
 const TOLERANCE: f64 = 1e-9;
 
-/// Below this share of the largest number of its column a difference is rounding noise.
+/// Fraction of the largest number of its column up to which a difference is rounding.
 const NOISE: f64 = 1e-12;
 
-/// The same for errors in per cent: a value that moved by 1e-9 of itself moves its error by this.
+/// The same for errors in per cent: a relative change of a value by 1e-9 changes its error by this.
 const PERCENT_NOISE: f64 = 100.0 * TOLERANCE;
 
 /// Path of the golden file of a table or figure.
@@ -19,7 +19,7 @@ pub fn path(root: &Path, name: &str) -> PathBuf {
 /// Rewrites a golden file.
 ///
 /// # Errors
-/// A sentence naming the file that cannot be written.
+/// A message with the file that cannot be written.
 pub fn bless(root: &Path, name: &str, csv: &str) -> Result<(), String> {
     let path = path(root, name);
     let words = |e: std::io::Error| format!("{}: {e}", path.display());
@@ -53,10 +53,10 @@ fn compare(name: &str, golden: &Grid, ours: &Grid) -> Vec<String> {
     }
     let columns = golden.iter().map(Vec::len).max().unwrap_or(0);
     let noise: Vec<f64> = (0..columns).map(|c| noise(golden, c)).collect();
-    let mut found = Vec::new();
+    let mut differences = Vec::new();
     for (row, (g, o)) in golden.iter().zip(ours).enumerate() {
         if g.len() != o.len() {
-            found.push(format!(
+            differences.push(format!(
                 "{name}, row {row}: {} cells where golden has {}",
                 o.len(),
                 g.len()
@@ -66,14 +66,15 @@ fn compare(name: &str, golden: &Grid, ours: &Grid) -> Vec<String> {
         for (column, (g, o)) in g.iter().zip(o).enumerate() {
             if !same(g, o, noise[column]) {
                 let head = golden[0].get(column).map_or("", String::as_str);
-                found.push(format!("{name}, row {row}, column {head}: golden {g:?}, now {o:?}"));
+                differences
+                    .push(format!("{name}, row {row}, column {head}: golden {g:?}, now {o:?}"));
             }
         }
     }
-    found
+    differences
 }
 
-/// The absolute difference a column's numbers may have.
+/// The absolute difference allowed for the numbers of a column.
 fn noise(grid: &Grid, column: usize) -> f64 {
     let head = grid.first().and_then(|r| r.get(column)).map_or("", String::as_str);
     if head.ends_with("_percent") {
@@ -94,26 +95,26 @@ fn same(golden: &str, ours: &str, noise: f64) -> bool {
 mod tests {
     use super::*;
 
-    fn found(golden: &str, ours: &str) -> Vec<String> {
+    fn differences_of(golden: &str, ours: &str) -> Vec<String> {
         compare("t", &cells(golden), &cells(ours))
     }
 
     #[test]
     fn rounding_passes_and_a_moved_number_is_named() {
         let golden = "npi,k\n2,5000.0\n4,0.0\n";
-        assert!(found(golden, "npi,k\n2,5000.000000001\n4,1e-12\n").is_empty());
-        assert!(found("e_percent\n1e-7\n", "e_percent\n1.5e-7\n").is_empty());
-        assert_eq!(found("e_percent\n1e-7\n", "e_percent\n3e-7\n").len(), 1);
+        assert!(differences_of(golden, "npi,k\n2,5000.000000001\n4,1e-12\n").is_empty());
+        assert!(differences_of("e_percent\n1e-7\n", "e_percent\n1.5e-7\n").is_empty());
+        assert_eq!(differences_of("e_percent\n1e-7\n", "e_percent\n3e-7\n").len(), 1);
         assert_eq!(
-            found(golden, "npi,k\n2,5000.1\n4,0.0\n"),
+            differences_of(golden, "npi,k\n2,5000.1\n4,0.0\n"),
             ["t, row 1, column k: golden \"5000.0\", now \"5000.1\""]
         );
     }
 
     #[test]
     fn words_and_shapes_must_agree() {
-        assert_eq!(found("v\nto the digit\n", "v\nunexplained\n").len(), 1);
-        assert_eq!(found("v\n1\n", "v\n1\n2\n").len(), 1);
-        assert_eq!(found("v\n1\n", "v\n1,2\n").len(), 1);
+        assert_eq!(differences_of("v\nto the digit\n", "v\nunexplained\n").len(), 1);
+        assert_eq!(differences_of("v\n1\n", "v\n1\n2\n").len(), 1);
+        assert_eq!(differences_of("v\n1\n", "v\n1,2\n").len(), 1);
     }
 }

@@ -1,9 +1,9 @@
 //! Appendix B: estimates on records refined by straight lines.
 //!
-//! The text names neither the integrator nor what was interpolated. What stands here is the plain
+//! The text names neither the integrator nor the interpolated quantities. This is the plain
 //! reading: Newmark, Nt = 128, displacement, velocity and force refined together. It does not give
-//! the printed numbers, nor does any other reading we tried. The shape of the printed columns, K and
-//! C falling steeply from NPI 6 to 10, belongs to a first period from rest, not to the periodic
+//! the printed numbers, nor does any other reading we tried. The shape of the printed columns, K
+//! and C falling steeply from NPI 6 to 10, belongs to a first period from rest, not to the periodic
 //! steady state of the other tables; no such run gave the digits either.
 
 use mechid::estimate::Unknowns;
@@ -22,7 +22,7 @@ use super::verdict::Verdict;
 /// Tables B1 and B2.
 ///
 /// # Errors
-/// The words of the estimation that fails.
+/// The message of the estimation that fails.
 pub fn rows(table: &str, published: &Published) -> Result<Vec<Row>, String> {
     let points = if table == "B1" { 1 } else { 2 };
     published.table(table).map(|cell| row(cell, points)).collect()
@@ -57,7 +57,7 @@ fn row(cell: &Cell, points: usize) -> Result<Row, String> {
 /// Estimates on records with `factor − 1` further instants in every interval.
 ///
 /// # Errors
-/// The words of the interpolation or the estimation that fails.
+/// The message of the interpolation or the estimation that fails.
 pub fn refined(
     sequences: &Sequences,
     factor: usize,

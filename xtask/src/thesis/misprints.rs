@@ -14,7 +14,7 @@ pub enum Field {
 /// A printed number known to be wrong.
 #[derive(Debug, Clone, Copy)]
 pub struct Misprint {
-    /// Table it stands in.
+    /// Table of the misprint.
     pub table: &'static str,
     /// Column.
     pub method: Method,
@@ -114,7 +114,7 @@ pub const CELLS: &[Misprint] = &[
 /// A mean-error entry that is not the mean of its column.
 #[derive(Debug, Clone, Copy)]
 pub struct MeanMisprint {
-    /// Table it stands in.
+    /// Table of the misprint.
     pub table: &'static str,
     /// Column.
     pub method: Method,

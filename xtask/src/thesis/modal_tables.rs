@@ -1,7 +1,7 @@
 //! Appendix E: modal parameters of the two-mass system of Steffen & Rade (1991).
 //!
 //! Step size and forced mass of the identified rows are not printed. Ours are stated in
-//! [`SETTING`]; what can be judged to the digit are the theoretical rows.
+//! [`SETTING`]; only the theoretical rows can be judged to the digit.
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::time_domain::TimeDomain;
@@ -14,10 +14,10 @@ use nalgebra::{Complex, DMatrix};
 use super::published::{Cell, Method, Published};
 use super::verdict::{Verdict, compare};
 
-/// Choices where the text is silent.
+/// Choices that the text does not state.
 pub const SETTING: &str = "Nt = 2048, amplitude 1 N on the first mass, NPI = 20 on the larger damped frequency, RK4 with a linear mid-step force";
 
-/// A printed modal parameter beside ours.
+/// A printed modal parameter and ours.
 #[derive(Debug, Clone)]
 pub struct ModalRow {
     /// Printed cell.
@@ -26,7 +26,7 @@ pub struct ModalRow {
     pub value: Complex<f64>,
     /// Verdict of the comparison.
     pub verdict: Verdict,
-    /// Reason, where it is a misprint.
+    /// Reason of a misprint.
     pub reason: Option<&'static str>,
     /// Value from the response without Euler's bias; `None` for theoretical rows.
     pub best: Option<Complex<f64>>,
@@ -35,7 +35,7 @@ pub struct ModalRow {
 /// Tables E1, E2 and the reproduced table of Steffen & Rade.
 ///
 /// # Errors
-/// The words of the estimation that fails.
+/// The message of the estimation that fails.
 pub fn rows(table: &str, published: &Published) -> Result<Vec<ModalRow>, String> {
     let theory = modal(&steffen_rade())?;
     let scheme: Option<Box<dyn Scheme>> = match table {
@@ -84,7 +84,7 @@ fn identify(scheme: &dyn Scheme, discretisation: Discretisation) -> Result<Modal
 /// The true modal parameters.
 ///
 /// # Errors
-/// The eigenvalue solver's own words.
+/// The message of the eigenvalue solver.
 pub fn theory() -> Result<Modal, String> {
     modal(&steffen_rade())
 }
@@ -93,7 +93,7 @@ pub fn theory() -> Result<Modal, String> {
 /// NPI.
 ///
 /// # Errors
-/// The integrator's own words.
+/// The message of the integrator.
 pub fn simulate(scheme: &dyn Scheme, npi: f64) -> Result<(Record, Response), String> {
     let system = steffen_rade();
     let words = |e: &dyn std::fmt::Display| e.to_string();
@@ -109,10 +109,10 @@ pub fn simulate(scheme: &dyn Scheme, npi: f64) -> Result<(Record, Response), Str
     Ok((force, motion))
 }
 
-/// The modal parameters that least squares over the whole period find.
+/// The modal parameters by least squares over the whole period.
 ///
 /// # Errors
-/// The estimator's own words.
+/// The message of the estimator.
 pub fn identified(
     force: &Record,
     displacement: &Record,

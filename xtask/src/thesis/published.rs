@@ -39,7 +39,7 @@ impl Method {
         Method::WilsonTheta,
     ];
 
-    /// The name a reader sees.
+    /// Name for a reader.
     pub fn name(self) -> &'static str {
         match self {
             Method::Rk4 => "Runge-Kutta 4",
@@ -117,7 +117,7 @@ impl Published {
     /// Reads `tests/published/*.csv` below the project's root.
     ///
     /// # Errors
-    /// A sentence naming the file that cannot be read.
+    /// A message with the file that cannot be read.
     pub fn read(root: &Path) -> Result<Self, String> {
         let folder = root.join("tests/published");
         let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)

@@ -11,18 +11,18 @@ use super::results::Results;
 use super::{audit, committed, golden, tables};
 use crate::{drawing, figures};
 
-/// One table or figure: its data, and how a reader sees it.
+/// One table or figure: its data and its form for a reader.
 #[derive(Debug, Clone)]
 pub struct Artefact {
     /// File stem, such as `table-5.6.4` or `figure-5.2.4`.
     pub name: String,
     /// All digits of its data; `None` for a drawing.
     pub csv: Option<String>,
-    /// Form in which a reader sees it.
+    /// Form for a reader.
     pub view: View,
 }
 
-/// Form in which a reader sees an artefact.
+/// Form of an artefact for a reader.
 #[derive(Debug, Clone)]
 pub enum View {
     /// A table.
@@ -32,7 +32,7 @@ pub enum View {
 }
 
 impl Artefact {
-    /// Name of the file that a reader looks at.
+    /// Name of the file for a reader.
     fn file(&self) -> String {
         format!("{}.{}", self.name, self.view.ending())
     }
@@ -52,8 +52,8 @@ impl View {
         }
     }
 
-    /// Returns its caption: the first sentence below the heading of a table, the title of a figure without its
-    /// `number`.
+    /// Returns its caption: the first sentence below the heading of a table, the title of a figure
+    /// without its `number`.
     fn caption(&self, number: &str) -> &str {
         match self {
             View::Markdown(text) => {
@@ -75,14 +75,14 @@ impl View {
 pub struct Reproduction {
     /// Tables, then figures.
     pub artefacts: Vec<Artefact>,
-    /// Pages that belong to no single table or figure: file name and Markdown.
+    /// Pages without a table or figure of their own: file name and Markdown.
     pub pages: Vec<(&'static str, String)>,
 }
 
 /// Computes every table and every figure; `tick` is called [`ticks`] times.
 ///
 /// # Errors
-/// The words of the computation that fails.
+/// The message of the computation that fails.
 pub fn all(root: &Path, tick: impl Fn() + Sync) -> Result<Reproduction, String> {
     let published = Published::read(root)?;
     let results = Results::compute(&published, &tick)?;
@@ -113,13 +113,13 @@ pub fn all(root: &Path, tick: impl Fn() + Sync) -> Result<Reproduction, String> 
 /// Returns the number of times that [`all`] ticks.
 ///
 /// # Errors
-/// A sentence naming the published file that cannot be read.
+/// A message with the published file that cannot be read.
 pub fn ticks(root: &Path) -> Result<usize, String> {
     Ok(Results::keys(&Published::read(root)?).len() + figures::numbers().len())
 }
 
-/// Returns whether `only` names the artefact `name` or a part of the dissertation it belongs to: `5.6`
-/// means 5.6.1, 5.6.2 and so on, `P1` the first paper, `figure-5.2.4` the figure alone.
+/// Returns whether `only` names the artefact `name` or a part of the dissertation that contains it:
+/// `5.6` means 5.6.1, 5.6.2 and so on, `P1` the first paper, `figure-5.2.4` only the figure.
 fn selects(only: &str, name: &str) -> bool {
     let number = name.split_once('-').map_or(name, |(_, number)| number);
     let begins = |text: &str| {
@@ -149,7 +149,7 @@ fn index(artefacts: &[Artefact]) -> String {
     text
 }
 
-/// Key by which table 5.6.2 comes before table 5.6.10, and tables before figures.
+/// Sort key: table 5.6.2 before table 5.6.10, and tables before figures.
 fn natural(name: &str) -> (bool, Vec<(usize, String)>) {
     let pieces = name.split(['-', '.']).map(|piece| match piece.parse() {
         Ok(number) => (number, String::new()),
@@ -162,7 +162,7 @@ impl Reproduction {
     /// Keeps only the tables and figures of that number or part.
     ///
     /// # Errors
-    /// A sentence with the names there are.
+    /// A message with the names that exist.
     pub fn only(self, number: &str) -> Result<Self, String> {
         let (artefacts, others): (Vec<_>, Vec<_>) =
             self.artefacts.into_iter().partition(|a| selects(number, &a.name));
@@ -179,7 +179,7 @@ impl Reproduction {
     /// Writes all files below `folder`, figures as SVG and PNG; returns how many.
     ///
     /// # Errors
-    /// A sentence naming the file that cannot be written.
+    /// A message with the file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<usize, String> {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let written: Result<Vec<usize>, String> =
@@ -195,43 +195,43 @@ impl Reproduction {
         self.golden().count()
     }
 
-    /// Names and data of what has a golden file; a drawing has none.
+    /// Names and data of the artefacts with a golden file; a drawing has none.
     fn golden(&self) -> impl Iterator<Item = (&str, &str)> {
         self.artefacts.iter().filter_map(|a| Some((a.name.as_str(), a.csv.as_deref()?)))
     }
 
-    /// Every difference from the golden files and from the tables, figures and pages in the repository,
-    /// one sentence each; of a complete reproduction (`whole`) files that it does not make, too.
+    /// Every difference from the golden files and from the tables, figures and pages in the
+    /// repository, one sentence each; for a complete reproduction (`whole`) also superfluous files.
     ///
     /// # Errors
-    /// A sentence naming the folder that cannot be read.
+    /// A message with the folder that cannot be read.
     pub fn differences(&self, root: &Path, whole: bool) -> Result<Vec<String>, String> {
         let of_golden = |(name, csv)| golden::differences(root, name, csv);
-        let mut found: Vec<String> = self.golden().flat_map(of_golden).collect();
+        let mut differences: Vec<String> = self.golden().flat_map(of_golden).collect();
         let views = self.artefacts.iter().map(|a| (a.file(), a.view.text()));
         let pages = self.pages.iter().map(|(name, text)| ((*name).to_owned(), text.as_str()));
         let mut made = BTreeSet::new();
         for (file, text) in views.chain(pages) {
             let path = root.join("docs/thesis").join(&file);
             match std::fs::read_to_string(&path) {
-                Ok(committed) if committed::alike(text, &committed) => {}
-                Ok(_) => found.push(format!("docs/thesis/{file} is not what is computed")),
-                Err(e) => found.push(format!("docs/thesis/{file}: {e}")),
+                Ok(committed) if committed::agree(text, &committed) => {}
+                Ok(_) => differences.push(format!("docs/thesis/{file} is not what is computed")),
+                Err(e) => differences.push(format!("docs/thesis/{file}: {e}")),
             }
             made.insert(file);
         }
         if whole {
             let golden = self.golden().map(|(name, _)| format!("{name}.csv")).collect();
-            found.extend(committed::strays(root, "tests/golden", &["csv"], &golden)?);
-            found.extend(committed::strays(root, "docs/thesis", &["md", "svg"], &made)?);
+            differences.extend(committed::strays(root, "tests/golden", &["csv"], &golden)?);
+            differences.extend(committed::strays(root, "docs/thesis", &["md", "svg"], &made)?);
         }
-        Ok(found)
+        Ok(differences)
     }
 
     /// Rewrites the golden files.
     ///
     /// # Errors
-    /// A sentence naming the file that cannot be written.
+    /// A message with the file that cannot be written.
     pub fn bless(&self, root: &Path) -> Result<(), String> {
         self.golden().try_for_each(|(name, csv)| golden::bless(root, name, csv))
     }

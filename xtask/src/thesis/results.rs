@@ -10,7 +10,7 @@ use super::published::{Cell, Method, Published};
 use super::simulate::{Sequences, correct, slipped_but};
 use super::slips::Slip;
 
-/// Identity of one estimation: a printed row's settings and its column.
+/// Identity of one estimation: the settings of a printed row, and its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
     /// Time or frequency.
@@ -28,8 +28,8 @@ pub struct Key {
 }
 
 impl Key {
-    /// The settings of a printed cell; `None` where the text does not state them.
-    pub fn of(cell: &Cell) -> Option<Self> {
+    /// The settings of a printed cell; `None` if the text does not state them.
+    pub fn from_cell(cell: &Cell) -> Option<Self> {
         if !Method::ALL.contains(&cell.method) || cell.table.starts_with('E') {
             return None;
         }
@@ -85,10 +85,10 @@ pub struct Estimates {
 pub struct Results(BTreeMap<Key, Estimates>);
 
 impl Results {
-    /// Runs every estimation that a printed cell asks for; `tick` is called after each.
+    /// Runs the estimations of all printed cells; `tick` is called after each.
     ///
     /// # Errors
-    /// The words of the first estimation that fails.
+    /// The message of the first estimation that fails.
     pub fn compute(published: &Published, tick: impl Fn() + Sync) -> Result<Self, String> {
         let keys = Self::keys(published);
         let estimates: Result<Vec<(Key, Estimates)>, String> = keys
@@ -104,16 +104,16 @@ impl Results {
 
     /// The keys of the printed cells, each once.
     pub fn keys(published: &Published) -> Vec<Key> {
-        let mut keys: Vec<Key> = published.cells.iter().filter_map(Key::of).collect();
+        let mut keys: Vec<Key> = published.cells.iter().filter_map(Key::from_cell).collect();
         keys.sort_unstable();
         keys.dedup();
         keys
     }
 
-    /// The same results with one slip undone in the replay, to count what it is needed for.
+    /// The same results with one slip undone in the replay, to count the cells that need it.
     ///
     /// # Errors
-    /// The words of the first estimation that fails.
+    /// The message of the first estimation that fails.
     pub fn undone(&self, slip: Slip) -> Result<Self, String> {
         let replayed: Result<Vec<(Key, Estimates)>, String> = self
             .0

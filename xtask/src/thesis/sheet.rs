@@ -1,4 +1,4 @@
-//! A table on its way to CSV and Markdown.
+//! A table to be written as CSV and Markdown.
 
 use std::fmt::Write as _;
 
@@ -40,12 +40,12 @@ impl Sheet {
     }
 }
 
-/// Every digit of a number, for the files a comparison reads; empty where there is none.
+/// Every digit of a number, for the files of a comparison; empty without a number.
 pub fn exact(value: f64) -> String {
     if value.is_finite() { format!("{value:?}") } else { String::new() }
 }
 
-/// Enough digits to read beside a printed number; a dash where there is none.
+/// Enough digits for a comparison with a printed number; a dash without a number.
 pub fn short(value: f64) -> String {
     match value.abs() {
         v if !v.is_finite() => "–".to_owned(),

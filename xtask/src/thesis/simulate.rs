@@ -1,4 +1,4 @@
-//! The five integrations of one case: as the equations ask, and with the slips replayed.
+//! The five integrations of one case: as the equations require, and with the slips replayed.
 
 use mechid::integrate::{
     CentralDifference, Houbolt, Newmark, RungeKutta4, SampledForce, Scheme, WilsonTheta,
@@ -18,7 +18,7 @@ pub struct Sequences {
     pub machine: Machine,
     /// Displacement, velocity, acceleration.
     pub response: Response,
-    /// The force the estimator is told.
+    /// The force that the estimator uses.
     pub force: Record,
 }
 
@@ -33,10 +33,10 @@ pub fn scheme(method: Method) -> Box<dyn Scheme> {
     }
 }
 
-/// The periodic steady state of a scheme on the system of eq. (4.2.3), nothing misplaced.
+/// The periodic steady state of a scheme on the system of eq. (4.2.3), without slips.
 ///
 /// # Errors
-/// The integrator's own words.
+/// The message of the integrator.
 pub fn correct(case: Case, method: Method) -> Result<Sequences, String> {
     let machine = match case.machine {
         Machine::Bearing { .. } => Machine::Bearing { kyx: KyxSign::Minus },
@@ -48,18 +48,18 @@ pub fn correct(case: Case, method: Method) -> Result<Sequences, String> {
     Ok(Sequences { machine, response, force })
 }
 
-/// The sequences the original programs worked on: the same library, the slips applied.
+/// The sequences of the original programs: the same library, with the slips.
 ///
 /// # Errors
-/// The integrator's own words.
+/// The message of the integrator.
 pub fn slipped(case: Case, method: Method) -> Result<Sequences, String> {
     slipped_but(case, method, None)
 }
 
-/// The same with one slip undone, to see what it alone is needed for.
+/// The same with one slip undone, to find the cells that need it.
 ///
 /// # Errors
-/// The integrator's own words.
+/// The message of the integrator.
 pub fn slipped_but(case: Case, method: Method, undone: Option<Slip>) -> Result<Sequences, String> {
     let words = |e| format!("{}: {e}", method.name());
     let applied = |slip| undone != Some(slip);

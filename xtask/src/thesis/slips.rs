@@ -1,7 +1,7 @@
 //! The dissertation's departures from its own equations, as named data.
 //!
 //! The library knows none of them. The reproduction applies them to correct library
-//! output, and prints the correct result beside the slipped one.
+//! output, and prints the correct result next to the slipped one.
 
 use mechid::signal::Record;
 use nalgebra::DMatrix;
@@ -38,7 +38,7 @@ impl Slip {
     ];
 
     /// The slips that the reproduction of a table replays.
-    pub fn of_table(table: &str) -> Vec<Self> {
+    pub fn for_table(table: &str) -> Vec<Self> {
         let frequency =
             table.starts_with("5.3.") || table.starts_with("5.7.") || table.starts_with('A');
         let bearing = !table.starts_with("5.2.") && !table.starts_with("5.3.");
@@ -73,7 +73,7 @@ impl Slip {
     }
 
     /// Returns the printed numbers that it belongs to.
-    pub fn place(self) -> &'static str {
+    pub fn printed_numbers(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "all central-difference columns",
             Slip::WilsonLoadLag => "all Wilson θ columns",
@@ -89,7 +89,7 @@ impl Slip {
         }
     }
 
-    /// Returns what the original programs did.
+    /// Returns the computation of the original programs.
     pub fn done(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => {
@@ -114,7 +114,7 @@ impl Slip {
         }
     }
 
-    /// Returns what the dissertation's own equations ask for.
+    /// Returns the requirement of the dissertation's own equations.
     pub fn right(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "x, v, a and F of the same instant",
@@ -130,13 +130,13 @@ impl Slip {
     }
 }
 
-/// The force as the original Runge-Kutta program saw it: at the samples, and in the middle
-/// of the step that follows each sample.
+/// The force of the original Runge-Kutta program: at the samples, and in the middle of the step
+/// that follows each sample.
 ///
-/// Written out, the four stages of step k were given F0 F0 F0 F0 (k = 0), F0 F1 F1 F2 (k = 1)
-/// and F_k F_{k+1} F_{k+1} F_{k+1} (k ≥ 2), every period anew. That is a classical step on
-/// a force whose sample 1 repeats sample 0, and whose mid-step values are taken half a step late
-/// (half a step early in the first two steps).
+/// Written out, the four stages of step k were given F0 F0 F0 F0 (k = 0), F0 F1 F1 F2 (k = 1) and
+/// F_k F_{k+1} F_{k+1} F_{k+1} (k ≥ 2), every period anew. That is a classical step on a force
+/// whose sample 1 repeats sample 0, and whose mid-step values are taken half a step late (half a
+/// step early in the first two steps).
 pub fn stage_loads(force: &Record) -> (Record, Record) {
     let n = force.len();
     let samples =

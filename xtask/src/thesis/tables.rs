@@ -1,4 +1,4 @@
-//! The dissertation's tables as CSV and Markdown, printed values beside computed ones.
+//! The dissertation's tables as CSV and Markdown, printed values next to computed ones.
 
 use std::fmt::Write as _;
 
@@ -17,7 +17,7 @@ use super::{interpolated, slips::Slip};
 pub struct Table {
     /// Its number in the dissertation.
     pub number: String,
-    /// All digits: what the golden comparison reads.
+    /// All digits, for the golden comparison.
     pub csv: String,
     /// Page for the reader.
     pub markdown: String,
@@ -26,7 +26,7 @@ pub struct Table {
 /// Every table.
 ///
 /// # Errors
-/// The words of the estimation that fails.
+/// The message of the estimation that fails.
 pub fn all(published: &Published, results: &Results) -> Result<Vec<Table>, String> {
     published.tables().map(|number| table(number, published, results)).collect()
 }
@@ -196,7 +196,7 @@ fn heading(number: &str, rows: &[Row]) -> String {
     if number.starts_with('B') {
         text.push_str("Neither the integrator nor the procedure is named in the text; *Reproduced* is Newmark with displacement, velocity and force refined by straight lines.\n\n");
     } else {
-        let replayed: Vec<&str> = Slip::of_table(number).into_iter().map(Slip::name).collect();
+        let replayed: Vec<&str> = Slip::for_table(number).into_iter().map(Slip::name).collect();
         let _ = writeln!(
             text,
             "*Reproduced* replays these slips: {}. *Without slips* is the same estimator on the same scheme, nothing misplaced (Runge-Kutta with a linear mid-step force). *Best estimator* is the exact first-order-hold fit on that response: what error it leaves is the integrator's.\n",

@@ -1,4 +1,4 @@
-//! Does a computed number give the printed digits?
+//! Agreement of a computed number with the printed digits.
 
 /// Relation of a printed number to the one computed from its recipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -7,9 +7,9 @@ pub enum Verdict {
     ToTheDigit,
     /// One unit in the last printed place off: rounded twice, or formed from other printed numbers.
     Rounding,
-    /// Not equal, and known to be printed wrongly; the reason is in the list of misprints.
+    /// A known misprint; the reason is in the list of misprints.
     Misprint,
-    /// Not equal, and we do not know why.
+    /// A difference without a known reason.
     Unexplained,
 }
 
@@ -18,7 +18,7 @@ impl Verdict {
     pub const ALL: [Verdict; 4] =
         [Verdict::ToTheDigit, Verdict::Rounding, Verdict::Misprint, Verdict::Unexplained];
 
-    /// The words of the tables.
+    /// The message of the tables.
     pub fn words(self) -> &'static str {
         match self {
             Verdict::ToTheDigit => "to the digit",
@@ -46,13 +46,13 @@ impl Decimal {
 
 /// Compares `value` with a printed number by its printed digits alone.
 ///
-/// Returns [`Verdict::Unexplained`] where neither truncation, rounding nor a slip of one
-/// unit in the last place explains the difference; whether that is a known misprint is
-/// for the caller to say.
+/// Returns [`Verdict::Unexplained`] if neither truncation, rounding nor a slip of one unit in the
+/// last place explains the difference; the caller decides whether it is a known misprint.
 pub fn compare(value: f64, printed: &str) -> Verdict {
     let Some(decimal) = Decimal::parse(printed) else { return Verdict::Unexplained };
     let scaled = value * 10f64.powi(decimal.places as i32);
-    // A value that is the printed decimal but for its last bit must not truncate to the one below.
+    // A value that equals the printed decimal up to its last bit must not be truncated to the
+    // decimal below.
     let slack = 1e-9 * scaled.abs().max(1.0);
     let truncated = (scaled.trunc(), (scaled + scaled.signum() * slack).trunc());
     let printed = decimal.units as f64;

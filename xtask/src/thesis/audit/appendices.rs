@@ -16,7 +16,7 @@ use super::rerun::percent;
 /// further points in every interval.
 ///
 /// # Errors
-/// The words of the step that fails.
+/// The message of the step that fails.
 pub fn refined_errors(
     points: usize,
     interpolation: Interpolation,
@@ -24,14 +24,15 @@ pub fn refined_errors(
 ) -> Result<Vec<f64>, String> {
     let case = Case { machine: Machine::SDOF, nt: 128, npi };
     let coarse = correct(case, Method::Newmark)?;
-    let found = interpolated::refined(&coarse, points + 1, interpolation, Discretisation::Euler)?;
-    Ok(percent(&found, case.machine))
+    let estimates =
+        interpolated::refined(&coarse, points + 1, interpolation, Discretisation::Euler)?;
+    Ok(percent(&estimates, case.machine))
 }
 
 /// Errors in per cent of damped frequency, damping ratio and shape ratio of both modes.
 ///
 /// # Errors
-/// The words of the step that fails.
+/// The message of the step that fails.
 pub fn modal_errors(
     source: Source,
     method: Method,
@@ -42,8 +43,9 @@ pub fn modal_errors(
     let leads = source == Source::Printed && method == Method::CentralDifference;
     let displacement =
         if leads { one_sample_early(motion.displacement()) } else { motion.displacement().clone() };
-    let found = modal_tables::identified(&force, &displacement, motion.velocity(), discretisation)?;
+    let estimates =
+        modal_tables::identified(&force, &displacement, motion.velocity(), discretisation)?;
     let error = |f: Complex<f64>, t: Complex<f64>| 100.0 * (f - t).norm() / t.norm();
-    let pairs = found.into_iter().flatten().zip(modal_tables::theory()?.into_iter().flatten());
+    let pairs = estimates.into_iter().flatten().zip(modal_tables::theory()?.into_iter().flatten());
     Ok(pairs.map(|(f, t)| error(f, t)).collect())
 }

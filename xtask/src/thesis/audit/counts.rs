@@ -1,4 +1,4 @@
-//! Numbers of printed values that come out, table by table.
+//! Number of printed values that are reproduced, table by table.
 
 use super::super::cells::Judged;
 use super::super::published::{Cell, Method};
@@ -14,7 +14,7 @@ pub struct Counts {
 
 impl Counts {
     /// Numbers whose settings the text does not state, `unstated` of them, are unexplained.
-    fn of<'a>(judged: impl Iterator<Item = &'a Judged>, unstated: usize) -> Self {
+    fn from_judged<'a>(judged: impl Iterator<Item = &'a Judged>, unstated: usize) -> Self {
         let mut counts = Self::default();
         counts.verdicts[Verdict::Unexplained as usize] = unstated;
         for j in judged.filter(|j| !j.printed.is_empty()) {
@@ -47,16 +47,16 @@ impl Counts {
 }
 
 /// Estimates, errors and mean rows of one table.
-pub fn of_table(evidence: &Evidence, table: &str) -> [Counts; 3] {
+pub fn for_table(evidence: &Evidence, table: &str) -> [Counts; 3] {
     let (rows, means) = (evidence.rows(table), evidence.means(table));
     let unstated = |printed: fn(&Cell) -> &str| {
         let cells = evidence.published.table(table);
         cells.filter(|c| c.method == Method::Unspecified && !printed(c).is_empty()).count()
     };
     [
-        Counts::of(rows.iter().map(|r| &r.estimate), unstated(|c| &c.estimate)),
-        Counts::of(rows.iter().map(|r| &r.error), unstated(|c| &c.error_percent)),
-        Counts::of(means.iter().map(|m| &m.printed), 0),
+        Counts::from_judged(rows.iter().map(|r| &r.estimate), unstated(|c| &c.estimate)),
+        Counts::from_judged(rows.iter().map(|r| &r.error), unstated(|c| &c.error_percent)),
+        Counts::from_judged(means.iter().map(|m| &m.printed), 0),
     ]
 }
 
@@ -65,7 +65,7 @@ pub fn in_all(evidence: &Evidence) -> [Counts; 3] {
     evidence
         .tables
         .iter()
-        .map(|t| of_table(evidence, t))
+        .map(|t| for_table(evidence, t))
         .fold([Counts::default(); 3], |sum, more| std::array::from_fn(|i| sum[i].plus(more[i])))
 }
 
@@ -75,7 +75,7 @@ pub fn section(evidence: &Evidence) -> String {
         let numbers = counts.iter().flat_map(Counts::cells);
         std::iter::once(name.to_owned()).chain(numbers).collect()
     };
-    let tables = evidence.tables.iter().map(|t| (t.as_str(), of_table(evidence, t)));
+    let tables = evidence.tables.iter().map(|t| (t.as_str(), for_table(evidence, t)));
     let identified = tables.filter(|(_, counts)| counts[0].total() > 0);
     let rows: Vec<Vec<String>> = identified
         .map(|(t, counts)| row(t, counts))

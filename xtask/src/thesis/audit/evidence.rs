@@ -56,13 +56,13 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Table 5.6.10 after 5.6.9: the numbers in the name count, not its letters.
+/// Table 5.6.10 comes after 5.6.9: the numbers in the name decide the order.
 fn sorting(table: &str) -> Vec<(bool, u32, String)> {
     let part = |p: &str| (p.parse::<u32>().is_err(), p.parse().unwrap_or(0), p.to_owned());
     table.split('.').map(part).collect()
 }
 
-/// Numbers that a claim is held against.
+/// Numbers with which a claim is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
     /// The printed ones (for reruns: with every slip replayed).
@@ -130,7 +130,7 @@ impl View<'_> {
 
     /// The error in % of one cell.
     ///
-    /// Not a number where the table has no such cell: every comparison with it is false.
+    /// NaN if the table has no such cell: every comparison with it is false.
     pub fn error(&self, table: &str, method: Method, npi: f64) -> f64 {
         let at = |(n, _): &&(f64, f64)| *n == npi;
         self.series(table, method).iter().find(at).map_or(f64::NAN, |(_, e)| *e)

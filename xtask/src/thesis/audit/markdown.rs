@@ -14,7 +14,7 @@ pub fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Stri
     text
 }
 
-/// Three digits, which is what an argument needs and what no machine's rounding changes.
+/// Three digits: enough for an argument, and independent of the rounding of the computer.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {

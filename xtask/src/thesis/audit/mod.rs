@@ -1,4 +1,4 @@
-//! The audit page: what was checked in the dissertation, what came out, what one learns.
+//! The audit page: the checks of the dissertation, their results and the lessons.
 
 mod appendices;
 pub mod claims;
@@ -19,7 +19,7 @@ use super::results::Results;
 /// The audit page, in Markdown, from what is printed and what is computed.
 ///
 /// # Errors
-/// The words of the first computation that fails.
+/// The message of the first computation that fails.
 pub fn page(published: &Published, results: &Results) -> Result<String, String> {
     let evidence = Evidence::new(published, results);
     let judged = claims::judge_all(&evidence)?;
@@ -37,7 +37,7 @@ pub fn page(published: &Published, results: &Results) -> Result<String, String> 
 /// Every claim with both verdicts.
 ///
 /// # Errors
-/// The words of the first rerun that fails.
+/// The message of the first rerun that fails.
 pub fn verdicts(published: &Published, results: &Results) -> Result<Vec<claims::Judged>, String> {
     claims::judge_all(&Evidence::new(published, results))
 }

@@ -1,4 +1,4 @@
-//! Simulations and estimates that no printed table asks for.
+//! Simulations and estimates without a printed table.
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::frequency_domain::equation_error;
@@ -18,7 +18,7 @@ use super::markdown::number;
 /// One period of motion and force, with the slips or without.
 ///
 /// # Errors
-/// The integrator's own words.
+/// The message of the integrator.
 pub fn sequences(source: Source, case: Case, method: Method) -> Result<Sequences, String> {
     match source {
         Source::Printed => simulate::slipped(case, method),
@@ -38,7 +38,7 @@ pub enum Domain {
 /// Estimates in the order of `Machine::parameters`.
 ///
 /// # Errors
-/// The words of the integrator or the estimator.
+/// The message of the integrator or the estimator.
 pub fn identified(
     source: Source,
     case: Case,
@@ -61,7 +61,7 @@ pub fn identified(
 /// Errors of [`identified`] in per cent.
 ///
 /// # Errors
-/// As [`identified`].
+/// The errors of [`identified`].
 pub fn errors(
     source: Source,
     case: Case,
@@ -74,7 +74,7 @@ pub fn errors(
 /// Errors in per cent of least squares on the lines 1 … `last` of a motion without slips.
 ///
 /// # Errors
-/// The estimator's own words.
+/// The message of the estimator.
 pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, String> {
     let machine = sequences.machine;
     let displacement = sequences.response.displacement();
@@ -90,6 +90,10 @@ pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, S
         Unknowns::known_mass(machine.system().mass()).map_err(|error| error.to_string())?;
     let found = equation_error(&data, &unknowns).map_err(|error| error.to_string())?;
     Ok(percent(&machine.listed(&found.stiffness(), &found.damping()), machine))
+    .map_err(words)?;
+    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
+    let estimate = equation_error(&data, &unknowns).map_err(words)?;
+    Ok(percent(&machine.listed(&estimate.stiffness(), &estimate.damping()), machine))
 }
 
 /// |estimate − truth| in per cent of the truth.
@@ -111,16 +115,16 @@ fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String>
     SecondOrderSystem::new(mass, matrix(damping), matrix(stiffness)).map_err(|e| e.to_string())
 }
 
-/// Machine with which a force is sought.
+/// Machine for the identification of a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameters {
     /// The true one.
     Exact,
-    /// The one identified from the same data.
+    /// The machine identified from the same data.
     From(Domain),
 }
 
-/// Equation by which a force is sought.
+/// Equation for the identification of a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Equation {
     /// Sample by sample, eq. (4.8.1).
@@ -142,16 +146,16 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// Computes the errors of a force sought in given sequences.
+    /// Computes the errors of the force identified from given sequences.
     ///
     /// # Errors
-    /// The words of the force equation.
-    pub fn of(
+    /// The message of the force equation.
+    pub fn new(
         sequences: &Sequences,
         machine: &SecondOrderSystem,
         equation: Equation,
     ) -> Result<Self, String> {
-        let found = match equation {
+        let force = match equation {
             Equation::Continuous => continuous(machine, &sequences.response),
             Equation::Taylor(order) => {
                 discretised_by_taylor(machine, &sequences.response, order, Extent::WholePeriod)
@@ -166,7 +170,7 @@ impl Ratios {
         let driven = machine.dof() - 1;
         let truth = Spectrum::of(&sequences.force);
         let ratios =
-            spectrum_ratio(found.spectrum(), &truth, driven, &lines).map_err(|e| e.to_string())?;
+            spectrum_ratio(force.spectrum(), &truth, driven, &lines).map_err(|e| e.to_string())?;
         Ok(Self { omega0: sampling.omega0(), ratios })
     }
 
@@ -211,10 +215,10 @@ impl Ratios {
     }
 }
 
-/// The force of one case, sought with one machine and one equation.
+/// The force of one case, identified with one machine and one equation.
 ///
 /// # Errors
-/// The words of the integrator, the estimator or the force equation.
+/// The message of the integrator, the estimator or the force equation.
 pub fn force(
     source: Source,
     case: Case,
@@ -229,7 +233,7 @@ pub fn force(
             system(&identified(source, case, method, domain)?, sequences.machine)?
         }
     };
-    Ratios::of(&sequences, &machine, equation)
+    Ratios::new(&sequences, &machine, equation)
 }
 
 /// The single degree of freedom at 256 samples.

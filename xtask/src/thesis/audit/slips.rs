@@ -7,10 +7,10 @@ use super::super::verdict::Verdict;
 use super::evidence::Evidence;
 use super::markdown::table;
 
-/// Printed estimates that come out with all slips, and no longer without this one.
+/// Printed estimates that are reproduced with all slips, but not without this one.
 ///
 /// # Errors
-/// The words of the first estimation that fails.
+/// The message of the first estimation that fails.
 pub fn needed_for(slip: Slip, evidence: &Evidence) -> Result<usize, String> {
     if slip == Slip::LostSigns {
         return Ok(evidence.all().filter(|r| sign_is_lost(r)).count());
@@ -30,20 +30,20 @@ fn explained(row: &cells::Row) -> bool {
 
 /// The misprints of whole columns are signs.
 fn sign_is_lost(row: &cells::Row) -> bool {
-    let found =
+    let count =
         misprints::find(&row.cell.table, row.cell.method, row.cell.npi, misprints::Field::Estimate);
-    row.estimate.verdict == Verdict::Misprint && found.is_some_and(|m| m.npi.is_none())
+    row.estimate.verdict == Verdict::Misprint && count.is_some_and(|m| m.npi.is_none())
 }
 
 /// The section of the page.
 ///
 /// # Errors
-/// The words of the first estimation that fails.
+/// The message of the first estimation that fails.
 pub fn section(evidence: &Evidence) -> Result<String, String> {
     let row = |slip: &Slip| {
         let needed = needed_for(*slip, evidence)?.to_string();
         let name = format!("**{}**", slip.name());
-        let words = [slip.place(), slip.done(), slip.right()].map(str::to_owned);
+        let words = [slip.printed_numbers(), slip.done(), slip.right()].map(str::to_owned);
         Ok([vec![name], words.to_vec(), vec![needed]].concat())
     };
     let rows: Result<Vec<Vec<String>>, String> = Slip::ALL.iter().map(row).collect();

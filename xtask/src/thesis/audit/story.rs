@@ -1,5 +1,4 @@
-//! Work, results and lessons: for a reader who has never seen the
-//! dissertation.
+//! Work, results and lessons, for a reader who has never seen the dissertation.
 
 use super::super::published::Method::{
     self, CentralDifference, Houbolt, Newmark, Rk4, WilsonTheta,
@@ -17,7 +16,7 @@ use super::slips;
 /// The opening of the page.
 ///
 /// # Errors
-/// The words of the computation that fails.
+/// The message of the computation that fails.
 pub fn section(evidence: &Evidence, judged: &[Judged]) -> Result<String, String> {
     let parts = [
         "# Audit of the dissertation\n\n\
@@ -59,7 +58,7 @@ fn outcome(evidence: &Evidence, judged: &[Judged]) -> Result<String, String> {
     let at_twenty = [printed, corrected].map(|v| number(v.error("5.3.1", Newmark, 20.0)));
     let [wilson, wilson_right] = both("5.2.3", WilsonTheta);
     let [central, central_right] = both("5.2.3", CentralDifference);
-    let still = judged.iter().filter(|j| j.corrected.holds() == Holds::Yes).count();
+    let holding = judged.iter().filter(|j| j.corrected.holds() == Holds::Yes).count();
     let was = judged.iter().filter(|j| j.printed.holds() == Holds::Yes).count();
     let offset = slips::needed_for(Slip::HarmonicOffset, evidence)?;
     let sign = slips::needed_for(Slip::StiffnessSign, evidence)?;
@@ -76,7 +75,7 @@ fn outcome(evidence: &Evidence, judged: &[Judged]) -> Result<String, String> {
          central difference {central_right} % instead of {central} %, and the rankings change.\n\
          - In the bearing four programs used +Kyx and one −Kyx ({sign} estimates need it): the \
          comparison of Runge-Kutta with the others compares two machines.\n\
-         - Of {} claims {was} hold in the printed numbers without exception, and {still} in the \
+         - Of {} claims {was} hold in the printed numbers without exception, and {holding} in the \
          corrected ones; [below](#the-claims-one-by-one) with the numbers.\n",
         estimates.total(),
         estimates.with(Verdict::ToTheDigit),
@@ -151,8 +150,8 @@ fn lessons(evidence: &Evidence) -> Result<String, String> {
 fn steps(evidence: &Evidence) -> String {
     let view = evidence.corrected();
     let at = |t, m, npi: f64| {
-        let found = view.best(t, m).into_iter().find(|(n, _)| *n == npi);
-        found.map_or(f64::NAN, |(_, e)| e)
+        let best = view.best(t, m).into_iter().find(|(n, _)| *n == npi);
+        best.map_or(f64::NAN, |(_, e)| e)
     };
     let worse = |m, npi| at("5.2.2", m, npi).max(at("5.2.3", m, npi));
     let npis = [2.0, 4.0, 8.0, 12.0, 16.0, 20.0];

@@ -76,8 +76,8 @@ fn named(values: [f64; 5]) -> String {
 }
 
 fn at(values: &[f64; 5], method: Method) -> f64 {
-    let found = Method::ALL.iter().position(|m| *m == method);
-    found.map_or(f64::NAN, |at| values[at])
+    let index = Method::ALL.iter().position(|m| *m == method);
+    index.map_or(f64::NAN, |at| values[at])
 }
 
 fn npi_and_samples(view: &View) -> Result<Finding, String> {
@@ -172,8 +172,8 @@ fn closest_to_runge_kutta(view: &View) -> Result<Finding, String> {
     for table in ["5.6.2", "5.6.3", "5.6.4", "5.6.5", "5.6.6", "5.6.7", "5.6.8", "5.6.9"] {
         let rk = view.deviations(table, Rk4);
         let distance = |m| {
-            let own = view.deviations(table, m);
-            own.iter().zip(&rk).map(|(a, b)| (a.1 - b.1).abs()).sum::<f64>()
+            let deviations = view.deviations(table, m);
+            deviations.iter().zip(&rk).map(|(a, b)| (a.1 - b.1).abs()).sum::<f64>()
         };
         closest(format!("{table}:"), DIRECT.map(distance));
     }

@@ -155,7 +155,7 @@ fn truncation_is_the_cause(view: &View) -> Result<Finding, String> {
     ];
     let (mut tests, mut lines) = (Vec::new(), Vec::new());
     for (name, sequences) in &data {
-        let rms = |step: &Equation| Ok(Ratios::of(sequences, &machine, *step)?.rms());
+        let rms = |step: &Equation| Ok(Ratios::new(sequences, &machine, *step)?.rms());
         let rms: Vec<f64> = steps.iter().map(rms).collect::<Result<_, String>>()?;
         tests.push(rms[2] < 0.1 * rms[0]);
         let shown: Vec<String> = rms.iter().map(|r| number(*r)).collect();

@@ -84,8 +84,8 @@ fn ends(view: &View, table: &str, method: Method) -> [f64; 2] {
 
 /// Tests that the first is the worst, written as "each other below it".
 fn worst(view: &View, table: &str, method: Method) -> Vec<bool> {
-    let others = Method::ALL.into_iter().filter(|m| *m != method);
-    others.map(|m| view.mean(table, m) < view.mean(table, method)).collect()
+    let rivals = Method::ALL.into_iter().filter(|m| *m != method);
+    rivals.map(|m| view.mean(table, m) < view.mean(table, method)).collect()
 }
 
 fn trend(view: &View, table: &str) -> String {
@@ -141,8 +141,8 @@ fn damping_x(view: &View, table: &str, order: &[Method]) -> Result<Finding, Stri
 
 fn damping_xy(view: &View) -> Result<Finding, String> {
     let mut finding = damping_x(view, "5.7.6", &[])?;
-    let others = [Newmark, Houbolt, Wilson];
-    let better = others.map(|m| view.mean("5.7.6", m) < view.mean("5.7.6", Central));
+    let rivals = [Newmark, Houbolt, Wilson];
+    let better = rivals.map(|m| view.mean("5.7.6", m) < view.mean("5.7.6", Central));
     finding.tally = finding.tally.and(better.into_iter().collect());
     Ok(finding)
 }

@@ -139,9 +139,9 @@ fn wilson_has_no_range(view: &View) -> Result<Finding, String> {
     let smallest = |series: &[f64]| series.iter().copied().fold(f64::INFINITY, f64::min);
     let (low, top) = (smallest(&high), high.iter().copied().fold(0.0, f64::max));
     let best = |m| smallest(&view.series("5.3.1", m).iter().map(|(_, e)| *e).collect::<Vec<_>>());
-    let others = [Rk4, Newmark, Central, Houbolt];
-    let words = others.map(|m| format!("{} {}", m.name(), number(best(m)))).join(", ");
-    let tests = [top - low < 5.0, low > 20.0].into_iter().chain(others.map(|m| best(m) < 10.0));
+    let rivals = [Rk4, Newmark, Central, Houbolt];
+    let words = rivals.map(|m| format!("{} {}", m.name(), number(best(m)))).join(", ");
+    let tests = [top - low < 5.0, low > 20.0].into_iter().chain(rivals.map(|m| best(m) < 10.0));
     let range = format!("Wilson θ from NPI 8 on: {} to {}.", number(low), number(top));
     Ok(Finding::new(tests, format!("{range} Smallest error of the others: {words}.")))
 }
@@ -149,11 +149,11 @@ fn wilson_has_no_range(view: &View) -> Result<Finding, String> {
 fn damping_converges(view: &View) -> Result<Finding, String> {
     let (rk, newmark) = (ends(view, "5.3.2", Rk4), ends(view, "5.3.2", Newmark));
     let mean_of = |m| view.mean("5.3.2", m);
-    let others =
+    let rivals =
         [Central, Houbolt, Wilson].map(|m| ends(view, "5.3.2", m)[1] > rk[1].max(newmark[1]));
     let tests = [rk[1] < rk[0], newmark[1] < newmark[0], mean_of(Newmark) < mean_of(Rk4)]
         .into_iter()
-        .chain(others);
+        .chain(rivals);
     let words = Method::ALL.map(|m| {
         let [two, twenty] = ends(view, "5.3.2", m).map(number);
         format!("{} {two} → {twenty}", m.name())

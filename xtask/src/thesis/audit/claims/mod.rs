@@ -1,4 +1,4 @@
-//! The dissertation's claims, each held against the printed tables and against the corrected
+//! The dissertation's claims, each compared with the printed tables and with the corrected
 //! computation.
 
 mod forces_bearing;
@@ -104,7 +104,7 @@ pub enum Support {
     Tables,
     /// Figures without numbers: the computation with every slip replayed is judged.
     Figures,
-    /// Nothing printed: likewise.
+    /// No printed evidence: likewise.
     Nothing,
 }
 
@@ -117,7 +117,7 @@ pub struct Claim {
     pub section: &'static str,
     /// Statement of the claim.
     pub statement: &'static str,
-    /// Test of the claim: what each of the counted tests asks.
+    /// Test of the claim: the question of each counted test.
     pub test: &'static str,
     /// Support that the dissertation offers.
     pub support: Support,
@@ -128,9 +128,9 @@ pub struct Claim {
 pub struct Judged {
     /// The claim.
     pub claim: Claim,
-    /// Held against what is printed, slips included.
+    /// Verdict from the printed numbers, including the slips.
     pub printed: Finding,
-    /// Held against the computation without slips.
+    /// Verdict from the computation without slips.
     pub corrected: Finding,
 }
 
@@ -149,7 +149,7 @@ const GROUPS: [(&str, &[Claim]); 8] = [
 /// Every claim, judged twice.
 ///
 /// # Errors
-/// The words of the first rerun that fails.
+/// The message of the first rerun that fails.
 pub fn judge_all(evidence: &Evidence) -> Result<Vec<Judged>, String> {
     let claims: Vec<Claim> = GROUPS.iter().flat_map(|(_, claims)| claims.iter().copied()).collect();
     claims
@@ -189,9 +189,9 @@ pub fn section(judged: &[Judged]) -> String {
         ),
         table(&["as printed", "corrected", "claims"], changes(judged))
     );
-    let mut rest = judged.iter();
+    let mut remaining = judged.iter();
     for (title, claims) in GROUPS {
-        let rows = rest.by_ref().take(claims.len()).map(row);
+        let rows = remaining.by_ref().take(claims.len()).map(row);
         text += &format!(
             "\n### {title}\n\n{}",
             table(&["No.", "Claim and test", "As printed", "Corrected"], rows)
@@ -200,10 +200,10 @@ pub fn section(judged: &[Judged]) -> String {
     text
 }
 
-/// Lists the claims that go from one verdict to another.
+/// Lists the claims that change from one verdict to another.
 fn changes(judged: &[Judged]) -> Vec<Vec<String>> {
-    let all = [Holds::Yes, Holds::Mostly, Holds::Hardly, Holds::No];
-    let pairs = all.iter().flat_map(|from| all.iter().map(move |to| (*from, *to)));
+    let verdicts = [Holds::Yes, Holds::Mostly, Holds::Hardly, Holds::No];
+    let pairs = verdicts.iter().flat_map(|from| verdicts.iter().map(move |to| (*from, *to)));
     pairs
         .filter_map(|(from, to)| {
             let numbers: Vec<String> = judged
@@ -232,12 +232,12 @@ fn row(judged: &Judged) -> Vec<String> {
     ]
 }
 
-/// Each mean of the list below the next.
+/// Whether each mean of the list is below the next.
 fn in_order(view: &View, table: &str, methods: &[Method]) -> Vec<bool> {
     methods.windows(2).map(|pair| view.mean(table, pair[0]) < view.mean(table, pair[1])).collect()
 }
 
-/// The mean of one method below that of each other.
+/// Whether the mean of one method is below the means of the others.
 fn below(view: &View, table: &str, method: Method, others: &[Method]) -> Vec<bool> {
     others.iter().map(|other| view.mean(table, method) < view.mean(table, *other)).collect()
 }

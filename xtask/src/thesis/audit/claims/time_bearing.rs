@@ -98,8 +98,8 @@ const FREQUENCY: [[&str; 4]; 2] =
     [["5.7.1", "5.7.2", "5.7.3", "5.7.4"], ["5.7.5", "5.7.6", "5.7.7", "5.7.8"]];
 
 fn best_in(view: &View, method: Method, tables: &[&str]) -> Result<Finding, String> {
-    let others = DIRECT.into_iter().filter(|m| *m != method).collect::<Vec<_>>();
-    let tests = tables.iter().flat_map(|t| below(view, t, method, &others));
+    let rivals = DIRECT.into_iter().filter(|m| *m != method).collect::<Vec<_>>();
+    let tests = tables.iter().flat_map(|t| below(view, t, method, &rivals));
     let words = tables.iter().map(|t| {
         let means = DIRECT.map(|m| format!("{} {}", m.name(), number(view.mean(t, m))));
         format!("{t}: {}", means.join(", "))
@@ -223,8 +223,12 @@ fn x_rows_better(view: &View) -> Result<Finding, String> {
     for (name, [xx, xy, yx, yy]) in sets {
         let of = |m, a, b| (view.mean(a, m) + view.mean(b, m)) / 2.0;
         tests.extend(Method::ALL.map(|m| of(m, xx, xy) < of(m, yx, yy)));
-        let all = |a, b| Method::ALL.iter().map(|m| of(*m, a, b)).sum::<f64>() / 5.0;
-        words.push(format!("{name}: {} against {}", number(all(xx, xy)), number(all(yx, yy))));
+        let over_methods = |a, b| Method::ALL.iter().map(|m| of(*m, a, b)).sum::<f64>() / 5.0;
+        words.push(format!(
+            "{name}: {} against {}",
+            number(over_methods(xx, xy)),
+            number(over_methods(yx, yy))
+        ));
     }
     Ok(Finding::new(tests, format!("Means over all methods, {}.", words.join("; "))))
 }

@@ -23,7 +23,7 @@ pub const CLAIMS: &[Claim] = &[Claim {
     judge: direction,
 }];
 
-/// Channels along X and Y; two signals of the same lines but different phases where both act.
+/// Channels along X and Y; two signals of the same lines with different phases if both act.
 fn force(case: Case, along: [bool; 2]) -> Result<Record, String> {
     let sampling = case.sampling();
     let signal = |phases| {

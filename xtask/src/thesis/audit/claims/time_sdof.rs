@@ -165,8 +165,8 @@ fn ranked(view: &View, table: &str, order: [Method; 4]) -> Result<Finding, Strin
 
 fn large_npi(view: &View) -> Result<Finding, String> {
     let at = |m| view.error("5.2.2", m, 20.0);
-    let others = [Rk4, Newmark, Central];
-    let above = [Wilson, Houbolt].into_iter().flat_map(|m| others.map(|o| at(m) > at(o)));
+    let rivals = [Rk4, Newmark, Central];
+    let above = [Wilson, Houbolt].into_iter().flat_map(|m| rivals.map(|o| at(m) > at(o)));
     let words = Method::ALL.map(|m| format!("{} {}", m.name(), number(at(m)))).join(", ");
     Ok(Finding::new(above.chain([at(Houbolt) > at(Wilson)]), format!("At NPI 20: {words}.")))
 }

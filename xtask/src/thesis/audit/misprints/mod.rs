@@ -1,4 +1,4 @@
-//! Every number, sign or reference that is printed wrongly, with the reason.
+//! Every misprinted number, sign or reference, with the reason.
 
 mod equations;
 mod modal;
@@ -14,7 +14,7 @@ use super::super::misprints::{CELLS, Field, MEANS, Misprint};
 use super::evidence::{Evidence, mean};
 use super::markdown::{number, table};
 
-/// Something printed wrongly or ambiguously outside the identification tables.
+/// A misprint or an ambiguity outside the identification tables.
 #[derive(Debug, Clone)]
 pub struct Remark {
     /// Place of the misprint.
@@ -43,7 +43,7 @@ const HEAD: [&str; 4] = ["Where", "Printed", "Should be", "How we know"];
 /// The section of the page.
 ///
 /// # Errors
-/// The words of the first computation that fails.
+/// The message of the first computation that fails.
 pub fn section(evidence: &Evidence) -> Result<String, String> {
     let fixed = |remarks: &[[&str; 4]]| table(&HEAD, remarks.iter().map(|r| Remark::new(*r).row()));
     let parts = [
@@ -77,8 +77,8 @@ fn cells(evidence: &Evidence) -> String {
             |r: &&Row| if m.field == Field::Estimate { r.estimate.value } else { r.error.value };
         let computed = mean(covered.iter().map(value));
         let shown = if m.npi.is_some() { format!("{computed:.4}") } else { number(computed) };
-        let place = format!("{}, {}, {at}, {field}", m.table, m.method.name());
-        [&place, m.printed, m.right, &shown, m.reason].map(str::to_owned).to_vec()
+        let location = format!("{}, {}, {at}, {field}", m.table, m.method.name());
+        [&location, m.printed, m.right, &shown, m.reason].map(str::to_owned).to_vec()
     };
     let head = ["Where", "Printed", "Should be", "Recomputed", "How we know"];
     table(&head, CELLS.iter().map(row))
@@ -88,7 +88,7 @@ fn means(evidence: &Evidence) -> String {
     let rows = MEANS.iter().flat_map(|listed| {
         let entries = evidence.means(listed.table).iter().filter(|m| m.method == listed.method);
         entries.map(|m| {
-            let place = format!("{}, {}, {}", listed.table, m.method.name(), m.parameter);
+            let location = format!("{}, {}, {}", listed.table, m.method.name(), m.parameter);
             let ours = mean(
                 evidence
                     .rows(listed.table)
@@ -97,7 +97,7 @@ fn means(evidence: &Evidence) -> String {
                     .map(|r| r.error.value),
             );
             vec![
-                place,
+                location,
                 m.printed.printed.clone(),
                 format!("{:.4}", m.printed.value),
                 format!("{ours:.4}"),

@@ -13,10 +13,10 @@ const RATIO_E1: (Complex<f64>, Complex<f64>, f64) =
 const RATIO_STEFFEN_RADE: (Complex<f64>, Complex<f64>, f64) =
     (Complex::new(-0.682, 0.275), Complex::new(-0.697, 0.291), 1.32);
 
-/// Lists what is wrong in tables E1, E2 and the reproduced table of Steffen & Rade (1991).
+/// Lists the errors in tables E1, E2 and the reproduced table of Steffen & Rade (1991).
 ///
 /// # Errors
-/// The words of the eigenvalue solver.
+/// The message of the eigenvalue solver.
 pub fn modal() -> Result<Vec<Remark>, String> {
     let modes = steffen_rade().modes().map_err(|e| e.to_string())?;
     let zeta: Vec<String> = modes.iter().map(|m| format!("{:.4}", m.damping_ratio())).collect();
@@ -34,19 +34,19 @@ pub fn modal() -> Result<Vec<Remark>, String> {
         let [place, printed, right, reason] = texts;
         Remark { place, printed, right, reason }
     };
-    let own = "computed from the printed M, C, K";
+    let computed = "computed from the printed M, C, K";
     Ok(vec![
         remark([
             "E1, E2, Steffen & Rade table 2: damping factors".to_owned(),
             "mode 1: 0.4275, mode 2: 0.187".to_owned(),
             format!("{} at {}, {} at {}", zeta[0], hertz[0], zeta[1], hertz[1]),
-            format!("{own}: the two are interchanged, in all three tables alike"),
+            format!("{computed}: the two are interchanged, in all three tables alike"),
         ]),
         remark([
             "the same tables: head of the eigenvectors".to_owned(),
             "y1/y2".to_owned(),
             "y2/y1".to_owned(),
-            format!("{own}: y2/y1 = {}, y1/y2 = {}", written(ratio), written(1.0 / ratio)),
+            format!("{computed}: y2/y1 = {}, y1/y2 = {}", written(ratio), written(1.0 / ratio)),
         ]),
         remark([
             "E1, E2: error of the eigenvector of mode 1".to_owned(),

@@ -3,7 +3,7 @@
 use super::super::super::published::{Cell, Published};
 use super::super::evidence::Evidence;
 
-/// Pair, how many numbers were compared, what differs.
+/// Pair, number of comparisons, differences.
 pub fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
     let published = evidence.published;
     let symposium: Vec<(Cell, Cell)> =
