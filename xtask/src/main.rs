@@ -26,7 +26,7 @@ enum Task {
         #[arg(long, value_name = "NUMBER")]
         only: Option<String>,
         /// Compare with the golden files (to 1e-9), tables, figures and pages of the repository,
-        /// and write nothing; files that belong to none of them fail, too.
+        /// without writing any; files that do not belong to them fail, too.
         #[arg(long, conflicts_with = "bless")]
         check: bool,
         /// Rewrite the golden files on purpose.

@@ -46,7 +46,7 @@ struct Gradient {
     whirl_squared: SVector<f64, 8>,
 }
 
-/// Standard errors of the values of a [`Threshold`], to first order in the errors of the coefficients.
+/// Standard errors of the values of a [`Threshold`], to first order in those of the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThresholdErrors {
     /// Standard error of the equivalent stiffness, in N/m.

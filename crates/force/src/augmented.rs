@@ -221,7 +221,7 @@ impl Augmented {
             if gain.is_none_or(|gain| gain > 0.0) {
                 best = Some(tuned);
             }
-            // If twice the order does not improve the likelihood, four times does not either.
+            // Twice the order without a gain means no gain by four times the order.
             if order > 4 && gain.is_some_and(|gain| gain < limits::ORDER_GAIN) {
                 break;
             }

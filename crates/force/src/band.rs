@@ -26,7 +26,7 @@ use crate::limits;
 ///
 /// let period = Sampling::new(0.01, 200)?;
 /// let wave = |lines: &[usize]| Multisine::flat(lines.to_vec(), 3.0, Phases::Zero)?.sample(period);
-/// // Lines 0.5 Hz apart: of 2, 10 and 30 Hz the middle one is left.
+/// // Lines 0.5 Hz apart: of 2, 10 and 30 Hz the middle one remains.
 /// let inside = within_band(&wave(&[4, 20, 60])?, [5.0, 20.0], Extent::WholePeriod)?;
 /// assert!((inside.data() - wave(&[20])?.data()).amax() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -167,7 +167,7 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // In step units the input matrix of a short step is about I, which also judges a single force.
+    // The input matrix of a short step is about I in step units, which also judges a single force.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

@@ -51,7 +51,7 @@ pub enum ForceError {
     /// The same degree of freedom was named twice.
     #[error("forced degree of freedom {} (counted from 1) is named twice", dof.saturating_add(1))]
     RepeatedDof {
-        /// Counted from 0.
+        /// Degree of freedom, counted from 0.
         dof: usize,
     },
     /// No degree of freedom is forced, so there is no unknown.

@@ -35,7 +35,7 @@ pub(crate) struct ErrorSpectrum {
     edges: Vec<[f64; 2]>,
     /// Variance of each force's error within it, forces × intervals, in N².
     pub variance: DMatrix<f64>,
-    /// Whether the interval determines every force better than its model does.
+    /// True if the interval determines every force better than its model does.
     is_determined: Vec<bool>,
     least_hz: f64,
 }
@@ -99,7 +99,7 @@ impl ForceInformation {
                 is_determined.push(true);
                 continue;
             };
-            // In units of each force's density: (I + D HᴴH D)⁻¹ with D² = S_f/S_n.
+            // Units of each force's density: (I + D HᴴH D)⁻¹ with D² = S_f/S_n.
             let density: Vec<f64> =
                 (0..forces).map(|f| model.density(f, *omega, process)).collect();
             let root = |f: usize| (density[f] / (noise * noise * self.dt)).sqrt();

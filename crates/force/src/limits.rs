@@ -126,7 +126,7 @@ pub(crate) const TRUNCATION_RESIDUAL: f64 = 0.1;
 /// data without noise is rounding, which would decide.
 pub(crate) const TIKHONOV_RESIDUAL: f64 = 1e-4;
 
-/// Relative difference up to which costs are equal.
+/// Largest relative difference of equal costs.
 pub(crate) const EQUAL_COSTS: f64 = 1e-6;
 
 /// Maximum number of Newton steps to the half width of an interval; they converge in far fewer.

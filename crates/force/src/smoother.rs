@@ -68,7 +68,7 @@ struct Filter {
     /// P Zᵀ of each channel, and its innovation's variance, at the last sample.
     gain: Vec<f64>,
     variance: Vec<f64>,
-    /// Whether covariance, gains and variances have converged to those of the sample before.
+    /// True once covariance, gains and variances have converged to those of the sample before.
     settled: bool,
     tolerance: f64,
     /// Variances before the measurements of the last sample.

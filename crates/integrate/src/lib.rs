@@ -42,7 +42,6 @@
 //! step on the motion.
 
 mod error;
-mod krylov;
 mod limits;
 mod modes;
 mod nonlinear;

@@ -3,7 +3,7 @@
 
 // Matrices.
 
-/// Maximum number of degrees of freedom up to which dense matrices are never converted to sparse.
+/// Maximum number of degrees of freedom of dense matrices that are never converted to sparse.
 pub(crate) const DENSE_DOF: usize = 64;
 
 /// Fraction of non-zero entries below which larger dense matrices are converted to sparse.
@@ -14,7 +14,7 @@ pub(crate) const SPARSE_FRACTION: f64 = 0.1;
 /// GB.
 pub(crate) const BAND_DIAGONALS: usize = 256;
 
-/// Number of diagonals up to which a band is always the fastest form, so that no other is tried.
+/// Maximum number of diagonals of a band that is always factored by band: no other form is faster.
 pub(crate) const NARROW_BAND_DIAGONALS: usize = 32;
 
 /// Smallest ratio of a diagonal entry to the largest entry of its column for which it is the
@@ -99,7 +99,7 @@ pub(crate) const SHOOTING_DIFFERENCE: f64 = 1e-5;
 /// Maximum memory of the vectors of a Krylov space, in bytes.
 pub(crate) const SEARCH_BYTES: usize = 1 << 30;
 
-/// Maximum number of vectors of a Krylov space, each of which costs a pass over the period.
+/// Maximum number of vectors of a Krylov space; each costs a pass over the period.
 pub(crate) const SEARCH_VECTORS: usize = 1000;
 
 /// Maximum number of degrees of freedom for which the derivative of a period is formed as a
@@ -159,7 +159,7 @@ pub(crate) const CRITICAL_GROWTH: f64 = 1e-9;
 /// limit: its motion then grows by more than is tolerated.
 pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
 
-/// Relative difference of two entries up to which a matrix counts as symmetric.
+/// Largest relative difference of two entries of a symmetric matrix.
 pub(crate) const ASYMMETRY: f64 = 1e-12;
 
 /// Negative eigenvalue of C or K, relative to the size of its rows, that counts as rounding. For K
@@ -227,7 +227,7 @@ pub(crate) const REAL_SHIFT: f64 = 1e-6;
 /// singular.
 pub(crate) const SHIFT_OFFSET: f64 = 1e-6;
 
-/// Relative difference up to which converged eigenvalues from two shifts are the same.
+/// Largest relative difference of converged eigenvalues from two shifts that are the same.
 pub(crate) const SAME_EIGENVALUE: f64 = 3e-8;
 
 /// Largest residual of a mode that is preferred for the next shift; a larger residual may belong
@@ -245,7 +245,7 @@ pub(crate) const RITZ_RESIDUAL: f64 = 1e-8;
 /// zero.
 pub(crate) const NEGLIGIBLE_EIGENVALUE: f64 = 1e-14;
 
-/// Relative difference up to which eigenvalues of the inverted operator are a multiple one.
+/// Largest relative difference of eigenvalues of the inverted operator that form a multiple one.
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-9;
 
 /// Norm of a unit eigenvector without its parts along others of the same eigenvalue above which it

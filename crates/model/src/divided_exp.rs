@@ -40,7 +40,7 @@ pub(crate) fn phi_divided(k: usize, a: C, b: C) -> C {
     if large.norm() < 1.0 {
         return series(k, large, small);
     }
-    // From (z φ_k)[a, b] = a φ_k[a, b] + φ_k(b) = φ_{k−1}[a, b].
+    // Leibniz: (z φ_k)[a, b] = a φ_k[a, b] + φ_k(b) = φ_{k−1}[a, b].
     (phi_divided(k - 1, large, small) - phi(k, small)) / large
 }
 

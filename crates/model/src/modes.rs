@@ -8,8 +8,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
 
-/// Modulus of an eigenvalue, relative to the largest, up to which it may be the rounding of a
-/// double zero, such as that of a free structure: about √ε (pure number).
+/// Largest modulus of an eigenvalue, relative to the largest, that may be the rounding of a double
+/// zero, such as that of a free structure: about √ε (pure number).
 pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
 /// A mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
@@ -276,7 +276,7 @@ impl Decomposition {
         for (q, y) in self.schur.q.column_iter().zip(&state) {
             balanced.zip_apply(&q, |z: &mut Complex<f64>, q| *z += y * q);
         }
-        // Of φ and λφ, the half with more digits.
+        // Inverse iteration gives φ and λφ; the half with more digits is kept.
         let n = len / 2;
         let first = if balanced.rows(0, n).norm() < balanced.rows(n, n).norm() { n } else { 0 };
         let half = balanced.rows(first, n).zip_map(&self.balance.rows(first, n), |z, b| z * b);

@@ -8,6 +8,7 @@
 //! | the Cholesky factor of a large matrix | [`cholesky`] |
 //! | singular values, eigenvalues of a Hermitian matrix, exponential, all of which end | [`linear_algebra`] |
 //! | eigenvalues of any matrix, equal ones too | [`real_schur`] |
+//! | linear equations and the largest eigenvalues of operators given by their products | [`krylov`] |
 //! | the logarithm of a matrix, its integral and their derivatives | [`logarithm`] |
 //! | the minimum of a function of a few variables, without derivatives | [`nelder_mead`] |
 //! | values with a standard error, and their intervals | [`Uncertain`] |
@@ -24,6 +25,7 @@
 pub mod cholesky;
 mod error;
 pub mod gauss_newton;
+pub mod krylov;
 pub mod least_squares;
 mod limits;
 pub mod linear_algebra;

@@ -68,7 +68,7 @@ pub struct Test {
     pub name: &'static str,
     /// M, C and K.
     pub system: SecondOrderSystem,
-    /// Whether M is known in the identification.
+    /// True if M is known in the identification.
     pub mass_known: bool,
     /// Lines driven, and above them as many lines without force.
     pub lines: Vec<usize>,

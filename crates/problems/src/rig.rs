@@ -42,7 +42,7 @@ pub enum Shakers {
     X,
     /// Shaker in y.
     Y,
-    /// Both, on alternate lines.
+    /// Shakers in x and y, on alternate lines.
     Interleaved,
 }
 

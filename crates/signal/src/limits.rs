@@ -48,7 +48,7 @@ pub(crate) const FLOOR_LINES: usize = 64;
 /// Minimum number of equal levels, from half the sampling rate down.
 pub(crate) const FLOOR_LEVELS: usize = 3;
 
-/// Ratio up to which levels are equal: more than four standard deviations of the ratio of two.
+/// Largest ratio of equal levels: more than four standard deviations of the ratio of two.
 pub(crate) const FLOOR_RATIO: f64 = 3.0;
 
 /// Standard deviation of the logarithm of a level of 64 lines under Hann's window, whose

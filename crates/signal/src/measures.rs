@@ -172,7 +172,7 @@ pub fn spectral_flatness(
 /// Order of persistent excitation of a periodic signal: the number of parameters it can identify.
 /// Each line between DC and Nyquist counts twice, DC and Nyquist once.
 ///
-/// Lines below `floor` times the strongest do not count.
+/// Lines below `floor` (a ratio) times the strongest do not count.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power,

@@ -110,7 +110,7 @@ fn grows_or_decays(x: &[f64], period: usize) -> bool {
         let [of_sum, of_difference] =
             [s, d].map(|values| if tt > 0.0 { product(values, t) / tt } else { 0.0 });
         shift += of_difference * of_difference * tt;
-        // Both are corrected for the shift.
+        // The shift explains a part of both, which is removed.
         let ss = product(s, s) - of_sum * of_sum * tt;
         let ds = product(d, s) - of_difference * of_sum * tt;
         growth += if ss > limits::MISMATCH_ROUNDING * product(s, s) { ds * ds / ss } else { 0.0 };

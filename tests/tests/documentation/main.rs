@@ -1,14 +1,16 @@
 //! Every public item says what its reader needs: errors, units, shapes, and where a formula comes
-//! from.
+//! from. Every comment is a sentence of plain words.
 //!
 //! The rules read the sources: what a crate's root reaches is public, and a sentence may stand at
 //! the item, at the type it belongs to, or at the head of its file.
 
+mod comments;
 mod items;
 mod rules;
 
 use std::path::{Path, PathBuf};
 
+use comments::Comment;
 use items::{Item, Source};
 
 /// The crates whose every item others call.
@@ -28,6 +30,17 @@ const LIBRARIES: [&str; 15] = [
     "report",
     "problems",
     "mechid",
+];
+
+/// The sources whose private comments are clean, too: a list that grows.
+const CLEAN: [&str; 7] = [
+    "crates/bearing",
+    "crates/force",
+    "crates/integrate",
+    "crates/model",
+    "crates/problems",
+    "crates/signal",
+    "xtask",
 ];
 
 fn folder(library: &str) -> PathBuf {
@@ -75,6 +88,56 @@ fn numbers_have_units() {
 #[test]
 fn lists_and_matrices_have_shapes() {
     none(&breaches(&LIBRARIES, rules::hides_its_shape), "public items without a shape");
+}
+
+/// Places and faults of the comments of the clean sources.
+fn faults(fault: impl Fn(&Comment) -> Option<String>) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let of_one = |name: &&str| {
+        let comments = comments::below(&root.join(name).join("src"));
+        assert!(comments.len() > 5, "{name}: {} comments", comments.len());
+        comments
+    };
+    let comments = CLEAN.iter().flat_map(of_one);
+    comments.filter_map(|c| fault(&c).map(|fault| format!("{}: {fault}", c.place))).collect()
+}
+
+#[test]
+fn comments_are_sentences() {
+    let faults = faults(|comment| comment.fragment().map(str::to_owned));
+    none(&faults, "comments that begin with a fragment");
+}
+
+#[test]
+fn comments_are_wrapped() {
+    let faults = faults(|comment| comment.is_wide().then(|| format!("{} columns", comment.width)));
+    none(&faults, "comments with lines that are too long");
+}
+
+#[test]
+fn comments_have_plain_words() {
+    let phrases = comments::phrases();
+    let faults = faults(|comment| comment.phrase(&phrases).map(str::to_owned));
+    none(&faults, "comments with a phrase of `phrases.txt`");
+}
+
+/// The judge of the rules: comments of each kind, with each fault and without.
+#[test]
+fn faults_of_comments_are_found() {
+    let source = "//! Force that is told.\n\n/// Whether it is so.\nfn f() {\n    // Level of noise.\n    \
+                  // The rest of it.\n    let x = 1;\n    /// ```\n    /// let of_which = 1;\n    /// ```\n}\n\
+                  \n#[cfg(test)]\nmod tests {\n    // Whose?\n}\n";
+    let found = comments::read(source, "f.rs");
+    let places: Vec<&str> = found.iter().map(|comment| comment.place.as_str()).collect();
+    assert_eq!(places, ["f.rs:1", "f.rs:3", "f.rs:5", "f.rs:8"]);
+    let fragments: Vec<_> = found.iter().map(Comment::fragment).collect();
+    assert_eq!(fragments, [None, Some("Whether"), None, None]);
+    let phrases: Vec<_> = found.iter().map(|c| c.phrase(&["told", "of which"])).collect();
+    assert_eq!(phrases, [Some("told"), None, None, None]);
+    assert_eq!(found[2].lines, ["Level of noise.", "The rest of it."]);
+    let wide = comments::read(&format!("// {}\n", "word ".repeat(20)), "f.rs");
+    assert!(wide[0].is_wide() && !found[2].is_wide());
+    assert!(comments::phrases().contains(&"up to which"));
 }
 
 /// What `cargo test --doc` runs there does something, and says what must come out.

@@ -165,6 +165,7 @@ const SHAPES: &[&str] = &[
 
 fn says(item: &Item, words: &[&str]) -> bool {
     let text = format!("{}\n{}", item.docs, item.around);
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || ",;:()[]`.".contains(c)).collect();
     let is = |part: &str, word: &str| match word.chars().all(char::is_lowercase) {

@@ -16,7 +16,7 @@ pub struct Drawing {
     pub svg: String,
 }
 
-/// Their numbers, in the order of the dissertation.
+/// Numbers of the drawings, in the order of the dissertation.
 const NUMBERS: [&str; 14] = [
     "4.2.1", "4.2.2", "4.2.3", "5.2.3", "5.3.3", "5.4.1", "5.4.4", "5.5.1", "5.6.1", "5.7.1",
     "5.8.1", "5.8.6", "5.9.1", "E1",

@@ -33,7 +33,7 @@ impl Spectra {
         Ok(self.panels()?.into_iter().fold(figure, Figure::panel))
     }
 
-    /// Both readings side by side; for the bearing the driven direction above the other.
+    /// Panels of both readings side by side; for the bearing the driven direction above the other.
     fn panels(self) -> Result<Vec<Panel>, String> {
         let readings: Result<Vec<Vec<ForceLines>>, String> =
             Reading::BOTH.into_iter().map(|reading| self.lines(reading)).collect();

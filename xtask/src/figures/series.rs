@@ -14,7 +14,7 @@ use crate::thesis::simulate::{Sequences, correct, slipped};
 /// The bearing; each program uses the sign of Kyx it was written with.
 pub(crate) const BEARING: Machine = Machine::Bearing { kyx: KyxSign::Minus };
 
-/// Whether the slips of the original programs are in.
+/// Reading of the dissertation: with the slips of the original programs, or without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reading {
     Replayed,

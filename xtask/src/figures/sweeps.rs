@@ -83,7 +83,7 @@ impl Sweep {
         Ok(panel.title(reading.title()))
     }
 
-    /// Both readings of one parameter on one scale; one panel where no slip is involved.
+    /// Panels of both readings of one parameter on one scale; one panel if no slip is involved.
     fn panels(&self, parameter: &str) -> Result<Vec<Panel>, String> {
         let panels: Result<Vec<Panel>, String> =
             Reading::BOTH.into_iter().map(|reading| self.panel(reading, parameter)).collect();

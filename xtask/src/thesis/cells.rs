@@ -26,7 +26,7 @@ pub struct Row {
     pub cell: Cell,
     /// The estimate.
     pub estimate: Judged,
-    /// Its error in per cent.
+    /// Error of the estimate, in per cent.
     pub error: Judged,
     /// The same estimator without slips.
     pub correct: f64,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Relative difference above which two numbers differ.
 const TOLERANCE: f64 = 1e-9;
 
-/// Fraction of the largest number of its column up to which a difference is rounding.
+/// Largest difference, relative to the largest number of its column, that is rounding.
 const NOISE: f64 = 1e-12;
 
 /// The same for errors in per cent: a relative change of a value by 1e-9 changes its error by this.

@@ -15,7 +15,7 @@ use super::{interpolated, slips::Slip};
 /// One reproduced table.
 #[derive(Debug, Clone)]
 pub struct Table {
-    /// Its number in the dissertation.
+    /// Number of the table in the dissertation.
     pub number: String,
     /// All digits, for the golden comparison.
     pub csv: String,

@@ -22,7 +22,7 @@ pub(super) struct Film {
     pub(super) columns: Vec<f64>,
     /// Start and end of the film in each row but the last, in rad.
     pub(super) fronts: [Vec<f64>; 2],
-    /// Whether the film starts or ends within the pad, not at its edge.
+    /// True if the film starts or ends within the pad, not at its edge.
     pub(super) free: [Vec<bool>; 2],
     /// Pressure over 6 μ Ω (R/c)²: rows without the last × columns.
     pub(super) pressure: DMatrix<f64>,

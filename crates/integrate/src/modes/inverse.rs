@@ -1,13 +1,13 @@
 //! The inverted operator of the equation of motion about a shift.
 
 use mechid_model::{Matrix, SparseSystem};
+use mechid_numerics::krylov::start_vector::numbered_start_vector;
 use nalgebra::{Complex, DVector};
 use nalgebra_sparse::coo::CooMatrix;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::error::IntegrateError;
-use crate::krylov::start_vector::numbered_start_vector;
 use crate::limits;
 use crate::modes::ModeSearch;
 use crate::sparse::{GeneralLu, NotFactored, SparseLu, combination};

@@ -7,7 +7,7 @@ use crate::limits;
 use crate::modes::{Candidate, ModeSearch};
 
 impl ModeSearch {
-    /// Returns the distance by which the search orders eigenvalues.
+    /// Returns the sort key of the search: the distance of an eigenvalue.
     pub(super) fn distance(self, value: Complex<f64>) -> f64 {
         match self {
             Self::Lowest => value.norm(),

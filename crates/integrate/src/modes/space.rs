@@ -2,11 +2,11 @@
 
 use mechid_model::{Matrix, Mode, SparseSystem};
 use mechid_numerics::RealSchur;
+use mechid_numerics::krylov::eigenvector::eigenvector;
+use mechid_numerics::krylov::start_vector::numbered_start_vector;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::error::IntegrateError;
-use crate::krylov::eigenvector::eigenvector;
-use crate::krylov::start_vector::numbered_start_vector;
 use crate::limits;
 use crate::modes::inverse::{Inverse, largest_row};
 use crate::modes::{Candidate, SparseMode};

@@ -107,7 +107,7 @@ impl Member {
                 let largest = values.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
                 let step = limits::TANGENT_DIFFERENCE * if largest > 0.0 { largest } else { 1.0 };
                 values[j] = original + step;
-                // The step as it is after rounding.
+                // Rounding changes the step; the difference quotient needs the rounded one.
                 let step = values[j] - original;
                 self.force.force(time, &self.x, &self.v, &mut self.moved);
                 let values = if of_velocity { &mut self.v } else { &mut self.x };

@@ -1,10 +1,10 @@
 //! The periodic steady state, solved for instead of waited for.
 
 use mechid_model::Response;
+use mechid_numerics::krylov::gmres;
 use mechid_signal::Sampling;
 
 use crate::error::IntegrateError;
-use crate::krylov::gmres;
 use crate::limits;
 use crate::periodic::period_map::PeriodMap;
 use crate::periodic::shooting::Shooting;
@@ -18,7 +18,7 @@ use crate::system::System;
 
 /// The response that repeats with the force, whose samples are one period (samples × n, in N).
 ///
-/// Over one period the scheme is an affine map of its own state, z_N = Φ z_0 + g. The periodic
+/// Over one period the scheme is an affine map of its state, z_N = Φ z_0 + g. The periodic
 /// state solves (I − Φ) z_0 = g; one pass from rest gives g, a second one the response. The cost is
 /// about two passes, plus the powers of a matrix with two rows per degree of freedom (three for
 /// Houbolt and Wilson θ). If the damping is so small that rounding over the period leaves a gap,

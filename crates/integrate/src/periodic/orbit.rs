@@ -2,12 +2,12 @@
 
 use mechid_model::{InitialState, Response};
 use mechid_numerics::RealSchur;
+use mechid_numerics::krylov::arnoldi::{Arnoldi, Dominant};
+use mechid_numerics::krylov::gmres;
+use mechid_numerics::krylov::start_vector::numbered_start_vector;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::error::IntegrateError;
-use crate::krylov::arnoldi::{Arnoldi, Dominant};
-use crate::krylov::gmres;
-use crate::krylov::start_vector::numbered_start_vector;
 use crate::limits;
 use crate::periodic::shooting::Shooting;
 use crate::schemes::scheme::Scheme;

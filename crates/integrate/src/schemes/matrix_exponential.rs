@@ -102,13 +102,12 @@ fn exponentials(
     linear: bool,
 ) -> Result<[DMatrix<f64>; 3], IntegrateError> {
     let n = system.dof();
-    // In step units: the second half of the state is Δt ẋ, the last quarter the change of the
-    // force.
+    // Step units: the second half of the state is Δt ẋ, the last quarter the change of the force.
     let mut generator = DMatrix::zeros(4 * n, 4 * n);
     generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&StateTransition::rate(system, dt));
     generator.view_mut((n, 2 * n), (n, n)).copy_from(&StateTransition::force_input(system, dt));
     generator.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
-    // In balanced units the norm is about ωΔt, not its square: fewer squarings.
+    // Balanced units have a norm of about ωΔt, not its square: fewer squarings.
     let norm = generator.norm();
     let scales =
         Transition::balance(&mut generator).ok_or(NumericsError::ExponentialOverflow { norm })?;

@@ -4,10 +4,10 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
+use mechid_numerics::krylov::start_vector::pseudo_random;
 use nalgebra::ComplexField;
 use nalgebra_sparse::csc::CscMatrix;
 
-use crate::krylov::start_vector::pseudo_random;
 use crate::limits;
 use crate::sparse::{NotFactored, fill};
 

@@ -7,10 +7,10 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use mechid_numerics::krylov::start_vector::pseudo_random;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
-use crate::krylov::start_vector::pseudo_random;
 use crate::limits;
 use crate::sparse::general::{pattern, reciprocal_condition};
 use crate::sparse::panels::{Columns, Panels};

@@ -3,11 +3,12 @@
 use std::cell::OnceCell;
 
 use mechid_model::{Matrix, SecondOrderSystem};
+use mechid_numerics::krylov::arnoldi::dominant;
+use mechid_numerics::krylov::start_vector::start_vector;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::error::IntegrateError;
-use crate::krylov::arnoldi::dominant;
-use crate::krylov::start_vector::start_vector;
+use crate::limits;
 use crate::stability::passive;
 use crate::stepping::effective_matrix::Equations;
 use crate::system::System;
@@ -95,7 +96,7 @@ pub(super) fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
     // The iteration also finds the unit of time that makes the two halves of the state comparable.
     let mut unit = 1.0;
     for _ in 0..4 {
-        let largest = dominant(start_vector(2 * n), |state, rate| {
+        let largest = dominant(start_vector(2 * n), limits::ARNOLDI_STEPS, |state, rate| {
             let (x, v) = state.split_at(n);
             let (dx, dv) = rate.split_at_mut(n);
             dx.copy_from_slice(v);

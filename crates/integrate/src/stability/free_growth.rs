@@ -1,11 +1,11 @@
 //! Growth of the free motion of a linear system of any size, by steps.
 
+use mechid_numerics::krylov::arnoldi::Arnoldi;
+use mechid_numerics::krylov::start_vector::numbered_start_vector;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DVector;
 
 use crate::error::IntegrateError;
-use crate::krylov::arnoldi::Arnoldi;
-use crate::krylov::start_vector::numbered_start_vector;
 use crate::limits;
 use crate::periodic::shooting::Shooting;
 use crate::schemes::newmark::Newmark;
@@ -14,7 +14,7 @@ use crate::stability::passive::is_passive;
 use crate::stepping::sampled_force::ForceTable;
 use crate::system::System;
 
-/// Returns the factor by which the fastest growing free motion of a linear `system` grows in the
+/// Returns the growth factor of the fastest growing free motion of a linear `system` over the
 /// period of `sampling` (a pure number above 1); `None` if no growth was found.
 ///
 /// If M is symmetric and positive definite, and C and K are symmetric and positive semidefinite, no

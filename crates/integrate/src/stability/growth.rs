@@ -2,10 +2,10 @@
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::RealSchur;
+use mechid_numerics::krylov::start_vector::start_vector;
 use nalgebra::{Complex, DVector};
 
 use crate::error::IntegrateError;
-use crate::krylov::start_vector::start_vector;
 use crate::stepping::stepper::{Loads, Stepper};
 use crate::stepping::transition::Transition;
 

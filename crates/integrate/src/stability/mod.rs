@@ -12,7 +12,6 @@ pub(crate) mod passive;
 pub(crate) mod step_limit;
 
 use crate::error::IntegrateError;
-use crate::krylov::arnoldi::dominant;
 use crate::limits;
 use crate::schemes::scheme::Scheme;
 use crate::stability::fastest::Fastest;
@@ -20,6 +19,7 @@ use crate::stability::growth::{Amplification, radius};
 use crate::stability::step_limit::Examined;
 use crate::stepping::transition::Transition;
 use crate::system::System;
+use mechid_numerics::krylov::arnoldi::dominant;
 
 /// Spectral radius of the amplification matrix of `scheme` on `system` at a step of `dt` seconds.
 ///
@@ -45,7 +45,11 @@ pub fn spectral_radius(
     let mut start = amplification.start();
     let mut radius = f64::INFINITY;
     for _ in 0..3 {
-        let Some(largest) = dominant(start, |z, next| amplification.apply(z, next)) else { break };
+        let Some(largest) =
+            dominant(start, limits::ARNOLDI_STEPS, |z, next| amplification.apply(z, next))
+        else {
+            break;
+        };
         radius = largest.value.norm();
         start = largest.vector.map(|v| v.re);
     }
@@ -60,7 +64,7 @@ pub fn spectral_radius(
 /// rounding. An unstable system is allowed twice its own growth.
 ///
 /// For more than 20 degrees of freedom it is the limit for a single degree of freedom that moves
-/// along the fastest mode, found with a hundred products with the matrices. If the system can only
+/// along the fastest mode, from a hundred products with the matrices. If the system can only
 /// lose energy, factorisations then enclose its frequency to a part in 10⁴; for other systems it is
 /// known to about one part in a thousand.
 ///
@@ -77,8 +81,8 @@ pub fn critical_step(
     limit_of(scheme, &Fastest::new(system))
 }
 
-/// Returns the steps of [`critical_step`], in s, of several schemes in their order; the properties
-/// of the system are computed once.
+/// Returns the steps of [`critical_step`], in s, of several schemes, one for each in their order;
+/// the properties of the system are computed once.
 ///
 /// # Errors
 /// The errors of [`critical_step`].

@@ -1,12 +1,12 @@
 //! Systems that can only lose energy, and their highest frequencies.
 
 use mechid_model::Matrix;
+use mechid_numerics::krylov::start_vector::start_vector;
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::error::IntegrateError;
-use crate::krylov::start_vector::start_vector;
 use crate::limits;
 use crate::sparse::{combination, is_positive_definite};
 use crate::stepping::effective_matrix::Equations;
@@ -136,7 +136,7 @@ impl Symmetric {
 /// M⁻¹A.
 pub(super) struct Top {
     pub(super) vector: DVector<f64>,
-    /// Its Rayleigh quotient, in 1/s² or 1/s: at most the largest eigenvalue.
+    /// Rayleigh quotient of the vector, in 1/s² or 1/s: at most the largest eigenvalue.
     pub(super) value: f64,
     /// Distance from it within which there is an eigenvalue.
     residual: f64,

@@ -1,9 +1,9 @@
 //! The largest step at which a scheme is stable.
 
 use mechid_model::{Matrix, SecondOrderSystem};
+use mechid_numerics::krylov::arnoldi::dominant;
 
 use crate::error::IntegrateError;
-use crate::krylov::arnoldi::dominant;
 use crate::limits;
 use crate::schemes::scheme::StableSteps;
 use crate::stability::fastest::{Fastest, fastest, reduced, reduced_to};
@@ -71,7 +71,7 @@ impl Examined<'_> {
             StableSteps::Unknown => false,
             StableSteps::All => true,
             StableSteps::Frequencies(limit) => below(Matrix::Stiffness, (limit / dt).powi(2)),
-            // Without oscillation |λ| is at most c/m.
+            // An overdamped motion has |λ| of at most c/m.
             StableSteps::Eigenvalues(limit) => {
                 below(Matrix::Stiffness, (limit / dt).powi(2)) && below(Matrix::Damping, limit / dt)
             }
@@ -124,7 +124,8 @@ impl Examined<'_> {
         let mut amplification = Amplification::new(stepper, fastest);
         let mut start = amplification.start();
         for _ in 0..2 {
-            let largest = dominant(start, |z, next| amplification.apply(z, next));
+            let largest =
+                dominant(start, limits::ARNOLDI_STEPS, |z, next| amplification.apply(z, next));
             let Some(largest) = largest else { return Ok(Some(f64::INFINITY)) };
             if largest.value.norm().ln() <= limits::TOLERATED_GROWTH {
                 return Ok(None);

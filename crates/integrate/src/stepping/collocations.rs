@@ -309,7 +309,7 @@ struct ProbeState {
     /// The collocation at which the force is 1 N; 0 at all others.
     unit: Option<usize>,
     asked: Vec<Asked>,
-    /// Whether Newton's method continues at the last collocation.
+    /// True while Newton's method continues at the last collocation.
     goes_on: bool,
 }
 

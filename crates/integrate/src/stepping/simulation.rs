@@ -22,7 +22,7 @@ pub(crate) struct Motion<'a> {
     /// The degree of freedom of each column, unless they are all in their order.
     observed: Option<&'a [usize]>,
     dof: usize,
-    /// Whether all values are known to be finite.
+    /// True if all values are known to be finite.
     finite: bool,
 }
 

@@ -64,10 +64,9 @@ pub trait Stepper: Send {
     /// step: near Δt = 0 the amplification matrix is I + O(Δt). The units of the state are in the
     /// documentation of the scheme; loads are in N.
     ///
+    /// # Errors
     /// [`IntegrateError::NotSolved`] if the system has nonlinear forces and Newton's method does
     /// not converge; a step of a linear system does not fail.
-    /// [`IntegrateError::NotSolved`] if the system has nonlinear forces and Newton's method does
-    /// not converge; of a linear system a step does not fail.
     ///
     /// # Panics
     /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or a load that is

@@ -232,12 +232,12 @@ fn row(judged: &Judged) -> Vec<String> {
     ]
 }
 
-/// Whether each mean of the list is below the next.
+/// Tests that each mean of the list is below the next.
 fn in_order(view: &View, table: &str, methods: &[Method]) -> Vec<bool> {
     methods.windows(2).map(|pair| view.mean(table, pair[0]) < view.mean(table, pair[1])).collect()
 }
 
-/// Whether the mean of one method is below the means of the others.
+/// Tests that the mean of one method is below the means of the others.
 fn below(view: &View, table: &str, method: Method, others: &[Method]) -> Vec<bool> {
     others.iter().map(|other| view.mean(table, method) < view.mean(table, *other)).collect()
 }

@@ -2,18 +2,18 @@
 
 use std::convert::Infallible;
 
-use mechid_numerics::RealSchur;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::krylov::eigenvector::eigenvector;
-use crate::limits;
+use crate::real_schur::RealSchur;
 
 /// An orthonormal basis V of the space of b, Φ b, Φ² b …, and Φ in this basis: Φ V = V H + a
-/// remainder outside the space.
+/// remainder outside the space. Vectors and Φ are in any consistent unit.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
-pub(crate) struct Arnoldi {
+#[derive(Debug)]
+pub struct Arnoldi {
     basis: Vec<DVector<f64>>,
     /// H with one more row, for the next vector; columns not computed yet are zero.
     pub(super) hessenberg: DMatrix<f64>,
@@ -21,20 +21,30 @@ pub(crate) struct Arnoldi {
 }
 
 impl Arnoldi {
-    /// Creates the space of `start` alone, without products; its dimension is at most `most`.
-    pub(crate) fn new(start: DVector<f64>, most: usize) -> Self {
+    /// Creates the space of `start` (n entries) alone, without products; its dimension is at most
+    /// `most`.
+    pub fn new(start: DVector<f64>, most: usize) -> Self {
         let hessenberg = DMatrix::zeros(most + 1, most);
         Self { basis: vec![start.normalize()], hessenberg, size: 0 }
     }
 
-    /// Number of products.
-    pub(crate) fn size(&self) -> usize {
+    /// Number of products with Φ so far.
+    pub fn size(&self) -> usize {
         self.size
     }
 
-    /// Adds one product; `apply` writes Φ v into its second argument. Returns whether the space can
-    /// grow further.
-    pub(crate) fn extend<E>(
+    /// Adds one product; `apply` writes Φ v (n entries) into its second argument. Returns whether
+    /// the space can grow further.
+    ///
+    /// # Errors
+    /// The error of `apply`.
+    ///
+    /// # Panics
+    /// If the space cannot grow.
+    ///
+    /// # Source
+    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
+    pub fn extend<E>(
         &mut self,
         apply: impl FnOnce(&[f64], &mut [f64]) -> Result<(), E>,
     ) -> Result<bool, E> {
@@ -59,14 +69,14 @@ impl Arnoldi {
         Ok(leads_out && self.size < self.hessenberg.ncols())
     }
 
-    /// Returns the square part of H; `None` if its numbers overflow.
-    pub(crate) fn square(&self) -> Option<DMatrix<f64>> {
+    /// Returns the square part of H, size × size, in the unit of Φ; `None` if its numbers overflow.
+    pub fn square(&self) -> Option<DMatrix<f64>> {
         let finite = self.hessenberg.iter().all(|value| value.is_finite());
         finite.then(|| self.hessenberg.view((0, 0), (self.size, self.size)).into_owned())
     }
 
-    /// Returns V y for real or complex coordinates y.
-    pub(crate) fn combined<T: nalgebra::ComplexField<RealField = f64>>(
+    /// Returns V y (n entries) for real or complex coordinates y, at most one per vector of V.
+    pub fn combined<T: nalgebra::ComplexField<RealField = f64>>(
         &self,
         coordinates: &[T],
     ) -> DVector<T> {
@@ -77,10 +87,13 @@ impl Arnoldi {
         vector
     }
 
-    /// Returns the eigenvalue of H of largest modulus with its eigenvector; `None` if numbers
-    /// overflow.
-    pub(crate) fn dominant(&self) -> Option<Dominant> {
-        let square = self.square()?;
+    /// Returns the eigenvalue of H of largest modulus with its eigenvector, an approximation of that
+    /// of Φ; `None` without products or if numbers overflow.
+    ///
+    /// # Source
+    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
+    pub fn dominant(&self) -> Option<Dominant> {
+        let square = self.square().filter(|square| !square.is_empty())?;
         let values = RealSchur::new(square.clone()).ok()?.eigenvalues();
         let value = values.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
         let coordinates = eigenvector(&square, 1, value, 0)?;
@@ -95,24 +108,26 @@ impl Arnoldi {
 
 /// An approximate eigenvalue of largest modulus.
 #[derive(Debug, Clone)]
-pub(crate) struct Dominant {
-    pub(crate) value: Complex<f64>,
-    /// ‖Φ u − μ u‖.
-    pub(crate) residual: f64,
-    /// Its eigenvector u, of norm 1.
-    pub(crate) vector: DVector<Complex<f64>>,
+pub struct Dominant {
+    /// The eigenvalue μ, in the unit of Φ.
+    pub value: Complex<f64>,
+    /// Residual ‖Φ u − μ u‖, in the unit of Φ.
+    pub residual: f64,
+    /// Eigenvector u, n entries, of norm 1.
+    pub vector: DVector<Complex<f64>>,
 }
 
-/// Returns the dominant eigenvalue after one round of Arnoldi's iteration from `start`; `apply`
-/// writes A x into its second argument. `None` if numbers overflow.
+/// Returns the dominant eigenvalue after at most `steps` Arnoldi steps from `start` (n entries);
+/// `apply` writes A x into its second argument. `None` if numbers overflow.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
-pub(crate) fn dominant(
+pub fn dominant(
     start: DVector<f64>,
+    steps: usize,
     mut apply: impl FnMut(&[f64], &mut [f64]),
 ) -> Option<Dominant> {
-    let most = limits::ARNOLDI_STEPS.min(start.len());
+    let most = steps.min(start.len());
     let mut space = Arnoldi::new(start, most);
     loop {
         let Ok(more) = space.extend(|x, y| {

@@ -6,10 +6,13 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::krylov::start_vector::numbered_start_vector;
 
-/// Returns the eigenvector of norm 1 of a `matrix` to its eigenvalue `value`, by inverse iteration.
-/// The matrix has at most `below` diagonals under the main one; for a multiple eigenvalue each
-/// `number` gives another eigenvector.
-pub(crate) fn eigenvector(
+/// Returns the eigenvector of norm 1 of a square `matrix` to its eigenvalue `value`, by inverse
+/// iteration; `None` if numbers overflow. The matrix has at most `below` diagonals under the main
+/// one; for a multiple eigenvalue each `number` gives another eigenvector.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1.
+pub fn eigenvector(
     matrix: &DMatrix<f64>,
     below: usize,
     value: Complex<f64>,

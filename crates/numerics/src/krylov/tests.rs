@@ -2,9 +2,9 @@
 
 use std::convert::Infallible;
 
-use mechid_numerics::NumericsError;
 use nalgebra::{DMatrix, DVector};
 
+use crate::error::NumericsError;
 use crate::krylov::arnoldi::{Arnoldi, Dominant, dominant};
 use crate::krylov::gmres::solve;
 use crate::krylov::start_vector::start_vector;
@@ -82,7 +82,7 @@ fn the_largest_of_many_eigenvalues_is_found() {
         }
         (y[0], y[1]) = (1.2 * (0.6 * x[0] - 0.8 * x[1]), 1.2 * (0.8 * x[0] + 0.6 * x[1]));
     };
-    let found = dominant(start_vector(202), apply).unwrap();
+    let found = dominant(start_vector(202), 32, apply).unwrap();
     assert!((found.value.norm() - 1.2).abs() < 1e-6, "{found:?}");
     assert!((found.value.im.abs() - 0.96).abs() < 1e-6);
     let inside: f64 = found.vector.iter().take(2).map(|v| v.norm_sqr()).sum();
@@ -91,7 +91,7 @@ fn the_largest_of_many_eigenvalues_is_found() {
 
 #[test]
 fn small_operators_are_exact() {
-    let found = dominant(start_vector(2), |x, y| (y[0], y[1]) = (3.0 * x[0], -4.0 * x[1]));
+    let found = dominant(start_vector(2), 32, |x, y| (y[0], y[1]) = (3.0 * x[0], -4.0 * x[1]));
     let found = found.unwrap();
     assert!((found.value.re + 4.0).abs() < 1e-14, "{found:?}");
 }

@@ -2,19 +2,20 @@
 
 use nalgebra::DVector;
 
-/// Returns a pseudo-random vector of norm 1, the same on every run.
-pub(crate) fn start_vector(len: usize) -> DVector<f64> {
+/// Returns a pseudo-random vector of `len` entries and norm 1, the same on every run.
+pub fn start_vector(len: usize) -> DVector<f64> {
     numbered_start_vector(len, 0)
 }
 
-/// Returns one of many such vectors, by its number.
-pub(crate) fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
+/// Returns one of many such vectors, by its `number`.
+pub fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
     let vector = DVector::from_iterator(len, pseudo_random(number).take(len));
     vector.normalize()
 }
 
-/// Pseudo-random numbers between −½ and ½, the same on every run; `number` chooses the sequence.
-pub(crate) fn pseudo_random(number: usize) -> impl Iterator<Item = f64> {
+/// Pseudo-random pure numbers between −½ and ½, the same on every run; `number` chooses the
+/// sequence.
+pub fn pseudo_random(number: usize) -> impl Iterator<Item = f64> {
     let mut seed = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(2 * number as u64 + 1);
     std::iter::repeat_with(move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

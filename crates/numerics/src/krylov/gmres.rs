@@ -1,30 +1,35 @@
 //! Systems of equations solved in a Krylov space.
 
-use mechid_numerics::NumericsError;
-use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::{DMatrix, DVector};
 
+use crate::error::NumericsError;
 use crate::krylov::arnoldi::Arnoldi;
+use crate::linear_algebra::singular_values;
 
 /// Solution of (I − Φ) y = b in a Krylov space.
-pub(crate) struct Solution {
-    /// y.
-    pub(crate) vector: DVector<f64>,
-    /// ‖b − (I − Φ) y‖ / ‖b‖.
-    pub(crate) residual: f64,
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// y, n entries, in the unit of b.
+    pub vector: DVector<f64>,
+    /// ‖b − (I − Φ) y‖ / ‖b‖, a pure number.
+    pub residual: f64,
     /// Number of products with Φ.
-    pub(crate) products: usize,
-    /// Smallest singular value of I − Φ in the space, over the largest.
-    pub(crate) reciprocal_condition: f64,
+    pub products: usize,
+    /// Smallest singular value of I − Φ in the space, over the largest, a pure number.
+    pub reciprocal_condition: f64,
 }
 
-/// Solves (I − Φ) y = b to a relative residual of `tolerance` in a space of `most` dimensions at
-/// most (GMRES); `apply` writes Φ v into its second argument.
+/// Solves (I − Φ) y = b for `right` = b (n entries) to a relative residual of `tolerance` (a pure
+/// number), in a space of at most `most` dimensions (GMRES); `apply` writes Φ v into its second
+/// argument.
+///
+/// # Errors
+/// The error of `apply`, and [`NumericsError`] if a decomposition fails.
 ///
 /// # Source
 /// Saad & Schultz, "GMRES: a generalized minimal residual algorithm", *SIAM J. Sci. Stat. Comput.*
 /// 7 (1986).
-pub(crate) fn solve<E: From<NumericsError>>(
+pub fn solve<E: From<NumericsError>>(
     right: &DVector<f64>,
     tolerance: f64,
     most: usize,

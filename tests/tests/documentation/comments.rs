@@ -1,0 +1,109 @@
+//! Comments of every kind, public, private and between the lines: whole sentences of plain words,
+//! wrapped.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Longest line of a comment, in columns.
+const WIDTH: usize = 100;
+
+/// First words of fragments, in documentation and between the lines.
+const FRAGMENTS: &[&str] = &[
+    "As", "Both", "By", "Counted", "From", "How", "Its", "Not", "Nothing", "Of", "So", "Such",
+    "Than", "That", "Their", "These", "Those", "What", "Where", "Whether", "Which", "Who", "Whose",
+    "Why",
+];
+
+/// One comment: neighbouring lines that begin alike.
+pub struct Comment {
+    /// File and line.
+    pub place: String,
+    pub lines: Vec<String>,
+    /// Columns of the longest line, without code of examples and tables.
+    pub width: usize,
+}
+
+/// The comments of the sources below a folder, without those of tests.
+pub fn below(folder: &Path) -> Vec<Comment> {
+    let mut files = Vec::new();
+    sources(folder, &mut files);
+    files.sort();
+    let read =
+        |file: &PathBuf| read(&fs::read_to_string(file).unwrap(), &file.display().to_string());
+    files.iter().flat_map(read).collect()
+}
+
+fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, files);
+        } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// The comments of a source; `mod tests` is the last item of its file.
+pub fn read(text: &str, file: &str) -> Vec<Comment> {
+    let mut comments: Vec<Comment> = Vec::new();
+    let (mut before, mut is_code) = (None, false);
+    for (at, line) in text.lines().enumerate() {
+        if line.trim() == "mod tests {" {
+            break;
+        }
+        let marker = ["///", "//!", "//"].into_iter().find(|m| line.trim_start().starts_with(m));
+        let key = marker.map(|marker| (marker, line.len() - line.trim_start().len()));
+        if key != before {
+            is_code = false;
+            if key.is_some() {
+                let place = format!("{file}:{}", at + 1);
+                comments.push(Comment { place, lines: Vec::new(), width: 0 });
+            }
+        }
+        before = key;
+        let (Some(marker), Some(comment)) = (marker, comments.last_mut()) else { continue };
+        let said = line.trim_start()[marker.len()..].trim();
+        if said.starts_with("```") {
+            is_code = !is_code;
+        } else if !is_code {
+            if !said.starts_with('|') {
+                comment.width = comment.width.max(line.chars().count());
+            }
+            comment.lines.push(said.to_owned());
+        }
+    }
+    comments
+}
+
+impl Comment {
+    /// Returns the first word of a fragment that the comment begins with.
+    pub fn fragment(&self) -> Option<&str> {
+        let first = self.lines.first()?;
+        let word = first.split(|c: char| !c.is_alphabetic() && c != '\'').next()?;
+        FRAGMENTS.contains(&word).then_some(word)
+    }
+
+    /// Returns whether a line is too long.
+    pub fn is_wide(&self) -> bool {
+        self.width > WIDTH
+    }
+
+    /// Returns the first of these phrases that the comment has.
+    pub fn phrase<'a>(&self, phrases: &[&'a str]) -> Option<&'a str> {
+        let words = self.lines.join(" ").to_lowercase();
+        let plain = |c: char| !c.is_alphabetic() && c != '\'';
+        let words: Vec<&str> = words.split(plain).filter(|word| !word.is_empty()).collect();
+        let has = |phrase: &&&str| {
+            let sought: Vec<&str> = phrase.split(' ').collect();
+            words.windows(sought.len()).any(|window| window == sought)
+        };
+        phrases.iter().find(has).copied()
+    }
+}
+
+/// The phrases of the list beside this file: what is before two spaces.
+pub fn phrases() -> Vec<&'static str> {
+    let lines = include_str!("phrases.txt").lines().filter(|line| !line.starts_with('#'));
+    lines.filter_map(|line| line.split("  ").next()).map(str::trim).collect()
+}
