@@ -7,11 +7,11 @@ use nalgebra::DMatrix;
 use crate::augmented::{Augmented, Tuned};
 use crate::band::{BandFilter, within_band};
 use crate::error::ForceError;
+use crate::force_information::ErrorSpectrum;
 use crate::force_model::{ForceModel, LowPass};
 use crate::identified::IdentifiedForce;
 use crate::measurement::{Measurement, Start};
 use crate::noise::{Noise, channel_sizes};
-use crate::seen::ErrorSpectrum;
 use crate::transfer::Transfer;
 use crate::unexplained::Residual;
 

@@ -147,6 +147,6 @@ impl Measurement {
 
 /// Returns the first index that occurs twice.
 pub(crate) fn first_repeated(indices: &[usize]) -> Option<usize> {
-    let mut indices = std::collections::HashSet::new();
-    indices.iter().copied().find(|index| !indices.insert(*index))
+    let mut earlier = std::collections::HashSet::new();
+    indices.iter().copied().find(|index| !earlier.insert(*index))
 }

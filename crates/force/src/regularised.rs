@@ -5,7 +5,7 @@ use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
 use statrs::function::erf::erfc;
 
-use crate::components::Operator;
+use crate::components::{Components, Operator};
 use crate::error::ForceError;
 use crate::evidence::Posterior;
 use crate::identified::IdentifiedForce;
