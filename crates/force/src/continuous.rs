@@ -28,7 +28,8 @@ use crate::identified::IdentifiedForce;
 ///
 /// // x = cos 3t, on m = 2, c = 0.5, k = 8: F = (8 − 2·9) cos 3t − 0.5·3 sin 3t.
 /// let sampling = Sampling::new(0.1, 20)?;
-/// let wave = |f: fn(f64) -> f64| Record::from_channel(sampling, sampling.times().map(f).collect());
+/// let wave =
+///     |f: fn(f64) -> f64| Record::from_channel(sampling, sampling.times().map(f).collect());
 /// let response = Response::new(
 ///     wave(|t| (3.0 * t).cos())?,
 ///     wave(|t| -3.0 * (3.0 * t).sin())?,

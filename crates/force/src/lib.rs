@@ -3,11 +3,11 @@
 //! | Function | Needs | Use it when |
 //! |---|---|---|
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
-//! | [`continuous_nonlinear`] | the same of a machine with nonlinear terms | its springs or dampers bend |
-//! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
+//! | [`continuous_nonlinear`] | the same, of a system with nonlinear terms | it is nonlinear |
+//! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing, noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
-//! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
-//! | [`kalman`] | any channels, any length | the record is no period |
+//! | [`regularised`] | any channels, a period or up to 512 samples × forces | the lines are unknown |
+//! | [`kalman`] | any channels, any length | the record is not a period |
 //!
 //! [`with_uncertain_system`] adds the covariance of an identified system to the standard error of
 //! any of them. The chapter on forces of the book has the reasons, and compares the errors of all

@@ -30,7 +30,8 @@ use crate::motion_noise::{MotionNoise, through};
 ///
 /// // x = cos 3t on m = 2, c = 0.5, k = 8 and 4 x³, which is 3 cos 3t + cos 9t.
 /// let sampling = Sampling::new(0.1, 20)?;
-/// let wave = |f: fn(f64) -> f64| Record::from_channel(sampling, sampling.times().map(f).collect());
+/// let wave =
+///     |f: fn(f64) -> f64| Record::from_channel(sampling, sampling.times().map(f).collect());
 /// let response = Response::new(
 ///     wave(|t| (3.0 * t).cos())?,
 ///     wave(|t| -3.0 * (3.0 * t).sin())?,

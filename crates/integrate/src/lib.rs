@@ -9,7 +9,7 @@
 //! use mechid_model::Sdof;
 //! use mechid_signal::{Multisine, Phases, Sampling};
 //!
-//! // 10 kg on 5000 N/m with 180 N·s/m, driven on 31 lines up to 60 Hz: what does each scheme make of it?
+//! // 10 kg on 5000 N/m with 180 N·s/m, driven on 31 lines up to 60 Hz, with each scheme.
 //! let system = Sdof::new(10.0, 180.0, 5000.0)?.system();
 //! let force = Multisine::flat(1..=31, 1.0, Phases::SchroederBinary)?
 //!     .sample(Sampling::new(2e-3, 256)?)?;
@@ -54,7 +54,8 @@ mod system;
 
 pub use error::IntegrateError;
 pub use modes::{ModeSearch, SparseMode, sparse_modes};
-pub use nonlinear::force::{ForceFunction, NonlinearForce, SystemWithForces, Tangents};
+pub use nonlinear::force::{ForceFunction, NonlinearForce, Tangents};
+pub use nonlinear::system_with_forces::SystemWithForces;
 pub use nonlinear::term_forces::TermForces;
 pub use periodic::linear::{
     integrate_periodic, integrate_periodic_function, integrate_periodic_selected,
@@ -68,10 +69,11 @@ pub use schemes::houbolt::{Houbolt, HouboltStart};
 pub use schemes::matrix_exponential::MatrixExponential;
 pub use schemes::newmark::Newmark;
 pub use schemes::runge_kutta::{MidStepForce, RungeKutta4};
-pub use schemes::scheme::{AllowUnstable, Convention, Scheme, StableSteps};
+pub use schemes::scheme::{AllowUnstable, Convention, Scheme};
 pub use schemes::wilson_theta::{WilsonLoad, WilsonTheta};
 pub use stability::accuracy::{Accuracy, accuracy};
 pub use stability::free_growth::growth_per_period;
+pub use stability::stable_steps::StableSteps;
 pub use stability::{critical_step, critical_steps, spectral_radius};
 pub use stepping::sampled_force::SampledForce;
 pub use stepping::selected_dofs::SelectedDofs;

@@ -58,7 +58,8 @@ pub fn integrate_periodic<'a>(
 /// // A steady 1 N at the first of 500 masses between walls: the string of springs is straight.
 /// let n = 500;
 /// let (mass, damping) = (band(n, &[(0, 1.0)]), band(n, &[(0, 20.0)]));
-/// let chain = SparseSystem::new(mass, damping, band(n, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]))?;
+/// let stiffness = band(n, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]);
+/// let chain = SparseSystem::new(mass, damping, stiffness)?;
 /// let force = Record::from_channel(Sampling::new(0.02, 64)?, vec![1.0; 64])?;
 /// let dofs = SelectedDofs { forced: &[0], observed: &[0, 1] };
 /// let newmark = Newmark::AVERAGE_ACCELERATION;

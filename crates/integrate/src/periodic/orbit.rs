@@ -319,7 +319,7 @@ mod tests {
     use mechid_signal::{Record, Sampling};
 
     use super::*;
-    use crate::nonlinear::force::SystemWithForces;
+    use crate::nonlinear::system_with_forces::SystemWithForces;
     use crate::nonlinear::term_forces::TermForces;
     use crate::schemes::bathe::Bathe;
     use crate::schemes::houbolt::Houbolt;

@@ -17,7 +17,7 @@ use crate::stepping::selected_dofs::SelectedDofs;
 /// use mechid_model::{SparseSystem, band};
 /// use mechid_signal::{Record, Sampling};
 ///
-/// // 1 N that never changes, at the first of 500 masses between walls: the string of springs is straight.
+/// // A constant 1 N at the first of 500 masses between walls: the string of springs is straight.
 /// let n = 500;
 /// let stiffness = band(n, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
 /// let chain = SparseSystem::new(band(n, &[(0, 1.0)]), band(n, &[]), stiffness)?;

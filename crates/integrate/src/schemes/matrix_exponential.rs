@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 
 use crate::error::IntegrateError;
 use crate::schemes::motion::start_consistently;
-use crate::schemes::scheme::{Convention, Scheme, StableSteps};
+use crate::schemes::scheme::{Convention, Scheme};
+use crate::stability::stable_steps::StableSteps;
 use crate::stepping::effective_matrix::{EffectiveMatrix, Equations};
 use crate::stepping::stepper::{Instant, Loads, Stepper, check_step};
 use crate::stepping::transition::Transition;

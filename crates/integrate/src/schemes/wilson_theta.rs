@@ -4,7 +4,8 @@ use mechid_model::InitialState;
 
 use crate::error::IntegrateError;
 use crate::schemes::motion::{motion, motion_mut, start_consistently};
-use crate::schemes::scheme::{Convention, Scheme, StableSteps, check_parameter};
+use crate::schemes::scheme::{Convention, Scheme, check_parameter};
+use crate::stability::stable_steps::StableSteps;
 use crate::stepping::effective_matrix::{EffectiveMatrix, Equations};
 use crate::stepping::stepper::{Instant, Loads, Stepper, check_step};
 use crate::system::System;

@@ -9,6 +9,7 @@ mod fastest;
 pub(crate) mod free_growth;
 mod growth;
 pub(crate) mod passive;
+pub(crate) mod stable_steps;
 pub(crate) mod step_limit;
 
 use crate::error::IntegrateError;

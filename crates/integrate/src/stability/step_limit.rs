@@ -5,10 +5,10 @@ use mechid_numerics::krylov::arnoldi::dominant;
 
 use crate::error::IntegrateError;
 use crate::limits;
-use crate::schemes::scheme::StableSteps;
 use crate::stability::fastest::{Fastest, fastest, reduced, reduced_to};
 use crate::stability::growth::{Amplification, growth, own_growth, radius, small_growth};
 use crate::stability::passive;
+use crate::stability::stable_steps::StableSteps;
 use crate::stepping::effective_matrix::Equations;
 use crate::stepping::stepper::Stepper;
 use crate::stepping::transition::Transition;

@@ -12,7 +12,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::limits;
-use crate::nonlinear::force::{NonlinearForce, SystemWithForces, Tangents};
+use crate::nonlinear::force::{NonlinearForce, Tangents};
+use crate::nonlinear::system_with_forces::SystemWithForces;
 use crate::schemes::scheme::Scheme;
 use crate::stepping::fixed_size::resolves;
 use crate::stepping::stepper::Loads;

@@ -1,9 +1,7 @@
 //! Look of frequency responses.
 
-use mechid_plot::charts::{Quantity, bode};
-use mechid_plot::{Axis, Figure};
-
-use super::trace::Trace;
+use mechid_plot::Axis;
+use mechid_plot::charts::Quantity;
 
 /// Look of the frequency responses in a figure.
 ///
@@ -73,19 +71,5 @@ impl FigureStyle {
                 Axis::linear(magnitude.name, format!("dB re 1 {}", magnitude.unit))
             }
         }
-    }
-
-    /// Draws measured points and fitted lines, magnitude above phase.
-    pub(super) fn chart(
-        self,
-        title: &str,
-        usual: FrequencyScale,
-        magnitude: Quantity<'_>,
-        [measured, fitted]: [&[Trace]; 2],
-    ) -> Figure {
-        let [measured, fitted] =
-            [measured, fitted].map(|all| all.iter().map(Trace::as_response).collect::<Vec<_>>());
-        let axes = (self.frequency_axis(usual), self.magnitude_axis(magnitude));
-        bode(title, axes.0, axes.1, &measured, &fitted)
     }
 }

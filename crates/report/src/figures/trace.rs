@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mechid_plot::charts::FrequencyResponse;
+use mechid_plot::Figure;
+use mechid_plot::charts::{FrequencyResponse, Quantity, bode};
 use nalgebra::Complex;
 
 use super::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
@@ -107,5 +108,21 @@ impl Trace {
             magnitude: &self.magnitude,
             phase_deg: &self.phase_deg,
         }
+    }
+}
+
+impl FigureStyle {
+    /// Draws measured points and fitted lines, magnitude above phase.
+    pub(super) fn chart(
+        self,
+        title: &str,
+        usual: FrequencyScale,
+        magnitude: Quantity<'_>,
+        [measured, fitted]: [&[Trace]; 2],
+    ) -> Figure {
+        let [measured, fitted] = [measured, fitted]
+            .map(|traces| traces.iter().map(Trace::as_response).collect::<Vec<_>>());
+        let axes = (self.frequency_axis(usual), self.magnitude_axis(magnitude));
+        bode(title, axes.0, axes.1, &measured, &fitted)
     }
 }

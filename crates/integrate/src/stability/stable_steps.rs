@@ -1,0 +1,23 @@
+//! Steps at which a scheme is known to be stable.
+
+/// The steps Δt at which a scheme is stable on every passive system: M symmetric and positive
+/// definite, C and K symmetric and positive semidefinite.
+///
+/// If x is an eigenvector of the amplification and m, c, k are the (real) products x*Mx, x*Cx,
+/// x*Kx, its eigenvalue is also that of the single degree of freedom m, c, k, whose ω² = k/m and
+/// c/m do not exceed the largest eigenvalues of M⁻¹K and M⁻¹C. So a limit for one degree of freedom
+/// is a limit for any number.
+///
+/// # Source
+/// Hughes (1987), sections 9.1 and 9.2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StableSteps {
+    /// All steps.
+    All,
+    /// Steps with ωΔt ≤ this pure number for every natural frequency ω without damping.
+    Frequencies(f64),
+    /// Steps with |λ|Δt ≤ this pure number for every eigenvalue λ.
+    Eigenvalues(f64),
+    /// A limit without a closed form.
+    Unknown,
+}
