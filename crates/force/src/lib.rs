@@ -4,9 +4,9 @@
 //! |---|---|---|
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
 //! | [`continuous_nonlinear`] | the same, of a system with nonlinear terms | it is nonlinear |
-//! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing, noise is small |
+//! | [`discretised`] | x, ẋ of every degree of freedom | no accelerations and little noise |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
-//! | [`regularised`] | any channels, a period or up to 512 samples × forces | the lines are unknown |
+//! | [`regularised`] | any channels, a period or few samples | the lines are unknown |
 //! | [`kalman`] | any channels, any length | the record is not a period |
 //!
 //! [`with_uncertain_system`] adds the covariance of an identified system to the standard error of

@@ -27,10 +27,13 @@
 //! | a system of many degrees of freedom | [`SparseSystem`] |
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
 //! | the free response that grows | [`SecondOrderSystem::instability`] |
-//! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
-//! | an exact response of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
+//! | dynamic stiffness | [`SecondOrderSystem::dynamic_stiffness`] |
+//! | receptance | [`SecondOrderSystem::receptance`] |
+//! | exact responses of one degree of freedom | [`Sdof`], such as [`Sdof::free_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
-//! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
+//! | the name of a measured quantity | [`ResponseQuantity`] |
+//! | the name of an identified entry | [`Parameter`] |
+//! | the course of a force between samples | [`Discretisation`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | springs and dampers that are not linear | [`NonlinearSystem`], [`Terms`] |
 //! | frequency over amplitude | [`UncertainNonlinearSystem::backbone`] |

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`exact_zoh`], [`exact_zoh_periodic`] | held at the sample on the left (as a converter does) |
 //! | [`exact_foh`], [`exact_foh_periodic`] | on the straight line from sample to sample |
-//! | [`exact_harmonic`], [`exact_harmonic_periodic`] | the sum of its spectral lines up to Nyquist |
+//! | [`exact_harmonic`], [`exact_harmonic_periodic`] | the sum of its spectral lines |
 //!
 //! The periodic functions return the motion that repeats with the period `len · dt` of the force,
 //! the others start from a given state. x, ẋ and ẍ belong to the same instants. A held force, and

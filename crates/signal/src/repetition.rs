@@ -33,10 +33,11 @@ pub struct Repetition {
 /// ```
 /// use mechid_signal::repetition;
 ///
-/// let sine: Vec<f64> = (0..100).map(|k| (std::f64::consts::TAU * k as f64 / 25.0).sin()).collect();
-/// let found = repetition(&sine).unwrap();
-/// assert_eq!(found.period, 25);
-/// assert!(found.mismatch < 1e-14);
+/// let omega = std::f64::consts::TAU / 25.0;
+/// let sine: Vec<f64> = (0..100).map(|k| (omega * k as f64).sin()).collect();
+/// let repetition = repetition(&sine).unwrap();
+/// assert_eq!(repetition.period, 25);
+/// assert!(repetition.mismatch < 1e-14);
 /// ```
 ///
 /// # Source

@@ -21,11 +21,12 @@ const GAUSSIAN: f64 = 1.482_602;
 /// let pulse = |peak, start| HalfSine::new(peak, start, 0.008)?.sample(sampling);
 /// let pulses = [pulse(100.0, 0.5)?, pulse(4.0, 1.5)?, pulse(80.0, 2.5)?, pulse(30.0, 2.53)?];
 /// let force: Vec<f64> = (0..4000).map(|k| pulses.iter().map(|p| p.channel(0)[k]).sum()).collect();
-/// let found = hits(&force, sampling.dt(), &HitRule::default())?;
-/// assert_eq!(found.all.len(), 3);
-/// assert!(found.all[0].faults.is_empty());
-/// assert_eq!(found.all[1].faults[0].to_string(), "weak hit: its peak is 4.0 % of the median peak");
-/// assert_eq!(found.all[2].faults[0].to_string(), "double hit: a second peak of 37.5 % after 30.0 ms");
+/// let hits = hits(&force, sampling.dt(), &HitRule::default())?.all;
+/// assert_eq!(hits.len(), 3);
+/// assert!(hits[0].faults.is_empty());
+/// let fault = |hit: usize| hits[hit].faults[0].to_string();
+/// assert_eq!(fault(1), "weak hit: its peak is 4.0 % of the median peak");
+/// assert_eq!(fault(2), "double hit: a second peak of 37.5 % after 30.0 ms");
 /// # Ok::<(), mechid_signal::SignalError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
