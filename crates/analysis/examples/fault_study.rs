@@ -121,7 +121,7 @@ fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
             let (first, second) = (of(0)?, of(1)?);
             let force = Record::from_channels(sampling, &[first.channel(0), second.channel(0)])?;
             let response = exact_harmonic_periodic(&system, &force)?;
-            let response = delay.of(response.displacement(), seed)?;
+            let response = delay.apply(response.displacement(), seed)?;
             let periods = SAMPLES / PERIOD;
             Ok([force.repeated(periods)?, response.repeated(periods)?])
         }
