@@ -124,7 +124,7 @@ fn simulation(diagram: &mut BlockDiagram, machine: Machine) -> Simulation {
 /// their row.
 struct Estimation {
     force: BoxId,
-    found: BoxId,
+    parameters: BoxId,
     row: usize,
 }
 
@@ -171,7 +171,7 @@ pub fn identification(machine: Machine, domain: Domain) -> String {
     let error =
         diagram.block((3, 1), Role::Comparison, "Deviation", &["|estimate − true| / |true|"]);
     diagram.arrow(simulated.truth, error, Route::RowFirst);
-    diagram.arrow(estimated.found, error, Route::Straight);
+    diagram.arrow(estimated.parameters, error, Route::Straight);
     diagram.to_svg()
 }
 
@@ -204,7 +204,7 @@ pub fn force(machine: Machine, domain: Domain, equation: ForceEquation) -> Strin
         &["|F̂(ω)| against |F(ω)|"],
     );
     diagram.arrow(simulated.response, solver, Route::Straight);
-    diagram.arrow(estimated.found, solver, Route::Straight);
+    diagram.arrow(estimated.parameters, solver, Route::Straight);
     diagram.arrow(solver, identified, Route::Straight);
     diagram.arrow(identified, comparison, Route::Straight);
     diagram.arrow(estimated.force, comparison, Route::Below);

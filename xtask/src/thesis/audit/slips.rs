@@ -30,9 +30,9 @@ fn explained(row: &cells::Row) -> bool {
 
 /// The misprints of whole columns are signs.
 fn sign_is_lost(row: &cells::Row) -> bool {
-    let count =
+    let misprint =
         misprints::find(&row.cell.table, row.cell.method, row.cell.npi, misprints::Field::Estimate);
-    row.estimate.verdict == Verdict::Misprint && count.is_some_and(|m| m.npi.is_none())
+    row.estimate.verdict == Verdict::Misprint && misprint.is_some_and(|m| m.npi.is_none())
 }
 
 /// The section of the page.
