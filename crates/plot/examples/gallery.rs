@@ -76,12 +76,14 @@ fn bode() -> Figure {
             frequency: &coarse,
             magnitude: &measured,
             phase_deg: &measured_phase,
+            standard_error: &[],
         }],
         &[FrequencyResponse {
             name: "fitted: K̂ = 4 998 N/m, Ĉ = 180.3 N·s/m",
             frequency: &fine,
             magnitude: &fitted,
             phase_deg: &fitted_phase,
+            standard_error: &[],
         }],
     )
 }

@@ -114,12 +114,21 @@ pub struct Canvas {
     clips: usize,
     /// Prefix of the ids in this document.
     ids: String,
+    /// `true` for a drawing that a reader who does not see it may pass over.
+    is_decorative: bool,
 }
 
 impl Canvas {
     /// An empty white sheet, px.
     pub fn new(width: f64, height: f64) -> Self {
-        let mut sheet = Canvas { width, height, body: String::new(), clips: 0, ids: String::new() };
+        let mut sheet = Canvas {
+            width,
+            height,
+            body: String::new(),
+            clips: 0,
+            ids: String::new(),
+            is_decorative: false,
+        };
         sheet.rect((0.0, 0.0), (width, height), Some(Color::WHITE), None);
         sheet
     }
@@ -131,6 +140,25 @@ impl Canvas {
         let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
         self.ids = ids.chars().map(safe).collect();
         self
+    }
+
+    /// Returns the sheet as an ornament: without a title, and hidden from readers who do not see it.
+    pub(crate) fn decorative(mut self) -> Self {
+        self.is_decorative = true;
+        self
+    }
+
+    /// Dots of one diameter, in px, and one colour, as one path.
+    pub(crate) fn dots(&mut self, centers: &[Point], diameter: f64, color: Color) {
+        let mut path = String::with_capacity(centers.len() * 12);
+        for (x, y) in centers {
+            let _ = write!(path, "M{} {}h0", num(*x), num(*y));
+        }
+        let (width, color) = (num(diameter), color.0);
+        let _ = writeln!(
+            self.body,
+            r#"<path d="{path}" fill="none" stroke="{color}" stroke-width="{width}" stroke-linecap="round"/>"#
+        );
     }
 
     /// A straight line.
@@ -270,6 +298,12 @@ impl Canvas {
     /// Returns the document, with a title for readers who do not see it.
     pub fn finish(self, title: &str) -> String {
         let (w, h) = (num(self.width), num(self.height));
+        if self.is_decorative {
+            return format!(
+                r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w} {h}" aria-hidden="true">{}</svg>"#,
+                self.body.replace('\n', "")
+            );
+        }
         format!(
             r#"<svg xmlns="http://www.w3.org/2000/svg" width="{w}" height="{h}" viewBox="0 0 {w} {h}" font-family="{FAMILY}" role="img"><title>{}</title>
 {}</svg>
@@ -344,7 +378,7 @@ fn unmarked(text: &str) -> String {
     runs(text).into_iter().map(|(_, run)| run).collect()
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

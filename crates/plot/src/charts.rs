@@ -3,7 +3,7 @@
 use crate::axis::Axis;
 use crate::curve::{Curve, Reference};
 use crate::figure::Figure;
-use crate::panel::Panel;
+use crate::panel::{Panel, ResponsePart};
 use crate::style::{Color, Dash};
 
 /// A quantity with its unit, such as ("Force", "N").
@@ -75,6 +75,8 @@ pub struct FrequencyResponse<'a> {
     pub magnitude: &'a [f64],
     /// Phases, degrees.
     pub phase_deg: &'a [f64],
+    /// Standard errors of the magnitudes, one for each point, in the same unit; empty if not known.
+    pub standard_error: &'a [f64],
 }
 
 /// Bode plot: measured points under fitted lines, magnitude above phase (degrees). A line of the phase
@@ -90,8 +92,9 @@ pub fn bode(
     measured: &[FrequencyResponse<'_>],
     fitted: &[FrequencyResponse<'_>],
 ) -> Figure {
-    let mut above = Panel::new(frequency.clone(), magnitude);
-    let mut below = Panel::new(frequency, Axis::linear("Phase", "°").step(45.0));
+    let mut above = Panel::new(frequency.clone(), magnitude).part(ResponsePart::Magnitude);
+    let phase = Axis::linear("Phase", "°").step(45.0);
+    let mut below = Panel::new(frequency, phase).part(ResponsePart::Phase);
     for (slot, response) in measured.iter().enumerate() {
         // A single measurement is the reference for all fits and is drawn in a neutral colour.
         let color =
@@ -99,7 +102,8 @@ pub fn bode(
         let points = |label: &str, y: &[f64]| {
             Curve::points(label, response.frequency, y).slot(slot).color(color)
         };
-        above = above.curve(points(response.name, response.magnitude));
+        let magnitude = points(response.name, response.magnitude).phase(response.phase_deg);
+        above = above.curve(magnitude.standard_error(response.standard_error));
         below = below.curve(points("", response.phase_deg));
     }
     for (index, response) in fitted.iter().enumerate() {
@@ -112,7 +116,9 @@ pub fn bode(
         let line = |label: &str, x: &[f64], y: &[f64]| {
             Curve::line(label, x, y).slot(slot).dash(Dash::Solid).color(color)
         };
-        above = above.curve(line(response.name, response.frequency, response.magnitude));
+        let magnitude = line(response.name, response.frequency, response.magnitude);
+        let magnitude = magnitude.phase(response.phase_deg);
+        above = above.curve(magnitude.standard_error(response.standard_error));
         let runs = response.phase_deg.chunk_by(|a, b| (b - a).abs() <= 180.0);
         let mut start = 0;
         for run in runs {

@@ -26,6 +26,12 @@ pub struct Curve {
     pub(crate) upper: Vec<f64>,
     pub(crate) style: Style,
     pub(crate) slot: Option<usize>,
+    /// Phases of a magnitude, in degrees; empty if it has none.
+    pub(crate) phase_deg: Vec<f64>,
+    /// Standard errors of the ordinates; empty if they are not known.
+    pub(crate) error: Vec<f64>,
+    /// Words about each point; empty if there are none.
+    pub(crate) notes: Vec<String>,
 }
 
 impl Curve {
@@ -38,6 +44,9 @@ impl Curve {
             upper: Vec::new(),
             style: Style::default(),
             slot: None,
+            phase_deg: Vec::new(),
+            error: Vec::new(),
+            notes: Vec::new(),
         }
     }
 
@@ -103,6 +112,30 @@ impl Curve {
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);
+        self
+    }
+
+    /// Gives a magnitude the phases of its points, in degrees, one for each: an interactive figure
+    /// then draws phase, real and imaginary part and the Nyquist plot from them.
+    #[must_use]
+    pub fn phase(mut self, phase_deg: &[f64]) -> Self {
+        self.phase_deg = phase_deg.to_vec();
+        self
+    }
+
+    /// Shades ± 2 standard errors around the curve; `error` has one standard error for each point, in the unit
+    /// of the ordinate.
+    #[must_use]
+    pub fn standard_error(mut self, error: &[f64]) -> Self {
+        self.error = error.to_vec();
+        self
+    }
+
+    /// Gives each point words, such as the name of its record, which an interactive figure shows when
+    /// the pointer is over it.
+    #[must_use]
+    pub fn notes(mut self, notes: Vec<String>) -> Self {
+        self.notes = notes;
         self
     }
 

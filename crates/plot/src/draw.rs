@@ -110,6 +110,9 @@ fn draw_curve(
         sheet.close_group();
         return;
     }
+    if !curve.error.is_empty() {
+        error_band(layout, curve, style.color, sheet);
+    }
     let radius = marker_radius(layout.size.0, points.len());
     if curve.kind == Kind::Stems {
         draw_stems(panel, layout, &points, style.color, sheet);
@@ -128,6 +131,24 @@ fn draw_curve(
             if curve.kind == Kind::Line { trace::thin_out(points, layout.size.0) } else { points };
         sheet.polyline(&line, stroke);
     }
+}
+
+/// Number of standard errors that a band reaches to either side.
+const ERRORS: f64 = 2.0;
+
+/// Shades ± 2 standard errors; on a logarithmic axis an edge that is not positive lies at the bottom.
+fn error_band(layout: &PanelLayout, curve: &Curve, color: Color, sheet: &mut Canvas) {
+    let edge = |sign: f64| {
+        let edge = curve.y.iter().zip(&curve.error).map(|(y, error)| y + sign * ERRORS * error);
+        let lowest = layout.y_range.0;
+        edge.map(|y| if y.is_finite() { y.max(lowest) } else { lowest }).collect::<Vec<f64>>()
+    };
+    let [lower, mut upper] = [-1.0, 1.0]
+        .map(|sign| trace::thin_out(trace::map(layout.maps, &curve.x, &edge(sign)), layout.size.0));
+    upper.reverse();
+    sheet.open_faded(BAND_OPACITY);
+    sheet.polygon(&[lower, upper].concat(), Some(color), None);
+    sheet.close_group();
 }
 
 fn draw_stems(

@@ -17,6 +17,15 @@ pub enum Legend {
     Hidden,
 }
 
+/// Part of a frequency response that a panel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResponsePart {
+    /// Magnitude.
+    Magnitude,
+    /// Phase, in degrees.
+    Phase,
+}
+
 /// A pair of axes with curves and reference lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -27,6 +36,7 @@ pub struct Panel {
     pub(crate) references: Vec<Reference>,
     pub(crate) legend: Legend,
     pub(crate) reach_y: Option<(f64, f64)>,
+    pub(crate) part: Option<ResponsePart>,
 }
 
 impl Panel {
@@ -40,6 +50,7 @@ impl Panel {
             references: Vec::new(),
             legend: Legend::Auto,
             reach_y: None,
+            part: None,
         }
     }
 
@@ -82,6 +93,14 @@ impl Panel {
     #[must_use]
     pub fn legend(mut self, legend: Legend) -> Self {
         self.legend = legend;
+        self
+    }
+
+    /// Says which part of a frequency response the panel shows, so that an interactive figure can
+    /// show others: a magnitude whose curves have phases, and the phase in the panel after it.
+    #[must_use]
+    pub fn part(mut self, part: ResponsePart) -> Self {
+        self.part = Some(part);
         self
     }
 
@@ -166,12 +185,28 @@ impl Panel {
                 y_len: if curve.x.len() == curve.y.len() { upper_len } else { curve.y.len() },
             });
         }
+        for numbers in [&curve.phase_deg, &curve.error] {
+            if !numbers.is_empty() && numbers.len() != curve.x.len() {
+                return Err(PlotError::LengthMismatch {
+                    curve: curve.label.clone(),
+                    x_len: curve.x.len(),
+                    y_len: numbers.len(),
+                });
+            }
+        }
         if curve.x.is_empty() {
             return Err(PlotError::EmptyCurve { curve: curve.label.clone() });
         }
         let xs = curve.x.iter().enumerate().map(|(index, &value)| ('x', index, value));
         let ys =
             curve.ordinates().enumerate().map(|(index, value)| ('y', index % curve.x.len(), value));
+        let more = curve.phase_deg.iter().chain(&curve.error);
+        if let Some((index, value)) =
+            more.copied().enumerate().find(|(_, value)| !value.is_finite())
+        {
+            let (curve, index) = (curve.label.clone(), index % curve.x.len());
+            return Err(PlotError::NonFinite { curve, coordinate: 'y', index, value });
+        }
         for (coordinate, index, value) in xs.chain(ys) {
             let scale = if coordinate == 'x' { self.x.scale } else { self.y.scale };
             let name = curve.label.clone();

@@ -74,6 +74,37 @@ pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<P
     points.into_iter().filter(|(x, y)| taken.insert((place(*x), place(*y)))).collect()
 }
 
+/// Indices of the first point in each cell of this radius, in px.
+pub(crate) fn thinned_indices(points: &[Point], radius: f64) -> Vec<usize> {
+    let cell = |value: f64| (value / (2.0 * radius)).floor() as i64;
+    let mut taken = HashSet::new();
+    (0..points.len()).filter(|k| taken.insert((cell(points[*k].0), cell(points[*k].1)))).collect()
+}
+
+/// Keeps the highest and the lowest point of each of `columns` columns, whatever the number of points; the
+/// points as they are where they run back.
+pub(crate) fn thin_coarsely(points: Vec<Point>, columns: f64) -> Vec<Point> {
+    let is_cloud = points.windows(2).any(|pair| pair[1].0 < pair[0].0);
+    if points.len() as f64 <= columns {
+        return points;
+    }
+    if is_cloud {
+        return thinned_indices(&points, 1.0).into_iter().map(|k| points[k]).collect();
+    }
+    let (low, high) = (points[0].0, points[points.len() - 1].0);
+    let width = (high - low).max(f64::MIN_POSITIVE) / columns;
+    let column = |point: &Point| ((point.0 - low) / width).floor();
+    let extremes = points.chunk_by(|a, b| column(a) == column(b)).flat_map(|column| {
+        let by_height = |a: &&Point, b: &&Point| a.1.total_cmp(&b.1);
+        let ends = [column.iter().min_by(by_height), column.iter().max_by(by_height)];
+        let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ends.dedup();
+        ends
+    });
+    extremes.collect()
+}
+
 /// Keeps the longest of consecutive stems on the same half pixel of width.
 pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
     let longer = |a: &&Point, b: &&Point| (a.1 - base).abs().total_cmp(&(b.1 - base).abs());

@@ -1,0 +1,99 @@
+//! Numbers as text for the script, each list once.
+
+use std::collections::HashMap;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+/// Number of values up to which a list is written in decimal digits, all of them; longer ones in single precision.
+const EXACT: usize = 100;
+
+/// Largest deviation of an even list from its step, in steps.
+const EVEN: f64 = 1e-9;
+
+/// Lists by their text.
+#[derive(Debug, Default)]
+pub(super) struct Arrays {
+    texts: Vec<String>,
+    known: HashMap<String, usize>,
+}
+
+impl Arrays {
+    /// Adds a list and returns its index; `[]` has none.
+    pub fn add(&mut self, values: &[f64]) -> Option<usize> {
+        (!values.is_empty()).then(|| self.insert(text(values)))
+    }
+
+    /// Adds positive numbers of which two digits suffice, such as standard errors.
+    pub fn add_rough(&mut self, values: &[f64]) -> Option<usize> {
+        let bytes = |value: &f64| (((*value as f32).to_bits() >> 16) as u16).to_le_bytes();
+        let all: Vec<u8> = values.iter().flat_map(bytes).collect();
+        (!values.is_empty()).then(|| self.insert(format!("h {}", STANDARD.encode(all))))
+    }
+
+    fn insert(&mut self, text: String) -> usize {
+        let next = self.texts.len();
+        let index = *self.known.entry(text.clone()).or_insert(next);
+        if index == next {
+            self.texts.push(text);
+        }
+        index
+    }
+
+    /// Returns the texts in the order of their indices.
+    pub fn into_texts(self) -> Vec<String> {
+        self.texts
+    }
+}
+
+fn text(values: &[f64]) -> String {
+    let (first, last, len) = (values[0], values[values.len() - 1], values.len());
+    if len <= EXACT {
+        let digits: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+        return format!("t {}", digits.join(" "));
+    }
+    let step = (last - first) / (len - 1) as f64;
+    let is_near =
+        |(k, value): (usize, &f64)| (value - (first + step * k as f64)).abs() <= EVEN * step.abs();
+    if step.is_finite() && step != 0.0 && values.iter().enumerate().all(is_near) {
+        return format!("e {first:?} {last:?} {len}");
+    }
+    // A power of two keeps the digits, and the numbers within the range of single precision.
+    let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let scale =
+        if largest > 0.0 { largest.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+    let bytes: Vec<u8> =
+        values.iter().flat_map(|value| ((value / scale) as f32).to_le_bytes()).collect();
+    format!("f {scale:?} {}", STANDARD.encode(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_are_exact_even_or_single_precision() {
+        assert_eq!(text(&[0.1, -2.0]), "t 0.1 -2.0");
+        let even: Vec<f64> = (0..4096).map(|k| 0.25 * f64::from(k)).collect();
+        assert_eq!(text(&even), "e 0.0 1023.75 4096");
+        let values: Vec<f64> = (0..500).map(|k| 1e-9 * f64::from(k).sin()).collect();
+        let coded = text(&values);
+        let [kind, scale, coded] = coded.split(' ').collect::<Vec<_>>()[..] else { panic!() };
+        let scale: f64 = scale.parse().unwrap();
+        let bytes = STANDARD.decode(coded).unwrap();
+        let back =
+            bytes.chunks(4).map(|b| scale * f64::from(f32::from_le_bytes(b.try_into().unwrap())));
+        assert_eq!(kind, "f");
+        for (back, value) in back.zip(&values) {
+            // Half a unit of the 24th binary digit.
+            assert!((back - value).abs() <= 6e-8 * value.abs(), "{back} {value}");
+        }
+        let mut arrays = Arrays::default();
+        assert_eq!(
+            [&even, &values, &even].map(|list| arrays.add(list)),
+            [Some(0), Some(1), Some(0)]
+        );
+        assert_eq!(arrays.add(&[]), None);
+        assert_eq!(arrays.into_texts().len(), 2);
+    }
+}

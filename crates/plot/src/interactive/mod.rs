@@ -1,0 +1,108 @@
+//! Figures that answer: their numbers beside their drawing, the script that zooms in them, and pages of one figure.
+
+mod arrays;
+mod data;
+mod html;
+mod squeeze;
+mod thumbnail;
+
+use crate::error::PlotError;
+use crate::figure::Figure;
+use crate::layout::Layout;
+
+pub use self::html::{FIGURE_STYLE, content_policy, script};
+
+/// Figures of one kind of which one is shown at a time, such as the responses of a matrix.
+///
+/// ```
+/// use mechid_plot::{Axis, Curve, Figure, FigureSet, Panel};
+///
+/// let one = |y: [f64; 2]| {
+///     let panel = Panel::new(Axis::linear("Time", "s"), Axis::linear("x", "m"));
+///     Figure::new("").panel(panel.curve(Curve::line("", &[0.0, 1.0], &y)))
+/// };
+/// let set = FigureSet::new([("x1".to_owned(), one([0.0, 1.0])), ("x2".to_owned(), one([1.0, 0.0]))]);
+/// let drawn = set.draw("shapes", "Two displacements")?;
+/// assert_eq!(drawn.map.len(), 2);
+/// assert!(drawn.svg.contains("<metadata>"));
+/// # Ok::<(), mechid_plot::PlotError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct FigureSet {
+    members: Vec<(String, Figure)>,
+}
+
+/// A drawn set: the figure shown first, with the numbers of all, and a small drawing of each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DrawnSet {
+    /// SVG of the first figure, which holds the numbers of all in an element `metadata`.
+    pub svg: String,
+    /// Name and small SVG of each figure, in order; empty for a single one.
+    pub map: Vec<(String, String)>,
+}
+
+impl FigureSet {
+    /// Gathers named figures; the first is the one shown at first.
+    pub fn new(members: impl IntoIterator<Item = (String, Figure)>) -> Self {
+        Self { members: members.into_iter().collect() }
+    }
+
+    /// Returns the named figures in order.
+    pub fn members(&self) -> &[(String, Figure)] {
+        &self.members
+    }
+
+    /// Draws the set for an HTML document beside others: its ids begin with `ids`, different for each, and
+    /// `label` is its name for readers who do not see it.
+    ///
+    /// # Errors
+    /// [`PlotError::NoPanels`] without figures; as [`Figure::to_svg`] for each.
+    pub fn draw(&self, ids: &str, label: &str) -> Result<DrawnSet, PlotError> {
+        let Some((_, first)) = self.members.first() else {
+            return Err(PlotError::NoPanels { figure: label.to_owned() });
+        };
+        let svg = first.to_inline_svg(ids, label)?;
+        let layouts = self.members.iter().map(|(_, figure)| {
+            figure.validate()?;
+            Layout::new(figure)
+        });
+        let layouts: Vec<Layout> = layouts.collect::<Result<_, PlotError>>()?;
+        let json = data::json(&self.members, &layouts);
+        let map = match self.members.len() {
+            1 => Vec::new(),
+            _ => self
+                .members
+                .iter()
+                .zip(&layouts)
+                .map(|((name, figure), layout)| (name.clone(), thumbnail::svg(figure, layout)))
+                .collect(),
+        };
+        Ok(DrawnSet { svg: with_metadata(&svg, &json), map })
+    }
+}
+
+impl Figure {
+    /// Returns the figure as [`Figure::to_inline_svg`] does, with its numbers for the [`script()`] that makes
+    /// it answer.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`].
+    pub fn to_interactive_svg(&self, ids: &str, label: &str) -> Result<String, PlotError> {
+        Ok(FigureSet::new([(String::new(), self.clone())]).draw(ids, label)?.svg)
+    }
+
+    /// Returns an HTML page of the figure, which zooms, has a cursor and loads nothing.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`].
+    pub fn to_html(&self) -> Result<String, PlotError> {
+        let svg = self.to_interactive_svg("figure", &self.title)?;
+        Ok(html::page(&self.title, &svg))
+    }
+}
+
+/// Puts text for the script behind the title of a document, with the signs of XML escaped.
+pub fn with_metadata(svg: &str, json: &str) -> String {
+    let text = crate::canvas::escape(json);
+    svg.replacen("</title>", &format!("</title><metadata>{text}</metadata>"), 1)
+}

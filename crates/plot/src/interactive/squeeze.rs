@@ -1,0 +1,185 @@
+//! The script as a page carries it: without comments, without spaces that mean nothing, and with short names.
+
+/// Names of the script's own that are written short. None is a name of the browser, a key of the data, or
+/// spelled out in a text of the script.
+const LONG: [&str; 87] = [
+    "frame",
+    "state",
+    "draw",
+    "every",
+    "render",
+    "curve",
+    "curves",
+    "parent",
+    "attributes",
+    "group",
+    "major",
+    "minor",
+    "frames",
+    "nearest",
+    "digits",
+    "redraws",
+    "panel",
+    "panels",
+    "panelOf",
+    "response",
+    "legend",
+    "tools",
+    "choice",
+    "button",
+    "measured",
+    "given",
+    "inside",
+    "within",
+    "rising",
+    "rises",
+    "markers",
+    "memory",
+    "cursor",
+    "sample",
+    "trace",
+    "flush",
+    "crowded",
+    "column",
+    "columns",
+    "least",
+    "most",
+    "chain",
+    "band",
+    "label",
+    "labels",
+    "caption",
+    "place",
+    "boxed",
+    "reset",
+    "start",
+    "waiting",
+    "seen_at",
+    "shapes",
+    "project",
+    "moved",
+    "words",
+    "spot",
+    "factor",
+    "amplitude",
+    "running",
+    "sortable",
+    "filtered",
+    "scaled",
+    "padded",
+    "ticks",
+    "angles",
+    "turned",
+    "unit",
+    "zoomed",
+    "wanted",
+    "event",
+    "other",
+    "figure",
+    "handlers",
+    "middle",
+    "known",
+    "shown",
+    "extent",
+    "printing",
+    "raised",
+    "minus",
+    "options",
+    "power",
+    "change",
+    "decode",
+    "put_in",
+    "press",
+];
+
+/// Returns the script in fewer characters, which do the same.
+pub(super) fn squeeze(script: &str) -> String {
+    let lines = script.lines().map(str::trim);
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
+    let text: Vec<char> = lines.collect::<Vec<_>>().join("\n").chars().collect();
+    let mut out = String::with_capacity(text.len());
+    // Open strings and templates; a brace for each expression within a template.
+    let mut open: Vec<char> = Vec::new();
+    let mut at = 0;
+    while at < text.len() {
+        let c = text[at];
+        match open.last() {
+            Some('`') if c == '$' && text.get(at + 1) == Some(&'{') => {
+                out.push_str("${");
+                open.push('{');
+                at += 2;
+            }
+            Some(quote @ ('"' | '`')) => {
+                let is_end = c == *quote;
+                out.push(c);
+                if is_end {
+                    open.pop();
+                }
+                at += 1;
+            }
+            _ if is_word(c) => {
+                let word: String = text[at..].iter().take_while(|c| is_word(**c)).collect();
+                at += word.chars().count();
+                out.push_str(&short(&word));
+            }
+            _ => {
+                match c {
+                    '"' | '`' | '{' => open.push(c),
+                    '}' => drop(open.pop()),
+                    _ => {}
+                }
+                if !(c.is_whitespace() && is_idle(c, out.chars().last(), text.get(at + 1).copied()))
+                {
+                    out.push(c);
+                }
+                at += 1;
+            }
+        }
+    }
+    out
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_' || c == '$'
+}
+
+/// Returns whether a space or the end of a line means nothing between these signs.
+fn is_idle(blank: char, before: Option<char>, after: Option<char>) -> bool {
+    let (Some(before), Some(after)) = (before, after) else { return true };
+    match blank {
+        '\n' => ";{,([".contains(before) || "}])".contains(after),
+        _ => {
+            let joins = is_word(before) && is_word(after);
+            !joins && !("+-".contains(before) && "+-".contains(after))
+        }
+    }
+}
+
+fn short(word: &str) -> String {
+    match LONG.iter().position(|long| *long == word) {
+        Some(at) => {
+            let letter = |n: usize| char::from(b'a' + n as u8);
+            if at < 26 {
+                format!("${}", letter(at))
+            } else {
+                format!("${}{}", letter(at / 26), letter(at % 26))
+            }
+        }
+        None if word == "const" => "let".to_owned(),
+        None => word.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strings_and_templates_stay_and_words_are_not_joined() {
+        let script = "// A comment.\nconst frame = {a: \"frame = a\"};\n  return frame + +1, `frame ${frame.x + 1} {` in b;\n";
+        assert_eq!(
+            squeeze(script),
+            "let $a={a:\"frame = a\"};return $a+ +1,`frame ${$a.x+1} {`in b;"
+        );
+    }
+}
