@@ -23,6 +23,7 @@ mod error;
 mod escape;
 mod experiment;
 mod folder;
+mod geometry;
 mod json;
 mod limits;
 mod line_spec;
@@ -50,6 +51,7 @@ pub use experiment::{
     StudyField, StudyRuns, SubStepLoad,
 };
 pub use folder::{FileStamp, create_folder, files_of};
+pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;

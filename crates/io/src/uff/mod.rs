@@ -5,9 +5,11 @@
 //! 58b, 151 and 164.
 
 mod function;
+mod geometry;
 mod header;
 mod lines;
 mod responses;
+mod shapes;
 mod values;
 mod write;
 
@@ -18,7 +20,9 @@ use crate::IoError;
 use crate::contents::{Contents, Fault, Place};
 use crate::limits::{Budget, Limits};
 
+pub(crate) use self::geometry::read_geometry;
 pub(crate) use self::responses::read as read_responses;
+pub(crate) use self::shapes::write_shapes;
 pub(crate) use self::write::write_responses;
 
 /// Reads the functions of a file as columns.

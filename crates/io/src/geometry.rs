@@ -1,0 +1,281 @@
+//! Points of a structure and the lines between them, and shapes of its modes on them.
+
+use std::path::Path;
+
+use crate::contents::Place;
+use crate::{IoError, standard, uff};
+
+/// Points of a structure, and lines between them for drawing.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Geometry {
+    /// The points, each with a name of its own.
+    pub points: Vec<GeometryPoint>,
+    /// Pairs of points, by their index, that a line joins.
+    pub lines: Vec<[usize; 2]>,
+}
+
+/// A point of a structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeometryPoint {
+    /// Name, such as the number of a node.
+    pub name: String,
+    /// Cartesian coordinates, in m.
+    pub position: [f64; 3],
+}
+
+/// Point and direction of a sensor or of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Direction<'a> {
+    /// Name of the point.
+    pub point: &'a str,
+    /// Axis: 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// `true` for the direction against the axis.
+    pub is_negative: bool,
+}
+
+/// Mode of a structure with its shape at the points of a [`Geometry`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointShape {
+    /// Natural frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Damping ratio, a pure number.
+    pub damping_ratio: f64,
+    /// Real and imaginary part of the displacement along x, y, z, for each point, a pure number.
+    pub displacement: Vec<[[f64; 2]; 3]>,
+}
+
+impl<'a> Direction<'a> {
+    /// Splits a name such as `12+Z` or `bracket-X`; `None` without sign and axis at its end.
+    pub fn parse(name: &'a str) -> Option<Self> {
+        let at = name.rfind(['+', '-'])?;
+        let axis =
+            ["X", "Y", "Z"].iter().position(|axis| axis.eq_ignore_ascii_case(&name[at + 1..]))?;
+        let point = &name[..at];
+        let is_negative = name[at..].starts_with('-');
+        (!point.is_empty()).then_some(Self { point, axis, is_negative })
+    }
+}
+
+impl Geometry {
+    /// Reads the geometry in a universal file (datasets 15 or 2411, and 82), or in a table: a row `name, x, y, z` for
+    /// each point, in m, and a row `line, name, name, …` for each chain of lines.
+    ///
+    /// Coordinates of a universal file are converted to m by its dataset 164, if it has one.
+    ///
+    /// # Errors
+    /// [`IoError::Read`], and [`IoError::Malformed`] with the line that is wrong.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let file = standard::input_name(path.as_ref());
+        match standard::read_text(path.as_ref()) {
+            Ok(text) => Self::parse(&file, &text),
+            Err(source) => Err(IoError::Read { file, source }),
+        }
+    }
+
+    /// Reads the text of such a file; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`IoError::Malformed`] with the line that is wrong.
+    pub fn parse(file: &str, text: &str) -> Result<Self, IoError> {
+        let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+        if first.trim_end() == "    -1" {
+            return uff::read_geometry(file, text.as_bytes());
+        }
+        let mut geometry = Self::default();
+        for (number, line) in (1..).zip(text.lines()) {
+            geometry.read_row(line).map_err(|what| {
+                let at = Place::Line(number);
+                IoError::Malformed { file: file.to_owned(), at, what }
+            })?;
+        }
+        if geometry.points.is_empty() {
+            return Err(IoError::Empty {
+                file: file.into(),
+                found: "it has no row `name, x, y, z`",
+            });
+        }
+        Ok(geometry)
+    }
+
+    fn read_row(&mut self, line: &str) -> Result<(), String> {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            return Ok(());
+        }
+        let cells: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
+        let cells = if cells.len() > 1 { cells } else { line.split_whitespace().collect() };
+        if cells[0].eq_ignore_ascii_case("line") {
+            return self.join(&cells[1..]);
+        }
+        let numbers: Option<Vec<f64>> = cells[1..].iter().map(|cell| cell.parse().ok()).collect();
+        match numbers.as_deref() {
+            Some(&[x, y, z]) if [x, y, z].iter().all(|value: &f64| value.is_finite()) => {
+                self.add(cells[0], [x, y, z])
+            }
+            // The header of a table.
+            None if self.points.is_empty() && cells.len() == 4 => Ok(()),
+            _ => Err("a point is a name and three coordinates in m".into()),
+        }
+    }
+
+    pub(crate) fn add(&mut self, name: &str, position: [f64; 3]) -> Result<(), String> {
+        if self.index(name).is_some() {
+            return Err(format!("point {name} is there twice"));
+        }
+        self.points.push(GeometryPoint { name: name.to_owned(), position });
+        Ok(())
+    }
+
+    /// Adds lines through points in order.
+    fn join(&mut self, names: &[&str]) -> Result<(), String> {
+        let index =
+            |name: &&str| self.index(name).ok_or_else(|| format!("there is no point {name}"));
+        let chain: Vec<usize> = names.iter().map(index).collect::<Result<_, _>>()?;
+        if chain.len() < 2 {
+            return Err("a line joins two points or more".into());
+        }
+        self.lines.extend(chain.windows(2).map(|pair| [pair[0], pair[1]]));
+        Ok(())
+    }
+
+    /// Returns the index of a point.
+    pub fn index(&self, name: &str) -> Option<usize> {
+        self.points.iter().position(|point| point.name == name)
+    }
+
+    /// Makes a geometry of names alone: points in a row, 1 m apart along x, in the order of their names, joined by a line.
+    /// Names `row.column`, such as `2.3+Z`, make a grid in the plane of x and y. A name without sign and
+    /// axis is a point by itself.
+    pub fn from_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut geometry = Self::default();
+        for name in names {
+            let point = Direction::parse(name).map_or(name, |direction| direction.point);
+            if geometry.index(point).is_none() {
+                let x = geometry.points.len() as f64;
+                geometry
+                    .points
+                    .push(GeometryPoint { name: point.to_owned(), position: [x, 0.0, 0.0] });
+            }
+        }
+        let cell = |point: &GeometryPoint| {
+            let (row, column) = point.name.split_once('.')?;
+            Some([row.parse::<u32>().ok()?, column.parse::<u32>().ok()?])
+        };
+        let cells: Option<Vec<[u32; 2]>> = geometry.points.iter().map(cell).collect();
+        match cells {
+            Some(cells) if cells.len() > 1 => {
+                for (point, [row, column]) in geometry.points.iter_mut().zip(&cells) {
+                    point.position = [f64::from(*column), f64::from(*row), 0.0];
+                }
+                for (at, [row, column]) in cells.iter().enumerate() {
+                    let next = [[*row, column.saturating_add(1)], [row.saturating_add(1), *column]];
+                    let found =
+                        next.iter().filter_map(|next| cells.iter().position(|cell| cell == next));
+                    geometry.lines.extend(found.map(|other| [at, other]));
+                }
+            }
+            _ => geometry.lines = (1..geometry.points.len()).map(|k| [k - 1, k]).collect(),
+        }
+        geometry
+    }
+
+    /// Returns the displacement of each point of a shape whose entries have these names, such as `1+Z`; an entry
+    /// whose name has no axis moves its point along z. `None` if an entry has no point.
+    pub fn displacement(&self, names: &[String], shape: &[[f64; 2]]) -> Option<Vec<[[f64; 2]; 3]>> {
+        let mut moved = vec![[[0.0; 2]; 3]; self.points.len()];
+        for (name, [re, im]) in names.iter().zip(shape) {
+            let whole = Direction { point: name, axis: 2, is_negative: false };
+            let direction = match self.index(name) {
+                Some(_) => whole,
+                None => Direction::parse(name)?,
+            };
+            let sign = if direction.is_negative { -1.0 } else { 1.0 };
+            moved[self.index(direction.point)?][direction.axis] = [sign * re, sign * im];
+        }
+        Some(moved)
+    }
+
+    /// Writes a universal file of the geometry and the shapes on it: units (164: SI), points (15), lines (82), and a
+    /// dataset 55 for each shape, complex, at 3 degrees of freedom of each point.
+    ///
+    /// Points whose names are no numbers are numbered from 1.
+    pub fn universal_file(&self, shapes: &[PointShape]) -> String {
+        uff::write_shapes(self, shapes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_make_a_row_or_a_grid() {
+        let row = Geometry::from_names(["1+Z", "2+Z", "2+X", "end"]);
+        let names: Vec<&str> = row.points.iter().map(|point| point.name.as_str()).collect();
+        assert_eq!(names, ["1", "2", "end"]);
+        assert_eq!(row.lines, [[0, 1], [1, 2]]);
+        let grid = Geometry::from_names(["1.1+Z", "1.2+Z", "2.1+Z", "2.2+Z"]);
+        assert_eq!(grid.points[3].position, [2.0, 2.0, 0.0]);
+        assert_eq!(grid.lines, [[0, 1], [0, 2], [1, 3], [2, 3]]);
+        assert_eq!(Geometry::from_names([]), Geometry::default());
+    }
+
+    #[test]
+    fn a_table_has_points_and_lines_and_names_what_is_wrong() {
+        let text =
+            "point,x,y,z\n# corners\n1, 0, 0, 0\n2, 1.5, 0, 0\n3, 1.5, 1, 0\nline, 1, 2, 3\n";
+        let geometry = Geometry::parse("frame.csv", text).unwrap();
+        assert_eq!(geometry.points[1].position, [1.5, 0.0, 0.0]);
+        assert_eq!(geometry.lines, [[0, 1], [1, 2]]);
+        for (text, part) in [
+            ("1 0 0 0\n1 1 0 0\n", "line 2: point 1 is there twice"),
+            ("1 0 0 0\nline 1 7\n", "line 2: there is no point 7"),
+            ("1 0 0 0\n2 0 NaN 0\n", "line 2: a point is a name"),
+            ("1 0 0 0\n2 0 0\n", "line 2: a point is a name"),
+            ("\n", "holds no data"),
+        ] {
+            let message = Geometry::parse("g.txt", text).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn entries_move_their_points_along_their_axes() {
+        let geometry = Geometry::from_names(["1-Z", "2+X"]);
+        let names = ["1-Z".to_owned(), "2+X".to_owned(), "2".to_owned()];
+        let moved = geometry.displacement(&names, &[[1.0, 2.0], [3.0, 0.0], [5.0, 0.0]]).unwrap();
+        assert_eq!(moved[0], [[0.0; 2], [0.0; 2], [-1.0, -2.0]]);
+        assert_eq!(moved[1], [[3.0, 0.0], [0.0; 2], [5.0, 0.0]]);
+        assert!(geometry.displacement(&["9+X".to_owned()], &[[1.0, 0.0]]).is_none());
+    }
+
+    /// Judge: reading back what was written, and the field widths of the format.
+    #[test]
+    fn a_universal_file_keeps_points_lines_and_shapes() {
+        let geometry = Geometry::parse("g", "10 0 0 0\n20 0.5 0 0.125\nline 10 20\n").unwrap();
+        let shape = PointShape {
+            frequency_hz: 12.5,
+            damping_ratio: 0.02,
+            displacement: vec![[[0.0; 2]; 3], [[1.0, 0.0], [0.0; 2], [-0.5, 0.25]]],
+        };
+        let text = geometry.universal_file(&[shape]);
+        assert_eq!(Geometry::parse("g.unv", &text).unwrap(), geometry);
+        assert!(text.lines().all(|line| line.len() <= 80));
+        let lines: Vec<&str> = text.lines().collect();
+        let at = lines.iter().position(|line| line.trim() == "55").unwrap();
+        // Structural model, complex eigenvalues, three translations, displacement, complex, three values.
+        assert_eq!(
+            lines[at + 6].split_whitespace().collect::<Vec<_>>(),
+            ["1", "3", "2", "8", "5", "3"]
+        );
+        let eigenvalue: Vec<f64> =
+            lines[at + 8].split_whitespace().map(|v| v.parse().unwrap()).collect();
+        let omega = std::f64::consts::TAU * 12.5;
+        assert!((eigenvalue[0] + 0.02 * omega).abs() < 1e-4);
+        assert!((eigenvalue[1] - omega * (1.0f64 - 4e-4).sqrt()).abs() < 1e-3);
+        assert_eq!(lines[at + 11].trim(), "20");
+        assert_eq!(lines[at + 12].len(), 78);
+        assert_eq!(&lines[at + 12][..13], "  1.00000E+00");
+    }
+}
