@@ -12,6 +12,7 @@
 //! file appears complete or not at all. Whoever computes a part, in whatever order and process, writes
 //! the same rows.
 
+mod changes;
 mod failures;
 mod part;
 mod results;
@@ -27,12 +28,13 @@ use std::time::Instant;
 use mechid_io::{create_folder, files_of};
 use rayon::ThreadPoolBuilder;
 
+pub use self::changes::{ChangeKind, SIGNIFICANT};
 pub use self::failures::FailureCount;
 pub use self::part::{FleetRecord, Part, PartDone};
 pub use self::results::read_results;
 pub use self::summary::FleetSummary;
 pub use self::table::results_as_parquet;
-pub use self::trends::{OUTLIER, TrendAxis, TrendPoint, TrendSeries, Trends};
+pub use self::trends::{OUTLIER, TrendAxis, TrendChange, TrendPoint, TrendSeries, Trends};
 use crate::{AnalysisError, SavedAnalysis};
 
 /// Number of records in a part unless it is said.

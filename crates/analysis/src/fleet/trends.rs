@@ -8,6 +8,7 @@ use mechid_numerics::Uncertain;
 use mechid_signal::message;
 use serde::Serialize;
 
+use super::changes::{self, Change, ChangeKind};
 use super::failures::FailureCount;
 use super::read_results;
 use crate::text::{significant, text_table};
@@ -70,6 +71,23 @@ pub struct TrendSeries {
     pub standard_error: Option<f64>,
     /// The values, in the order of the records.
     pub points: Vec<TrendPoint>,
+    /// Steps and drifts, in the order of the records.
+    pub changes: Vec<TrendChange>,
+}
+
+/// A step or a drift of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrendChange {
+    /// Step or drift.
+    pub kind: ChangeKind,
+    /// Name of the record from which on the quantity has another value.
+    pub record: String,
+    /// Place of that record on the axis, a pure number.
+    pub at: f64,
+    /// Change of the level by a step, or from the beginning of a drift to the last record, in the unit of the series.
+    pub size: f64,
+    /// Probability that records in an order at random look as changed, adjusted for the number of series.
+    pub p_value: f64,
 }
 
 /// Value of one record.
@@ -127,6 +145,7 @@ impl Trends {
                         spread,
                         standard_error: None,
                         points,
+                        changes: Vec::new(),
                     });
                     series.len() - 1
                 });
@@ -141,7 +160,8 @@ impl Trends {
                 });
             }
         }
-        series.iter_mut().for_each(TrendSeries::judge);
+        let tests = series.len();
+        series.iter_mut().for_each(|one| one.judge(tests));
         let analyses: BTreeSet<_> =
             rows.iter().map(|row| (&row.analysis_hash, &row.version)).collect();
         Self {
@@ -157,24 +177,106 @@ impl Trends {
 }
 
 impl TrendSeries {
-    /// Computes median and spread, and marks the outliers.
-    fn judge(&mut self) {
+    /// Finds changes, computes median and spread, and marks the outliers: values far from the level of their records, not
+    /// from that of all.
+    fn judge(&mut self, tests: usize) {
         let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
         self.median = median(values.clone());
-        let away = values.iter().map(|value| (value - self.median).abs()).collect();
+        let changes = changes::find(&values, tests);
+        let levels = changes::baseline(&values, &changes);
+        let away = values.iter().zip(&levels).map(|(value, level)| (value - level).abs()).collect();
         self.spread = NORMAL_OVER_MAD * median(away);
         let errors: Vec<f64> =
             self.points.iter().filter_map(|point| point.standard_error).collect();
         self.standard_error = (!errors.is_empty()).then(|| median(errors));
-        for point in &mut self.points {
+        for (point, level) in self.points.iter_mut().zip(&levels) {
             let deviation = self.spread.hypot(point.standard_error.unwrap_or(0.0));
-            point.is_outlier = (point.value - self.median).abs() > OUTLIER * deviation;
+            point.is_outlier = (point.value - level).abs() > OUTLIER * deviation;
         }
+        self.changes = changes.iter().map(|change| self.named(change)).collect();
+    }
+
+    fn named(&self, change: &Change) -> TrendChange {
+        let first = match change.kind {
+            ChangeKind::Step => change.begins,
+            ChangeKind::Drift => change.begins + 1,
+        };
+        let point = &self.points[first.min(self.points.len() - 1)];
+        TrendChange {
+            kind: change.kind,
+            record: point.record.clone(),
+            at: point.at,
+            size: change.size,
+            p_value: change.p_value,
+        }
+    }
+
+    /// Returns the category of the quantity: frequency, damping ratio, or the letter of a parameter.
+    pub fn category(&self) -> &str {
+        ["frequency", "damping ratio"]
+            .into_iter()
+            .find(|name| self.name.starts_with(name))
+            .unwrap_or_else(|| {
+                self.name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_' || c == ',')
+            })
     }
 
     /// Returns the outliers.
     pub fn outliers(&self) -> impl Iterator<Item = &TrendPoint> {
         self.points.iter().filter(|point| point.is_outlier)
+    }
+}
+
+impl TrendSeries {
+    /// Returns a change in words.
+    pub fn sentence(&self, change: &TrendChange) -> String {
+        let (kind, size) = (change.kind.name(), significant(change.size, 3));
+        let from = match change.kind {
+            ChangeKind::Step => "at",
+            ChangeKind::Drift => "from",
+        };
+        let p = significant(change.p_value, 2);
+        let unit = format!("{size} {}", self.unit);
+        format!("{}: {kind} of {} {from} {}, p = {p}", self.name, unit.trim_end(), change.record)
+    }
+}
+
+impl Trends {
+    /// Returns the changes of all series.
+    pub fn changes(&self) -> impl Iterator<Item = (&TrendSeries, &TrendChange)> {
+        self.series.iter().flat_map(|one| one.changes.iter().map(move |change| (one, change)))
+    }
+
+    /// Returns a table with one row per value: quantity, unit, record, place on the axis, value, standard error, whether it is
+    /// an outlier, and the kind, size and p-value of a change that begins there.
+    pub fn csv(&self) -> String {
+        let header = "quantity,unit,record,at,value,standard_error,outlier,change,change_size,change_p_value";
+        let mut text = format!("{header}\n");
+        let quoted = |cell: &str| match cell.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", cell.replace('"', "\"\"")),
+            false => cell.to_owned(),
+        };
+        for series in &self.series {
+            for point in &series.points {
+                let [name, unit, record] =
+                    [&series.name, &series.unit, &point.record].map(|cell| quoted(cell));
+                let error =
+                    point.standard_error.map(|error| format!("{error:?}")).unwrap_or_default();
+                let begins =
+                    |change: &&TrendChange| change.at == point.at && change.record == point.record;
+                let change = match series.changes.iter().find(begins) {
+                    Some(TrendChange { kind, size, p_value, .. }) => {
+                        format!("{},{size:?},{p_value:?}", kind.name())
+                    }
+                    None => ",,".into(),
+                };
+                let (at, value, is_outlier) = (point.at, point.value, point.is_outlier);
+                text += &format!(
+                    "{name},{unit},{record},{at},{value:?},{error},{is_outlier},{change}\n"
+                );
+            }
+        }
+        text
     }
 }
 
@@ -220,7 +322,7 @@ fn number_in(row: &ResultRow) -> Option<f64> {
     numbers.filter(|part| !part.is_empty()).filter_map(|part| part.parse().ok()).next_back()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     match values.len() {
         0 => f64::NAN,
@@ -266,10 +368,16 @@ impl fmt::Display for Trends {
             ]);
         }
         write!(f, "\n{}", text_table(&rows))?;
+        for (series, change) in self.changes() {
+            writeln!(f, "{}", series.sentence(change))?;
+        }
         let all =
             || self.series.iter().flat_map(|one| one.outliers().map(move |point| (one, point)));
         if all().next().is_some() {
-            writeln!(f, "\noutliers, more than {OUTLIER} standard deviations from the median:")?;
+            writeln!(
+                f,
+                "\noutliers, more than {OUTLIER} standard deviations from the level of their records:"
+            )?;
         }
         for (series, point) in all().take(LISTED) {
             let value = format!("{} {}", significant(point.value, 6), series.unit);

@@ -14,8 +14,9 @@ use crate::outcome::{Files, Outcome};
 
 /// Show the results of `mechid fleet` side by side: parameters and modes over the records, outliers, failures
 ///
-/// An outlier is farther from the median than 3.5 standard deviations, those of the series (a robust
-/// estimate) and of the value together.
+/// Steps and drifts are found by the ranks of the values, with the record where they begin and a p-value.
+/// An outlier is farther from the level of its records than 3.5 standard deviations, those of the series (a
+/// robust estimate) and of the value together.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid trends results --output trends.html
@@ -34,6 +35,10 @@ pub struct TrendsArgs {
     /// Heading of the page [default: the folder]
     #[arg(long, value_name = "TEXT", requires = "output", help_heading = "Output")]
     title: Option<String>,
+    /// File for a table with one row per value: quantity, record, value, standard error, outlier, and the
+    /// change that begins there
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    table: Option<PathBuf>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -43,7 +48,11 @@ pub struct TrendsArgs {
 impl TrendsArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        Files::default().reads([&self.results]).writes(&self.output).writes(&self.plot.plot)
+        Files::default()
+            .reads([&self.results])
+            .writes(&self.output)
+            .writes(&self.table)
+            .writes(&self.plot.plot)
     }
 
     /// Reads the results, and draws them.
@@ -54,6 +63,9 @@ impl TrendsArgs {
             let of_folder = || format!("Results in {}", self.results.display());
             let title = self.title.clone().unwrap_or_else(of_folder);
             outcome = outcome.with_file(file, trends_page(&trends, &title)?);
+        }
+        if let Some(file) = &self.table {
+            outcome = outcome.with_file(file, trends.csv());
         }
         outcome.with_plot(&self.plot, || Ok(trends.figure()?))
     }

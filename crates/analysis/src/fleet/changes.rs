@@ -1,0 +1,269 @@
+//! Steps and drifts of a quantity over many records, by the ranks of its values.
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+/// Smallest number of records on either side of a step, and of a drift. Fewer are outliers.
+const LEAST: usize = 4;
+
+/// Number of orders at random behind a p-value. The least p-value is one over this.
+const ORDERS: usize = 9999;
+
+/// Number of orders that look as changed after which a p-value is known well enough; it is then about this over the number of
+/// orders tried.
+///
+/// # Source
+/// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).
+const EXCEEDED: usize = 20;
+
+/// Number of records that a test shuffles one by one; of more, means of neighbours.
+const SHUFFLED: usize = 2000;
+
+/// p-value of a quantity, adjusted for the number of quantities, below which a change is told.
+pub const SIGNIFICANT: f64 = 0.01;
+
+/// Number of pairs of records at most from which a slope is computed, in each direction.
+const SLOPES: usize = 400;
+
+/// Way in which a quantity changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChangeKind {
+    /// From one level to another, between two records.
+    Step,
+    /// By the same amount from record to record, from one record on.
+    Drift,
+}
+
+impl ChangeKind {
+    /// Returns the word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Drift => "drift",
+        }
+    }
+}
+
+/// A change within a list of values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Change {
+    pub kind: ChangeKind,
+    /// Index of the first value after a step, or of the last one before a drift.
+    pub begins: usize,
+    pub p_value: f64,
+    /// Difference of the levels of a step, or from the first to the last value of a drift.
+    pub size: f64,
+}
+
+/// Finds the changes of values in order: the largest, then those within its parts. `tests` is the number of lists that
+/// are looked at, for which each p-value is adjusted.
+pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let mut parts = vec![(0, values.len())];
+    while let Some((start, end)) = parts.pop() {
+        let part = &values[start..end];
+        let Some(mut change) = largest(part) else { continue };
+        change.p_value = (change.p_value * tests as f64).min(1.0);
+        if change.p_value >= SIGNIFICANT {
+            continue;
+        }
+        change.begins += start;
+        parts.push((start, change.begins));
+        if change.kind == ChangeKind::Step {
+            parts.push((change.begins, end));
+        }
+        changes.push(change);
+    }
+    changes.sort_by_key(|change| change.begins);
+    changes
+}
+
+/// Returns for each value the level that it would have without noise: the medians between steps, and the line of a drift.
+pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
+    let mut levels = Vec::with_capacity(values.len());
+    let mut start = 0;
+    let ends = changes.iter().map(|change| (change.begins, Some(change)));
+    for (end, change) in ends.chain([(values.len(), None)]) {
+        let level = super::trends::median(values[start..end].to_vec());
+        levels.extend((start..end).map(|_| level));
+        start = end;
+        if let Some(change) = change.filter(|change| change.kind == ChangeKind::Drift) {
+            let slope = change.size / (values.len() - 1 - change.begins) as f64;
+            let level = if level.is_finite() { level } else { values[start] };
+            levels.extend((start..values.len()).map(|k| level + slope * (k - start) as f64));
+            break;
+        }
+    }
+    levels
+}
+
+/// The step or drift that explains most of the ranks of some values, with the share of orders at random that would
+/// explain as much. Both have one size and one beginning, so that the larger share is the likelier.
+fn largest(values: &[f64]) -> Option<Change> {
+    if values.len() < 2 * LEAST {
+        return None;
+    }
+    let ranks = ranks(values);
+    let (kind, begins, _) = best(&ranks, LEAST)?;
+    let mut shuffled = means_of_neighbours(&ranks);
+    let least = (LEAST * shuffled.len()).div_ceil(values.len()).max(1);
+    let (_, _, explained) = best(&shuffled, least)?;
+    // The same seed for every list: the same rows give the same page.
+    let mut random = ChaCha8Rng::seed_from_u64(48);
+    let (mut orders, mut exceeded) = (0, 0);
+    while orders < ORDERS && exceeded < EXCEEDED {
+        orders += 1;
+        shuffled.shuffle(&mut random);
+        exceeded +=
+            usize::from(best(&shuffled, least).is_some_and(|(.., share)| share >= explained));
+    }
+    let p_value = (exceeded + 1) as f64 / (orders + 1) as f64;
+    let size = match kind {
+        ChangeKind::Step => {
+            let [before, after] = [&values[..begins], &values[begins..]]
+                .map(|part| super::trends::median(part.to_vec()));
+            after - before
+        }
+        ChangeKind::Drift => slope(&values[begins..]) * (values.len() - 1 - begins) as f64,
+    };
+    Some(Change { kind, begins, p_value, size })
+}
+
+/// Ranks less their mean; equal values share their mean rank.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut below = 0;
+    let middle = (values.len() as f64 - 1.0) / 2.0;
+    for tied in order.chunk_by(|a, b| values[*a] == values[*b]) {
+        let rank = below as f64 + (tied.len() as f64 - 1.0) / 2.0 - middle;
+        tied.iter().for_each(|k| ranks[*k] = rank);
+        below += tied.len();
+    }
+    ranks
+}
+
+fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
+    let width = ranks.len().div_ceil(SHUFFLED);
+    let mean = |some: &[f64]| some.iter().sum::<f64>() / some.len() as f64;
+    let means: Vec<f64> = ranks.chunks(width).map(mean).collect();
+    let middle = mean(&means);
+    means.into_iter().map(|value| value - middle).collect()
+}
+
+/// The change that explains the largest share of the variance of values whose sum is zero: kind, beginning, share.
+fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
+    let len = values.len();
+    let total: f64 = values.iter().map(|value| value * value).sum();
+    if total <= 0.0 || len < 2 * least {
+        return None;
+    }
+    let mut best = (ChangeKind::Step, 0, 0.0);
+    let n = len as f64;
+    // Sum of the values behind k, and of their distances from k times the values.
+    let (mut behind, mut moment) = (0.0, 0.0);
+    for k in (0..len).rev() {
+        moment += behind;
+        let (m, after) = ((len - 1 - k) as f64, len - 1 - k);
+        if after >= least {
+            let spread = m * (m + 1.0) * (2.0 * m + 1.0) / 6.0 - (m * (m + 1.0) / 2.0).powi(2) / n;
+            let share = moment * moment / (spread * total);
+            if share > best.2 {
+                best = (ChangeKind::Drift, k, share);
+            }
+        }
+        behind += values[k];
+        if k >= least && len - k >= least {
+            let (before, after) = (k as f64, (len - k) as f64);
+            let share = behind * behind * n / (before * after * total);
+            if share > best.2 {
+                best = (ChangeKind::Step, k, share);
+            }
+        }
+    }
+    (best.2 > 0.0).then_some(best)
+}
+
+/// Median of the slopes between pairs of values.
+///
+/// # Source
+/// P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63 (1968).
+fn slope(values: &[f64]) -> f64 {
+    let every = values.len().div_ceil(SLOPES).max(1);
+    let some: Vec<(usize, f64)> = values.iter().copied().enumerate().step_by(every).collect();
+    let pairs = some
+        .iter()
+        .enumerate()
+        .flat_map(|(at, (i, a))| some[at + 1..].iter().map(move |(j, b)| (b - a) / (j - i) as f64));
+    super::trends::median(pairs.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Noise of standard deviation 1, the sum of twelve uniform numbers less six.
+    fn noise(len: usize, seed: u64) -> Vec<f64> {
+        let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mut uniform = || {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..len).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+    }
+
+    #[test]
+    fn a_step_behind_an_outlier_is_found_where_it_is() {
+        let mut values = noise(60, 3);
+        values[20..].iter_mut().for_each(|value| *value += 3.0);
+        values[10] = 1e6;
+        let changes = find(&values, 10);
+        let [step] = changes[..] else { panic!("{changes:?}") };
+        assert_eq!(
+            (step.kind, step.begins.abs_diff(20) <= 1),
+            (ChangeKind::Step, true),
+            "{step:?}"
+        );
+        assert!(step.p_value < SIGNIFICANT && (step.size - 3.0).abs() < 1.0, "{step:?}");
+        let levels = baseline(&values, &changes);
+        assert!((levels[0]).abs() < 0.6 && (levels[59] - 3.0).abs() < 0.6);
+    }
+
+    #[test]
+    fn a_drift_is_found_with_its_beginning_and_its_rise() {
+        let mut values = noise(120, 5);
+        for (k, value) in values.iter_mut().enumerate().skip(50) {
+            *value += 0.15 * (k - 50) as f64;
+        }
+        let changes = find(&values, 10);
+        let drift = changes.last().unwrap();
+        assert_eq!(drift.kind, ChangeKind::Drift, "{changes:?}");
+        // Half the noise of a value is the rise of three to four records; ten of them.
+        assert!(drift.begins.abs_diff(50) <= 12, "{drift:?}");
+        assert!((drift.size - 0.15 * (119 - drift.begins) as f64).abs() < 2.0, "{drift:?}");
+        let levels = baseline(&values, &changes);
+        assert_eq!(levels.len(), 120);
+        assert!((levels[119] - 0.15 * 69.0).abs() < 1.5, "{}", levels[119]);
+    }
+
+    /// Judge: of lists of noise, the share of p-values below a limit is that limit.
+    #[test]
+    fn p_values_of_noise_are_even() {
+        let below =
+            (0..400).filter(|seed| largest(&noise(40, seed + 1)).unwrap().p_value < 0.1).count();
+        // 40 are expected, ± 6; four standard deviations.
+        assert!((16..=64).contains(&below), "{below} of 400");
+    }
+
+    #[test]
+    fn a_few_values_and_equal_ones_do_not_change() {
+        assert!(find(&[1.0, 2.0, 9.0], 1).is_empty());
+        assert!(find(&[2.0; 50], 1).is_empty());
+    }
+}
