@@ -20,6 +20,14 @@ pub enum CliError {
     /// A file cannot be read, understood or written.
     #[error(transparent)]
     Io(#[from] IoError),
+    /// The file about a measurement cannot be read.
+    #[error("{file}: {source}")]
+    About {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// An option without its object.
     #[error("{option} {why}")]
     MisplacedOption {

@@ -115,9 +115,12 @@ impl Outcome {
     ) -> Result<Self, CliError> {
         let Some(path) = &plot.plot else { return Ok(self) };
         let figure = figure()?;
-        let bitmap = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
-        let content =
-            if bitmap { figure.to_png(PNG_SCALE)? } else { figure.to_svg()?.into_bytes() };
+        let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+        let content = match ending.as_deref().and_then(|ending| ending.to_str()) {
+            Some("png") => figure.to_png(PNG_SCALE)?,
+            Some("html") => figure.to_html()?.into_bytes(),
+            _ => figure.to_svg()?.into_bytes(),
+        };
         Ok(self.with_file(path, content))
     }
 

@@ -77,6 +77,13 @@ impl Figure {
         self
     }
 
+    /// Gives the figure another title.
+    #[must_use]
+    pub fn titled(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
     /// Title of the figure.
     pub fn name(&self) -> &str {
         &self.title

@@ -89,6 +89,13 @@ impl Panel {
         self
     }
 
+    /// Gives the panel another ordinate.
+    #[must_use]
+    pub fn y(mut self, axis: Axis) -> Self {
+        self.y = axis;
+        self
+    }
+
     /// Places the legend.
     #[must_use]
     pub fn legend(mut self, legend: Legend) -> Self {

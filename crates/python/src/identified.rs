@@ -94,7 +94,7 @@ impl Identified {
 
     /// The page of the program's report, as HTML.
     fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
-        let settings = PageSettings { title, reconstruct_force: force, command: None };
+        let settings = PageSettings { title, reconstruct_force: force, ..PageSettings::default() };
         let identified = Arc::clone(&self.0);
         work::watched(py, None, || Ok(()), move || page(&identified, &settings))
     }

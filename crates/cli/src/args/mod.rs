@@ -30,16 +30,17 @@ pub struct ReportArgs {
 /// File to draw the result into.
 #[derive(Debug, Default, Args)]
 pub struct PlotArgs {
-    /// Draw the result into this file; its ending, .svg or .png, says how
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = plot_file, help_heading = "Output")]
+    /// Draw the result into this file; its ending, .svg, .png or .html, says how; a page
+    /// zooms and has a cursor
+    #[arg(long, value_name = "FILE.svg|.png|.html", value_parser = plot_file, help_heading = "Output")]
     pub plot: Option<PathBuf>,
 }
 
 fn plot_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
-        Some("svg" | "png") => Ok(path),
-        _ => Err("the file name must end in .svg or .png".into()),
+        Some("svg" | "png" | "html") => Ok(path),
+        _ => Err("the file name must end in .svg, .png or .html".into()),
     }
 }
 

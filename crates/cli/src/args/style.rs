@@ -1,6 +1,7 @@
 //! Look of pictures of frequency responses.
 
 use clap::{Args, ValueEnum};
+use mechid::analysis::ResponseQuantity;
 use mechid::report::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 
 /// Look of the frequency responses in the picture.
@@ -16,6 +17,20 @@ pub struct StyleArgs {
     /// Magnitude axis of the picture
     #[arg(long, value_name = "SCALE", value_enum, default_value_t, requires = "plot")]
     plot_magnitude: PlotMagnitude,
+    /// Response per unit force in the picture [default: as measured; receptance for mechid modal]
+    #[arg(long, value_name = "QUANTITY", value_enum, requires = "plot")]
+    plot_quantity: Option<PlotQuantity>,
+}
+
+/// Response per unit force, by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PlotQuantity {
+    /// Displacement per force
+    Receptance,
+    /// Velocity per force
+    Mobility,
+    /// Acceleration per force
+    Accelerance,
 }
 
 /// Branch of the phase, by name.
@@ -63,6 +78,11 @@ impl StyleArgs {
                 PlotMagnitude::Log => MagnitudeScale::Logarithmic,
                 PlotMagnitude::Db => MagnitudeScale::Decibel,
             },
+            quantity: self.plot_quantity.map(|quantity| match quantity {
+                PlotQuantity::Receptance => ResponseQuantity::Displacement,
+                PlotQuantity::Mobility => ResponseQuantity::Velocity,
+                PlotQuantity::Accelerance => ResponseQuantity::Acceleration,
+            }),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! `mechid report`: one HTML file with everything an identification has to show.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mechid::analysis::Identified;
-use mechid::io::{is_standard_output, output_name};
+use mechid::io::{Geometry, input_name, is_standard_output, output_name};
 use mechid::report::{PageSettings, page};
 use serde::Serialize;
 
@@ -18,7 +19,7 @@ use crate::{options, repeat};
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
 ///
 /// Takes the options of `mechid identify`. The file needs nothing else: it can be sent, printed and
-/// kept, and ends with the command that writes it again.
+/// kept; its figures zoom and have a cursor. It ends with the command that writes it again.
 ///
 /// A long text is gone through a stretch at a time and held as by `mechid identify`: levels, time
 /// histories and mean periods are those of all samples; the residual in time and, of an open record,
@@ -43,8 +44,31 @@ pub struct PageArgs {
     /// Heading of the report [default: the name of the record]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     title: Option<String>,
+    /// File with more to stand on the page, one `name: value` per line, such as sensors, operator, date, place
+    /// and comment
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    about: Option<PathBuf>,
+    /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and 82), or a table with
+    /// rows name,x,y,z in m and line,name,name [default: a row, by the names of the channels]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    geometry: Option<PathBuf>,
     #[command(flatten)]
     pub report: ReportArgs,
+}
+
+/// Reads lines of `name: value`; a line without a colon continues the one before.
+fn read_about(file: &Path) -> Result<Vec<(String, String)>, CliError> {
+    let text = fs::read_to_string(file)
+        .map_err(|source| CliError::About { file: input_name(file), source })?;
+    let mut about: Vec<(String, String)> = Vec::new();
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        match (line.split_once(':'), about.last_mut()) {
+            (Some((name, value)), _) => about.push((name.trim().into(), value.trim().into())),
+            (None, Some((_, value))) => *value += &format!(" {line}"),
+            (None, None) => about.push(("Comment".into(), line.into())),
+        }
+    }
+    Ok(about)
 }
 
 /// Parses the name of a page.
@@ -68,7 +92,7 @@ struct Printed<'a> {
 impl PageArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        self.fit.files().writes([&self.output])
+        self.fit.files().reads(&self.about).reads(&self.geometry).writes([&self.output])
     }
 
     /// Reads, identifies, draws and writes; `words` are the arguments of the program.
@@ -78,6 +102,8 @@ impl PageArgs {
             title: self.title.clone(),
             reconstruct_force: self.reconstruct_force,
             command: Some(repeat::command(words)),
+            about: self.about.as_deref().map(read_about).transpose()?.unwrap_or_default(),
+            geometry: self.geometry.as_ref().map(Geometry::read).transpose()?,
         };
         let page = options::spelled(&page(&identified, &settings)?);
         let html = output_name(&self.output);

@@ -130,7 +130,11 @@ pub(super) fn json(members: &[(String, Figure)], layouts: &[Layout]) -> String {
             .panels
             .iter()
             .zip(&layout.panels)
-            .map(|(panel, layout)| panel_data(panel, layout, &mut arrays))
+            .enumerate()
+            .map(|(at, (panel, layout))| {
+                let title = if at == 0 && panel.title.is_empty() { name } else { &panel.title };
+                panel_data(panel, title, layout, &mut arrays)
+            })
             .collect(),
     });
     let views: Vec<View<'_>> = views.collect();
@@ -139,7 +143,12 @@ pub(super) fn json(members: &[(String, Figure)], layouts: &[Layout]) -> String {
     serde_json::to_string(&Data { width, views, arrays: arrays.into_texts() }).unwrap_or_default()
 }
 
-fn panel_data<'a>(panel: &'a Panel, layout: &PanelLayout, arrays: &mut Arrays) -> PanelData<'a> {
+fn panel_data<'a>(
+    panel: &'a Panel,
+    title: &'a str,
+    layout: &PanelLayout,
+    arrays: &mut Arrays,
+) -> PanelData<'a> {
     // The script draws the phase from the curves of the magnitude.
     let has_phase = |curve: &Curve| !curve.phase_deg.is_empty();
     let part = match panel.part {
@@ -157,7 +166,7 @@ fn panel_data<'a>(panel: &'a Panel, layout: &PanelLayout, arrays: &mut Arrays) -
             .collect(),
     };
     PanelData {
-        title: &panel.title,
+        title,
         height: layout.size.1.round(),
         x: axis_data(&panel.x, layout.x_range),
         y: axis_data(&panel.y, layout.y_range),

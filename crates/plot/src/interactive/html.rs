@@ -36,12 +36,13 @@ pub const FIGURE_STYLE: &str = include_str!("figure.css");
 /// A page of one drawn figure.
 pub(super) fn page(title: &str, svg: &str) -> String {
     let heading = if title.is_empty() { "Figure".into() } else { escape(title) };
+    let above = if title.is_empty() { String::new() } else { format!("<h1>{heading}</h1>") };
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{heading}</title>\
-         <style>{FIGURE_STYLE}</style></head>\n<body><main><figure class=\"wide\">{svg}</figure></main>\
+         <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}<figure class=\"wide\">{svg}</figure></main>\
          <script>{}</script></body></html>\n",
         content_policy(),
         script()

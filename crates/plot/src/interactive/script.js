@@ -1,7 +1,7 @@
 "use strict";
 (() => {
 const {abs, ceil, cos, floor, log10, max, min, round, sin, PI} = Math, DEG = PI / 180, INK = "#333333";
-const every = (root, selector) => [...root.querySelectorAll(selector)];
+const pick = (root, selector) => [...root.querySelectorAll(selector)];
 // Words reach the page as text and attributes only, never as markup.
 const put = (made, attributes, text) => {
     for (const name in attributes) made.setAttribute(name, attributes[name]);
@@ -86,7 +86,7 @@ const choice = (parent, label, options, value, change) => {
 };
 const button = (parent, text, onclick) => Object.assign(add(parent, "button", {type: "button"}, text), {onclick});
 // The small drawings choose what the large one shows.
-const map = (figure, change) => every(figure, ".map button").forEach((one, k, buttons) => {
+const map = (figure, change) => pick(figure, ".map button").forEach((one, k, buttons) => {
     press(one, !k);
     one.onclick = () => { buttons.forEach(other => press(other, other === one)); change(k); };
 });
@@ -97,7 +97,7 @@ const begin = svg => {
     return [JSON.parse(svg.querySelector("metadata").textContent), tools, out, svg.closest("figure")];
 };
 const clear = (svg, width, height) => {
-    every(svg, ":scope > :not(title, metadata)").forEach(child => child.remove());
+    pick(svg, ":scope > :not(title, metadata)").forEach(child => child.remove());
     put(svg, {viewBox: `0 0 ${width} ${height}`, width, height});
     draw(svg, "rect", {width, height, fill: "#ffffff"});
 };
@@ -166,22 +166,26 @@ const plot = svg => {
     const render = () => {
         const width = printing ? data.w : max(280, round(svg.getBoundingClientRect().width));
         const view = data.v[state.view], all = panels(), columns = within(min(view.c, floor(width / 300)), 1, all.length);
+        const fit = (low, high, step) => within((high - low) / step, 2, 9);
+        const ranges = all.map((p, n) => {
+            const zoomed = state.x[key(p.x)], x = zoomed ?? p.x.r ?? extent(p, 1);
+            return [x, state.y[n] ?? (p.y.fixed || p.y.l === "Coherence" || !(zoomed || state.off.size) ? p.y.r : undefined) ?? extent(p, 0, x)];
+        });
+        const labels = max(2, ...all.flatMap((p, n) => ticks(p.y, ranges[n][1], fit(0, p.h, 42)).major.map(t => t[1].length))) * 6.6;
         frames = [];
         let top = 6;
         for (let row = 0; row < all.length; row += columns) {
             const some = all.slice(row, row + columns), last = row + columns >= all.length || !view.s;
             const head = some.some(p => p.t) ? 22 : 16, height = max(...some.map(p => p.h)), bottom = top + head + height;
             some.forEach((p, column) => {
-                const n = row + column, zoomed = state.x[key(p.x)], {fixed} = p.y;
-                let xs = zoomed ?? p.x.r ?? extent(p, 1);
-                let ys = state.y[n] ?? (fixed || p.y.l === "Coherence" || !(zoomed || state.off.size) ? p.y.r : undefined) ?? extent(p, 0, xs);
-                const room = width / columns, labels = max(2, ...ticks(p.y, ys, within(height / 42, 2, 9)).major.map(t => t[1].length)) * 6.6;
+                const n = row + column, room = width / columns;
+                let [xs, ys] = ranges[n];
                 const left = column * room + 32 + labels, right = (column + 1) * room - 14;
-                if (p.c[0]?.F && !zoomed) {
+                if (p.c[0]?.F && !state.x[key(p.x)]) {
                     const unit = max((xs[1] - xs[0]) / (right - left), (ys[1] - ys[0]) / height) / 2;
                     [xs, ys] = [[xs, right - left], [ys, height]].map(([[a, b], long]) => [(a + b) / 2 - unit * long, (a + b) / 2 + unit * long]);
                 }
-                frames.push({p, n, left, right, top: top + head, bottom, xs, ys, last, labels, X: scaled(xs, p.x.g, left, right), Y: scaled(ys, p.y.g, bottom, top + head)});
+                frames.push({p, n, left, right, top: top + head, bottom, xs, ys, last, labels, fit, X: scaled(xs, p.x.g, left, right), Y: scaled(ys, p.y.g, bottom, top + head)});
             });
             top = bottom + (last ? 46 : 10);
         }
@@ -193,8 +197,8 @@ const plot = svg => {
     };
     const label = (parent, x, y, text, more) => draw(parent, "text", {x, y, "font-size": 11.5, "text-anchor": "middle", fill: INK, ...more}, text);
     const panelOf = frame => {
-        const {p, left, right, top, bottom, X, Y, xs, ys, last, labels, n} = frame, group = draw(svg, "g", {class: "panel"}), id = `z${base}-${n}`;
-        const xt = ticks(p.x, xs, within((right - left) / 70, 2, 12)), yt = ticks(p.y, ys, within((bottom - top) / 42, 2, 9));
+        const {p, left, right, top, bottom, X, Y, xs, ys, last, labels, n, fit} = frame, group = draw(svg, "g", {class: "panel"}), id = `z${base}-${n}`;
+        const xt = ticks(p.x, xs, fit(left, right, 70)), yt = ticks(p.y, ys, fit(top, bottom, 42));
         const down = v => `M${px(X(v))} ${top}V${bottom}`, across = v => `M${left} ${px(Y(v))}H${right}`;
         const grid = (x, y, stroke) => draw(group, "path", {d: x.map(down).join("") + y.map(across).join(""), stroke, fill: "none"});
         grid(xt.minor, yt.minor, "#f1f1f1");
@@ -262,7 +266,7 @@ const plot = svg => {
             const parts = c.k ? press(button(legend, "", () => {
                 state.off.delete(name) || state.off.add(name);
                 render();
-                every(legend, "button").find(other => other.textContent === name).focus();
+                pick(legend, "button").find(other => other.textContent === name).focus();
             }), !state.off.has(name)) : add(legend, "span");
             const sample = draw(parts, "svg", {width: 28, height: 12, "aria-hidden": true});
             if (c.k === "b") draw(sample, "rect", {width: 28, height: 12, fill: c.o, opacity: 0.3});
@@ -339,7 +343,7 @@ const plot = svg => {
                 waiting = undefined;
                 const frame = start ? start.frame : inside(x, y);
                 if (!start) { if (frame) point(frame, x, y); return; }
-                every(svg, ".select").forEach(box => box.remove());
+                pick(svg, ".select").forEach(box => box.remove());
                 if (start.pan) {
                     select("x", key(frame.p.x), frame.left - x + start.x, frame.right - x + start.x, frame.X);
                     select("y", frame.n, frame.bottom - y + start.y, frame.top - y + start.y, frame.Y);
@@ -352,7 +356,7 @@ const plot = svg => {
             });
         },
         pointerup: event => {
-            every(svg, ".select").forEach(box => box.remove());
+            pick(svg, ".select").forEach(box => box.remove());
             if (start && !start.pan) {
                 const {frame} = start, [x, width, y, height, flat] = boxed(...place(event));
                 if (width > 5) {
@@ -453,27 +457,27 @@ const shapes = svg => {
     return render;
 };
 
-const sortable = table => every(table, "thead th").forEach((head, column) => {
+const sortable = table => pick(table, "thead th").forEach((head, column) => {
     const text = head.textContent;
     put(head, {}, "");
     button(head, text, () => {
-        const rows = every(table, "tbody tr"), up = head.getAttribute("aria-sort") !== "ascending";
+        const rows = pick(table, "tbody tr"), up = head.getAttribute("aria-sort") !== "ascending";
         const value = row => { const text = row.cells[column].textContent.replace(/−/g, "-"), n = parseFloat(text); return n === n ? n : text; };
-        every(table, "th").forEach(other => other.removeAttribute("aria-sort"));
+        pick(table, "th").forEach(other => other.removeAttribute("aria-sort"));
         put(head, {"aria-sort": up ? "ascending" : "descending"});
         rows.sort((a, b) => { const [u, v] = [value(a), value(b)]; return (u > v) - (u < v) || typeof u > typeof v; });
         table.tBodies[0].append(...(up ? rows : rows.reverse()));
     });
 });
 const filtered = section => {
-    const items = every(section, "[data-category]"), names = [...new Set(items.map(item => item.dataset.category))], tools = add(null, "div", {class: "tools"});
+    const items = pick(section, "[data-category]"), names = [...new Set(items.map(item => item.dataset.category))], tools = add(null, "div", {class: "tools"});
     section.querySelector("h2").after(tools);
     choice(tools, "Show", [["", "all"], ...names.map(name => [name, name])], "", value => items.forEach(item => { item.hidden = value && item.dataset.category !== value; }));
 };
 
-every(document, "table.sort").forEach(sortable);
-every(document, "[data-filter]").forEach(filtered);
-every(document, "svg > metadata").forEach(({parentNode: svg}) => {
+pick(document, "table.sort").forEach(sortable);
+pick(document, "[data-filter]").forEach(filtered);
+pick(document, "svg > metadata").forEach(({parentNode: svg}) => {
     // What nobody looks at yet stays as it was drawn.
     const seen = new IntersectionObserver(entries => {
         if (!entries.some(entry => entry.isIntersecting)) return;

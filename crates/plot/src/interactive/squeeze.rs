@@ -6,7 +6,6 @@ const LONG: [&str; 87] = [
     "frame",
     "state",
     "draw",
-    "every",
     "render",
     "curve",
     "curves",
@@ -90,6 +89,7 @@ const LONG: [&str; 87] = [
     "decode",
     "put_in",
     "press",
+    "pick",
 ];
 
 /// Returns the script in fewer characters, which do the same.

@@ -1,5 +1,7 @@
 //! Magnitude, phase and coherence.
 
+use std::f64::consts::TAU;
+
 use mechid_analysis::FrfTable;
 use mechid_plot::charts::Quantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
@@ -20,8 +22,12 @@ pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
                 false => report.pair(r),
             };
             let values = r.real.iter().zip(&r.imaginary).map(|(re, im)| Complex::new(*re, *im));
-            let omega = report.frequency_hz.iter().map(|hz| hz * std::f64::consts::TAU);
-            Trace::line(style, name, omega.zip(values))
+            let omega = report.frequency_hz.iter().map(|hz| hz * TAU);
+            let points: Vec<(f64, Complex<f64>)> = omega.zip(values).collect();
+            let errors = points.iter().zip(&r.standard_error);
+            let errors = errors.filter(|((omega, h), _)| Trace::is_drawn(style, *omega, *h));
+            let errors = errors.map(|(_, error)| *error).collect();
+            Trace::line(style, name, points.into_iter()).standard_error(style, errors)
         })
         .collect();
     let name = match report.quantity.as_str() {

@@ -10,6 +10,7 @@ mod motion;
 pub mod receptance;
 mod record;
 pub mod restoring;
+pub mod shapes;
 mod style;
 mod sweep;
 pub mod trace;
@@ -74,6 +75,27 @@ pub(crate) fn displacement_name(channels: &Channels, kind: ResponseQuantity, dof
     }
 }
 
+/// Name of a motion as it is drawn: that of its channel where this is what is drawn, or of the place.
+pub(crate) fn motion_name(
+    channels: &Channels,
+    measured: ResponseQuantity,
+    dof: usize,
+    drawn: Option<ResponseQuantity>,
+) -> String {
+    let name = channels.response_name(measured, dof);
+    match drawn {
+        Some(drawn) if drawn != measured => {
+            let motion = match drawn {
+                ResponseQuantity::Displacement => "x",
+                ResponseQuantity::Velocity => "v",
+                ResponseQuantity::Acceleration => "a",
+            };
+            format!("{motion} at {name}")
+        }
+        _ => name,
+    }
+}
+
 impl ToFigure for Identified {
     /// Draws measured and identified receptance, or, where no line separates the forces, the amplitudes of
     /// the response, measured and predicted, and the coherence of random and hammer tests; for a fit in the time
@@ -89,7 +111,9 @@ impl ToFigure for Identified {
                 let drawn = {
                     let system = self.estimate().system().map_err(AnalysisError::from)?;
                     let names = Names {
-                        displacement: &|dof| displacement_name(channels, data.measured(), dof),
+                        displacement: &|dof| {
+                            motion_name(channels, data.measured(), dof, style.quantity)
+                        },
                         force: &|dof| channels.force_name(dof),
                     };
                     receptance_or_responses(&title, data, &system, names, style)?

@@ -3,12 +3,11 @@
 use std::f64::consts::TAU;
 
 use mechid_analysis::text::compact;
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
-use mechid_plot::charts::Quantity;
 
 use super::receptance::Names;
-use super::style::{FigureStyle, FrequencyScale};
+use super::style::{FigureStyle, FrequencyScale, derivative, per_force};
 use super::trace::Trace;
 use crate::ReportError;
 
@@ -67,11 +66,13 @@ pub fn figure(
     let frequency_hz = grid(&modes);
     let omega: Vec<f64> = frequency_hz.iter().map(|hz| TAU * hz).collect();
     let receptances = system.receptances(&omega)?;
+    let shown = style.quantity.unwrap_or(ResponseQuantity::Displacement);
     let pairs = pairs(system, names);
     let alone = pairs.len() == 1;
     let traces = pairs.into_iter().map(|(i, j, name)| {
         let name = if alone { String::new() } else { name };
-        Trace::line(style, name, omega.iter().zip(&receptances).map(|(w, h)| (*w, h[(i, j)])))
+        let responses = omega.iter().zip(&receptances);
+        Trace::line(style, name, responses.map(|(w, h)| (*w, h[(i, j)] * derivative(shown, *w))))
     });
     // What no force moves has nothing that a logarithmic axis could show.
     let traces: Vec<Trace> = traces.filter(|trace| !trace.is_empty()).collect();
@@ -82,8 +83,7 @@ pub fn figure(
         _ => file.to_owned(),
     };
     let natural: Vec<f64> = modes.iter().map(|(hz, _)| *hz).collect();
-    let quantity = Quantity::new("Receptance", "m/N");
-    let drawn = style.chart(&title, FrequencyScale::Logarithmic, quantity, [&[], &traces]);
+    let drawn = style.chart(&title, FrequencyScale::Logarithmic, per_force(shown), [&[], &traces]);
     Ok(drawn.mark_x(&label(&natural), &natural))
 }
 

@@ -1,5 +1,7 @@
 //! Measured and fitted receptance.
 
+use std::slice::from_ref;
+
 use mechid_analysis::identify::ResponseCoherence;
 use mechid_analysis::review::receptance::ActingAlone;
 use mechid_model::SecondOrderSystem;
@@ -9,7 +11,7 @@ use mechid_plot::{Axis, Curve, Figure, Panel};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::style::{FigureStyle, FrequencyScale, MagnitudeScale};
+use super::style::{FigureStyle, FrequencyScale, MagnitudeScale, derivative, per_force};
 use super::trace::Trace;
 use crate::ReportError;
 
@@ -29,7 +31,7 @@ impl Names<'_> {
     }
 }
 
-/// Points of a fitted curve.
+/// Number of points of a fitted curve.
 const FINE: usize = 800;
 
 /// Largest condition number of the forces of several experiments by which their responses are separated.
@@ -41,7 +43,7 @@ const SAME_LINE: f64 = 1e-9;
 /// Number of degrees of freedom up to which each pair of motion and force has panels of its own.
 const GRID: usize = 8;
 
-/// Magnitude and phase of x_i / F_j, measured and fitted, for every pair of degrees of freedom that the
+/// Magnitude and phase of the response per unit force, x_i / F_j in the quantity that was measured or in that of the style, measured and fitted, for every pair of degrees of freedom that the
 /// records show: on the lines where F_j acts alone, and where as many records as degrees of freedom have
 /// independent forces. `None` where no line separates the forces.
 ///
@@ -57,51 +59,107 @@ pub fn receptance(
     names: Names<'_>,
     style: FigureStyle,
 ) -> Result<Option<Figure>, ReportError> {
+    let Some(pairs) = pairs(data, system, names, style)? else { return Ok(None) };
+    let quantity = per_force(style.quantity.unwrap_or(data.measured()));
+    let usual = FrequencyScale::Linear;
     let dof = data.dof();
+    if !(2..=GRID).contains(&dof) {
+        let named = |pair: Pair| {
+            let name = if dof == 1 { String::new() } else { format!(" {}", pair.name) };
+            (pair.measured.suffixed(&name), pair.fitted.suffixed(&name))
+        };
+        let (measured, fitted): (Vec<Trace>, Vec<Trace>) = pairs.into_iter().map(named).unzip();
+        return Ok(Some(style.chart(title, usual, quantity, [&measured, &fitted])));
+    }
+    let mut figure = Figure::new(title);
+    let columns = pairs.iter().filter(|pair| pair.motion == 0).count();
+    for row in pairs.chunk_by(|a, b| a.motion == b.motion) {
+        let charts: Vec<Figure> = row
+            .iter()
+            .map(|Pair { measured, fitted, .. }| {
+                style.chart("", usual, quantity, [from_ref(measured), from_ref(fitted)])
+            })
+            .collect();
+        for at in 0..2 {
+            for (chart, pair) in charts.iter().zip(row) {
+                let panel = chart.panels()[at].clone();
+                figure = figure.panel(if at == 0 { panel.title(pair.name.clone()) } else { panel });
+            }
+        }
+    }
+    Ok(Some(figure.columns(columns).share_x().shared_legend()))
+}
+
+/// Largest number of pairs of motion and force that a page draws.
+pub const DRAWN_PAIRS: usize = 128;
+
+/// The same as a figure for each pair, at most [`DRAWN_PAIRS`] of them, with the coherence of its motion below if
+/// there is one. `None` where no line separates the forces.
+///
+/// # Errors
+/// As [`receptance`].
+pub fn receptance_set(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+    names: Names<'_>,
+    style: FigureStyle,
+    measured: Option<&ResponseCoherence>,
+) -> Result<Option<Vec<(String, Figure)>>, ReportError> {
+    let Some(pairs) = pairs(data, system, names, style)? else { return Ok(None) };
+    let quantity = per_force(style.quantity.unwrap_or(data.measured()));
+    let draw = |pair: Pair| {
+        let Pair { motion, name, measured: points, fitted, .. } = pair;
+        let curves = [from_ref(&points), from_ref(&fitted)];
+        let figure = style.chart("", FrequencyScale::Linear, quantity, curves);
+        let figure = match measured {
+            Some(measured) => figure.panel(coherence_of(measured, motion, style)),
+            None => figure,
+        };
+        (name, figure)
+    };
+    Ok(Some(pairs.into_iter().take(DRAWN_PAIRS).map(draw).collect()))
+}
+
+/// A response, measured and fitted.
+struct Pair {
+    motion: usize,
+    name: String,
+    measured: Trace,
+    fitted: Trace,
+}
+
+/// Pairs of motion and force that the records show, motion by motion; `None` if there are none.
+fn pairs(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+    names: Names<'_>,
+    style: FigureStyle,
+) -> Result<Option<Vec<Pair>>, ReportError> {
+    let dof = data.dof();
+    let quantity = style.quantity.unwrap_or(data.measured());
     let forces: Vec<Vec<Column>> = columns(data);
     let shown: Vec<usize> = (0..dof).filter(|j| !forces[*j].is_empty()).collect();
     if shown.is_empty() {
         return Ok(None);
     }
-    let grid = (2..=GRID).contains(&dof);
-    // Row by row: of each motion, measured and fitted under each force.
-    let mut pairs: Vec<Vec<[Trace; 2]>> = (0..dof).map(|_| Vec::new()).collect();
-    for j in &shown {
-        let points = &forces[*j];
+    let mut pairs = Vec::new();
+    for &j in &shown {
+        let points = &forces[j];
         let omega: Vec<f64> = points.iter().map(|(omega, _)| *omega).collect();
-        let fine = fine_grid(&omega);
+        let fine = fine_grid(&omega, dof * shown.len());
         let receptances = system.receptances(&fine)?;
-        for (i, row) in pairs.iter_mut().enumerate() {
-            let name =
-                if dof == 1 || grid { String::new() } else { format!(" {}", names.pair(i, *j)) };
-            let model = fine.iter().zip(&receptances).map(|(omega, h)| (*omega, h[(i, *j)]));
-            let model = Trace::line(style, format!("identified{name}"), model);
-            let measured = points.iter().map(|(omega, h)| (*omega, h[i]));
-            let measured = Trace::beside(style, &model, format!("measured{name}"), measured);
-            row.push([measured, model]);
+        for i in 0..dof {
+            let of = |omega: f64, h: Complex<f64>| (omega, h * derivative(quantity, omega));
+            let model = fine.iter().zip(&receptances).map(|(omega, h)| of(*omega, h[(i, j)]));
+            let fitted = Trace::line(style, "identified".into(), model);
+            let points = points.iter().map(|(omega, h)| of(*omega, h[i]));
+            let measured = Trace::beside(style, &fitted, "measured".into(), points);
+            pairs.push(Pair { motion: i, name: names.pair(i, j), measured, fitted });
         }
     }
-    let quantity = Quantity::new("Receptance", "m/N");
-    let usual = FrequencyScale::Linear;
-    if !grid {
-        let (measured, fitted): (Vec<Trace>, Vec<Trace>) =
-            pairs.into_iter().flatten().map(|[measured, fitted]| (measured, fitted)).unzip();
-        return Ok(Some(style.chart(title, usual, quantity, [&measured, &fitted])));
-    }
-    let mut figure = Figure::new(title);
-    for (i, row) in pairs.into_iter().enumerate() {
-        let charts: Vec<Figure> = row
-            .into_iter()
-            .map(|[measured, fitted]| style.chart("", usual, quantity, [&[measured], &[fitted]]))
-            .collect();
-        for at in 0..2 {
-            for (chart, j) in charts.iter().zip(&shown) {
-                let panel = chart.panels()[at].clone();
-                figure = figure.panel(if at == 0 { panel.title(names.pair(i, *j)) } else { panel });
-            }
-        }
-    }
-    Ok(Some(figure.columns(shown.len()).share_x().shared_legend()))
+    // Stable: the forces of a motion keep their order.
+    pairs.sort_by_key(|pair| pair.motion);
+    Ok(Some(pairs))
 }
 
 /// Measured columns of H for each force, by rising frequency.
@@ -215,16 +273,31 @@ pub fn coherence(
     panel
 }
 
+/// Coherence of one motion with all forces.
+fn coherence_of(measured: &ResponseCoherence, motion: usize, style: FigureStyle) -> Panel {
+    let axis = style.frequency_axis(FrequencyScale::Linear);
+    let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
+    let at = motion.min(measured.values.ncols().saturating_sub(1));
+    let values: Vec<f64> = measured.values.column(at).iter().skip(hidden).copied().collect();
+    Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0)).curve(Curve::line(
+        "",
+        &measured.frequency_hz[hidden..],
+        &values,
+    ))
+}
+
 /// Reason for a figure of responses instead of receptances.
 pub const WHY: &str = "one record does not separate forces that act at once";
 
-fn fine_grid(omega: &[f64]) -> Vec<f64> {
+/// Frequencies of a fitted curve, fewer of them where there are many curves.
+fn fine_grid(omega: &[f64], curves: usize) -> Vec<f64> {
+    let points = (FINE * 16 / curves.max(16)).max(FINE / 4);
     let low = omega.iter().copied().fold(f64::INFINITY, f64::min);
     let high = omega.iter().copied().fold(0.0, f64::max);
     if low > high {
         return Vec::new();
     }
-    (0..=FINE).map(|k| low + (high - low) * k as f64 / FINE as f64).collect()
+    (0..=points).map(|k| low + (high - low) * k as f64 / points as f64).collect()
 }
 
 #[cfg(test)]

@@ -2,6 +2,12 @@
 
 use mechid_plot::Axis;
 use mechid_plot::charts::Quantity;
+use mechid_model::ResponseQuantity;
+use mechid_plot::charts::{Quantity, bode};
+use mechid_plot::{Axis, Figure};
+use nalgebra::Complex;
+
+use super::trace::Trace;
 
 /// Look of the frequency responses in a figure.
 ///
@@ -12,6 +18,7 @@ use mechid_plot::charts::Quantity;
 ///     phase: PhaseStyle::Continuous,
 ///     frequency: Some(FrequencyScale::Logarithmic),
 ///     magnitude: MagnitudeScale::Decibel,
+///     quantity: None,
 /// };
 /// assert_ne!(style, FigureStyle::default());
 /// ```
@@ -23,6 +30,28 @@ pub struct FigureStyle {
     pub frequency: Option<FrequencyScale>,
     /// Magnitude axis.
     pub magnitude: MagnitudeScale,
+    /// Response per unit force: receptance, mobility or accelerance; `None`: as it was measured, receptance
+    /// of a machine.
+    pub quantity: Option<ResponseQuantity>,
+}
+
+/// Name and unit of the response per unit force.
+pub(super) fn per_force(quantity: ResponseQuantity) -> Quantity<'static> {
+    match quantity {
+        ResponseQuantity::Displacement => Quantity::new("Receptance", "m/N"),
+        ResponseQuantity::Velocity => Quantity::new("Mobility", "m/(s·N)"),
+        ResponseQuantity::Acceleration => Quantity::new("Accelerance", "m/(s²·N)"),
+    }
+}
+
+/// Returns (iω)ᵈ, which turns a receptance into the response per unit force of the d-th derivative.
+pub(super) fn derivative(quantity: ResponseQuantity, omega: f64) -> Complex<f64> {
+    let order = match quantity {
+        ResponseQuantity::Displacement => 0,
+        ResponseQuantity::Velocity => 1,
+        ResponseQuantity::Acceleration => 2,
+    };
+    Complex::new(0.0, omega).powi(order)
 }
 
 /// Branch of the phase of a frequency response.

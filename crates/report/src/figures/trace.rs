@@ -14,6 +14,7 @@ pub struct Trace {
     frequency_hz: Vec<f64>,
     magnitude: Vec<f64>,
     phase_deg: Vec<f64>,
+    standard_error: Vec<f64>,
 }
 
 /// Difference of angles, in degrees, that is rounding.
@@ -68,6 +69,23 @@ impl Trace {
         })
     }
 
+    /// Returns the curve with standard errors of its magnitudes, one for each drawn point; without them in
+    /// decibels, and where one is not a number.
+    pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
+        let is_whole = errors.len() == self.magnitude.len();
+        let is_known = is_whole && errors.iter().all(|error| error.is_finite());
+        if is_known && style.magnitude == MagnitudeScale::Logarithmic {
+            self.standard_error = errors;
+        }
+        self
+    }
+
+    /// Returns whether a style draws a response at an angular frequency.
+    pub fn is_drawn(style: FigureStyle, omega: f64, h: Complex<f64>) -> bool {
+        let positive = style.frequency == Some(FrequencyScale::Logarithmic);
+        h.norm() > 0.0 && (!positive || omega > 0.0)
+    }
+
     /// Points of no magnitude, and those at 0 Hz on a logarithmic axis, cannot be drawn and are left out.
     fn with_phase(
         style: FigureStyle,
@@ -75,12 +93,14 @@ impl Trace {
         points: impl Iterator<Item = (f64, Complex<f64>)>,
         mut continuous: impl FnMut(f64, f64) -> f64,
     ) -> Self {
-        let mut trace =
-            Self { name, frequency_hz: Vec::new(), magnitude: Vec::new(), phase_deg: Vec::new() };
-        let positive = style.frequency == Some(FrequencyScale::Logarithmic);
-        let is_shown =
-            |(omega, h): &(f64, Complex<f64>)| h.norm() > 0.0 && (!positive || *omega > 0.0);
-        for (omega, h) in points.filter(is_shown) {
+        let mut trace = Self {
+            name,
+            frequency_hz: Vec::new(),
+            magnitude: Vec::new(),
+            phase_deg: Vec::new(),
+            standard_error: Vec::new(),
+        };
+        for (omega, h) in points.filter(|(omega, h)| Self::is_drawn(style, *omega, *h)) {
             let angle = h.arg().to_degrees();
             trace.frequency_hz.push(omega / TAU);
             trace.magnitude.push(match style.magnitude {
@@ -95,6 +115,12 @@ impl Trace {
         trace
     }
 
+    /// Returns the curve with more behind its name.
+    pub fn suffixed(mut self, more: &str) -> Self {
+        self.name += more;
+        self
+    }
+
     /// Returns whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.magnitude.is_empty()
@@ -107,6 +133,7 @@ impl Trace {
             frequency: &self.frequency_hz,
             magnitude: &self.magnitude,
             phase_deg: &self.phase_deg,
+            standard_error: &self.standard_error,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Parameters and modes over many records.
 
 use mechid_analysis::fleet::{TrendAxis, TrendPoint, TrendSeries, Trends};
-use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
+use mechid_analysis::text::significant;
+use mechid_plot::{Axis, Color, Curve, Figure, Marker, Panel, Reference};
 
 /// Number of points of a series that are drawn; of more, every other one or fewer, but every outlier.
 pub const DRAWN: usize = 1000;
@@ -25,7 +26,8 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     let curve = |name: &str, points: &[&TrendPoint], slot: usize| {
         let (x, y): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.at, point.value)).unzip();
-        Curve::points(name, &x, &y).slot(slot)
+        let notes = points.iter().map(|point| note(series, point)).collect();
+        Curve::points(name, &x, &y).slot(slot).notes(notes)
     };
     let ends = usual.iter().map(|point| Some((point.at, point.interval?)));
     let mut panel =
@@ -39,8 +41,65 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     if !usual.is_empty() {
         panel = panel.curve(curve("value", &usual, 0));
     }
-    if !outliers.is_empty() {
-        panel = panel.curve(curve("outlier", &outliers, 1));
+    let (low, high) = range(series, &usual);
+    let (near, far): (Vec<&TrendPoint>, Vec<&TrendPoint>) =
+        outliers.into_iter().partition(|point| (low..=high).contains(&point.value));
+    if !near.is_empty() {
+        panel = panel.curve(curve("outlier", &near, 1));
     }
-    panel.reference(Reference::horizontal("median", series.median))
+    for (name, is_above, marker) in [
+        ("outlier above the axis", true, Marker::Triangle),
+        ("outlier below the axis", false, Marker::TriangleDown),
+    ] {
+        let some = far.iter().filter(|point| (point.value > high) == is_above);
+        let (x, notes): (Vec<f64>, Vec<String>) = some.map(|p| (p.at, note(series, p))).unzip();
+        if !x.is_empty() {
+            let edge =
+                if is_above { high - EDGE * (high - low) } else { low + EDGE * (high - low) };
+            let edge = vec![edge; x.len()];
+            let points = Curve::points(name, &x, &edge).slot(1).marker(marker);
+            panel = panel.curve(points.notes(notes));
+        }
+    }
+    for change in &series.changes {
+        let label = format!("{}, p = {}", change.kind.name(), significant(change.p_value, 2));
+        panel = panel.reference(Reference::vertical(label, change.at).color(Color::PURPLE));
+    }
+    panel = panel.reference(Reference::horizontal("median", series.median));
+    let axis = Axis::linear(series.name.as_str(), &series.unit).range(low, high);
+    panel.y(axis)
+}
+
+/// Distance from the edge of an outlier beyond it, as a part of the axis.
+const EDGE: f64 = 0.04;
+
+/// Margin of an axis, as a part of it.
+const MARGIN: f64 = 0.08;
+
+/// Range of the ordinate: that of the values that are no outliers, so that one outlier does not hide the others, and
+/// of the median.
+fn range(series: &TrendSeries, usual: &[&TrendPoint]) -> (f64, f64) {
+    let ends = usual.iter().flat_map(|point| match point.interval {
+        Some([low, high]) => {
+            // An interval without bound would hide the values.
+            let most = 4.0 * series.spread;
+            [low.max(point.value - most), high.min(point.value + most)]
+        }
+        None => [point.value; 2],
+    });
+    let (low, high) = ends
+        .chain([series.median])
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    match high > low {
+        true => (low - MARGIN * (high - low), high + MARGIN * (high - low)),
+        false => (
+            low - 0.05 * low.abs() - f64::MIN_POSITIVE,
+            high + 0.05 * high.abs() + f64::MIN_POSITIVE,
+        ),
+    }
+}
+
+/// Record and value of a point in words.
+fn note(series: &TrendSeries, point: &TrendPoint) -> String {
+    format!("{}: {} {}", point.record, significant(point.value, 6), series.unit)
 }

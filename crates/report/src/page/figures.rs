@@ -9,37 +9,63 @@ use mechid_analysis::review::receptance::Receptance;
 use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Correlations, OwnCorrelation, Residual};
 use mechid_analysis::review::whole::Gathered;
-use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
+use mechid_model::ResponseQuantity;
+use mechid_plot::{Axis, Color, Curve, Dash, Figure, FigureSet, Legend, Panel, Reference};
 use mechid_signal::{Record, Spectrum};
 
-use super::Captions as _;
+use super::{Captions as _, Contents};
 use crate::FigureStyle;
 use crate::ReportError;
 use crate::figures::receptance::{self as picture, Names};
+use crate::figures::shapes::{ModeShapes, assurance_svg};
 use crate::figures::{displacement_name, restoring as surface};
 
 /// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
 /// one can still be read.
 const WIDTH: f64 = 480.0;
 
-/// Height of a panel with its labels, px.
-const PANEL: f64 = 210.0;
+/// Width of a figure that has a row to itself, px.
+const WIDE: f64 = 760.0;
+
+/// Height of a panel with its labels, px, the first of a figure and any other.
+const PANEL: [f64; 2] = [190.0, 150.0];
+
+/// Number of figures of a set above which the set has a row to itself.
+pub(super) const BESIDE: usize = 4;
 
 /// A picture with its words.
 pub(crate) struct Drawn {
     pub id: String,
     pub svg: String,
+    /// Name and small drawing of each figure to choose from; empty if there is one.
+    pub map: Vec<(String, String)>,
     pub caption: String,
 }
 
 pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, ReportError> {
-    let panels = figure.panels();
-    // Many curves have a legend of several rows.
-    let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
-    let height = PANEL * (panels.len() as f64).max(1.5) + 12.0 * curves as f64;
-    let figure = figure.size(WIDTH, height);
-    let svg = figure.to_inline_svg(&id, &caption)?;
-    Ok(Drawn { id, svg, caption })
+    drawn_set(id, vec![(String::new(), figure)], caption)
+}
+
+/// Figures of which the page shows one large and all small.
+pub(super) fn drawn_set(
+    id: String,
+    members: Vec<(String, Figure)>,
+    caption: String,
+) -> Result<Drawn, ReportError> {
+    let width = if members.len() > BESIDE { WIDE } else { WIDTH };
+    let is_alone = members.len() == 1;
+    let sized = members.into_iter().map(|(name, figure)| {
+        let panels = figure.panels();
+        // Many curves have a legend of several rows.
+        let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
+        let [first, other] = PANEL;
+        let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
+        let title = if is_alone { "" } else { name.as_str() };
+        let figure = figure.titled(title).size(width, height);
+        (name, figure)
+    });
+    let drawn = FigureSet::new(sized).draw(&id, &caption)?;
+    Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption })
 }
 
 fn times(record: &Record) -> Vec<f64> {
@@ -53,21 +79,21 @@ fn history(
     (held, whole): (&Record, &Gathered),
     period: &Record,
     channels: &[usize],
-) -> Figure {
+) -> Vec<(String, Figure)> {
     let spectrum = Spectrum::of(period);
     let hz: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
-    let mut figure = Figure::new("");
-    for &c in channels {
+    let of_channel = |&c: &usize| {
         let label = name(c);
         let (t, values) = whole.history(held, c);
         let time = Panel::new(Axis::linear("Time in the window", "s"), Axis::linear(&label, unit));
-        figure = figure.panel(time.curve(Curve::line("", &t, &values).width(1.0)));
+        let time = time.curve(Curve::line("", &t, &values).width(1.0));
         let amplitude: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.line(n, c).norm()).collect();
         let axis = Axis::linear(format!("Amplitude of {label}"), unit);
         let stems = Curve::stems("", &hz, &amplitude).color(Color::VERMILION);
-        figure = figure.panel(Panel::new(Axis::linear("Frequency", "Hz"), axis).curve(stems));
-    }
-    figure
+        let lines = Panel::new(Axis::linear("Frequency", "Hz"), axis).curve(stems);
+        (label, Figure::new("").panel(time).panel(lines))
+    };
+    channels.iter().map(of_channel).collect()
 }
 
 /// A thin line over the thick one that it should hide.
@@ -96,7 +122,7 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
     let of_force = (&held.force, &part.whole.force);
     let of_motion = (motion, &part.whole.motions[0]);
     Ok(vec![
-        drawn(
+        drawn_set(
             part.id("force"),
             history(
                 (&|dof| held.names.force_name(dof), "N"),
@@ -106,7 +132,7 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
             ),
             format!("Measured force: time history of the window, and line amplitudes of {of}."),
         )?,
-        drawn(
+        drawn_set(
             part.id("motion"),
             history(
                 (&|dof| held.names.response_name(kind, dof), kind.unit()),
@@ -128,36 +154,47 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
     let system = identified.estimate().system().map_err(AnalysisError::from)?;
     let origin = &measured.origin;
     let (style, channels) = (FigureStyle::default(), identified.names());
+    let kind = measured.data.measured();
     let names = Names {
-        displacement: &|dof| displacement_name(channels, measured.data.measured(), dof),
+        displacement: &|dof| channels.response_name(kind, dof),
         force: &|dof| channels.force_name(dof),
     };
-    let (figure, caption) = match picture::receptance("", &measured.data, &system, names, style)? {
-        Some(figure) => {
-            let caption = format!(
-                "Receptance, motion over force: that of the identified machine, and that of the record, \
-                 {origin}."
-            );
-            (figure, caption)
-        }
-        None => {
-            let caption = format!(
-                "Amplitude of the response, {origin}, and predicted by the identified machine from the \
-                 forces; no receptance, for {}.",
-                picture::WHY
-            );
-            (picture::responses("", &measured.data, &system, names, style)?, caption)
-        }
+    let coherence = measured.coherence.as_ref();
+    let below = match coherence {
+        Some(coherence) => format!(
+            " Below, the part of the response's power that is linear in the forces, from {}.",
+            coherence.averages
+        ),
+        None => String::new(),
     };
-    let Some(coherence) = &measured.coherence else {
-        return drawn("receptance".into(), figure, caption);
-    };
-    let name = |dof| channels.response_name(measured.data.measured(), dof);
-    let figure = figure.panel(picture::coherence(coherence, &name, style));
+    if let Some(set) = picture::receptance_set(&measured.data, &system, names, style, coherence)? {
+        let pairs = measured.data.dof().pow(2);
+        let left_out = match set.len() {
+            picture::DRAWN_PAIRS if pairs > picture::DRAWN_PAIRS => {
+                format!(" The first {} pairs are drawn.", picture::DRAWN_PAIRS)
+            }
+            _ => String::new(),
+        };
+        let caption = format!(
+            "Response per unit force: that of the identified machine, and that of the record, \
+             {origin}.{below}{left_out}"
+        );
+        return drawn_set("receptance".into(), set, caption);
+    }
     let caption = format!(
-        "{caption} Below, the part of the response's power that is linear in the forces, from {}.",
-        coherence.averages
+        "Amplitude of the response, {origin}, and predicted by the identified machine from the \
+         forces; no receptance, for {}.{below}",
+        picture::WHY
     );
+    let names = Names { displacement: &|dof| displacement_name(channels, kind, dof), ..names };
+    let figure = picture::responses("", &measured.data, &system, names, style)?;
+    let figure = match coherence {
+        Some(coherence) => {
+            let name = |dof| channels.response_name(kind, dof);
+            figure.panel(picture::coherence(coherence, &name, style))
+        }
+        None => figure,
+    };
     drawn("receptance".into(), figure, caption)
 }
 
@@ -207,8 +244,7 @@ fn over_time(
     let measured = compared.measured.window(0, samples)?;
     let modelled = compared.predicted.window(0, samples)?;
     let t = times(&measured);
-    let mut figure = Figure::new("").share_x();
-    for c in 0..measured.channels() {
+    let of_channel = |c: usize| {
         let name = &compared.names[c];
         let time = || Axis::linear("Time in the window", "s");
         let (x, model) = (measured.channel(c), modelled.channel(c));
@@ -218,9 +254,9 @@ fn over_time(
             .legend(Legend::Above);
         let rest = Curve::line("", &t, &residual).color(Color::VERMILION).width(1.0);
         let below = Panel::new(time(), Axis::linear(format!("Residual of {name}"), unit));
-        figure = figure.panel(both).panel(below.curve(rest));
-    }
-    drawn(id, figure, caption)
+        (name.clone(), Figure::new("").share_x().panel(both).panel(below.curve(rest)))
+    };
+    drawn_set(id, (0..measured.channels()).map(of_channel).collect(), caption)
 }
 
 /// Amplitudes of motion and residual, on the lines used or all.
@@ -235,8 +271,7 @@ pub fn residual_spectrum(
     let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
     let unit = compared.kind.unit();
-    let mut figure = Figure::new("");
-    for c in 0..motion.channels() {
+    let of_channel = |c: usize| {
         let points = |spectrum: &Spectrum| -> (Vec<f64>, Vec<f64>) {
             let point = |n: &usize| (spectrum.frequency_hz(*n), spectrum.line(*n, c).norm());
             // A logarithmic axis has no place for nothing.
@@ -250,11 +285,11 @@ pub fn residual_spectrum(
                 panel = panel.curve(Curve::points(name, &hz, &amplitude).slot(slot));
             }
         }
-        figure = figure.panel(panel);
-    }
-    drawn(
+        (compared.names[c].clone(), Figure::new("").panel(panel))
+    };
+    drawn_set(
         part.id("residual-spectrum"),
-        figure,
+        (0..motion.channels()).map(of_channel).collect(),
         format!(
             "{}: noise lies flat, what the model misses has the shape of a resonance or of the force.",
             part.of_period(&format!(
@@ -272,9 +307,10 @@ pub fn correlations(
 ) -> Result<Drawn, ReportError> {
     let held = part.held();
     let kind = held.response().1;
-    let mut figure = Figure::new("");
+    let mut members = Vec::new();
     let (mut widest, mut of_lines) = (0, false);
     for (c, channel) in correlations.iter().enumerate() {
+        let mut figure = Figure::new("");
         let residual = held.names.response_name(kind, c);
         let panel = |x: Axis, what: &str, at: &[f64], coefficients: &[f64], bound: f64| {
             Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
@@ -309,6 +345,9 @@ pub fn correlations(
             let name = format!("with {}", held.names.force_name(*force));
             figure = figure.panel(panel(Axis::linear("Lag", "s"), &name, &lags, r, bound));
         }
+        if !figure.panels().is_empty() {
+            members.push((residual, figure));
+        }
     }
     let what = match of_lines {
         true => "Correlation of the residual, weighted by its noise, from line to line (real and \
@@ -324,7 +363,26 @@ pub fn correlations(
     };
     let caption =
         format!("{what}; 95 % of the stems of noise stay between the dashed lines.{spanned}");
-    drawn(part.id("correlations"), figure, caption)
+    drawn_set(part.id("correlations"), members, caption)
+}
+
+/// Deflected lines of the modes, and the likeness of their shapes; nothing for one degree of freedom, and where the
+/// geometry does not have the places of the channels.
+pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<[Drawn; 2]> {
+    let report = contents.review.identified.summary();
+    let dofs = contents.review.identified.estimate().dof();
+    let names: Vec<String> =
+        (0..dofs).map(|dof| report.channels.response_name(kind, dof)).collect();
+    let shapes = ModeShapes::from_modes(&report.modes, &names, contents.geometry)?;
+    let caption = "Mode shapes: lines of the largest deflection over those at rest; of a complex mode the points do not \
+                   reach theirs together.";
+    let drawn = shapes.draw(caption);
+    let likeness = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, 0 for orthogonal ones.";
+    let matrix = assurance_svg(&shapes.assurance(), likeness);
+    Some([
+        Drawn { id: "shapes".into(), svg: drawn.svg, map: drawn.map, caption: caption.into() },
+        Drawn { id: "assurance".into(), svg: matrix, map: Vec::new(), caption: likeness.into() },
+    ])
 }
 
 /// The restoring force of a machine with nonlinear terms, of the first record.
@@ -343,8 +401,7 @@ pub fn force(
 ) -> Result<Drawn, ReportError> {
     let (force, measured) = (reconstruction.force.record(), &reconstruction.measured);
     let t = times(measured);
-    let mut figure = Figure::new("").share_x();
-    for &c in &reconstruction.forced {
+    let of_force = |&c: &usize| {
         let (reconstructed, truth) = (force.channel(c), measured.channel(c));
         let name = part.held().names.force_name(c);
         let time = || Axis::linear("Time in the window", "s");
@@ -361,11 +418,11 @@ pub fn force(
                 .legend(Legend::Above);
         }
         let difference = Curve::line("", &t, &apart).color(Color::VERMILION).width(1.0);
-        figure = figure.panel(both).panel(below.curve(difference));
-    }
-    drawn(
+        (name, Figure::new("").share_x().panel(both).panel(below.curve(difference)))
+    };
+    drawn_set(
         part.id("reconstructed-force"),
-        figure,
+        reconstruction.forced.iter().map(of_force).collect(),
         part.of_period("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
     )
 }

@@ -10,6 +10,8 @@ mod trends;
 use std::path::PathBuf;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use mechid_io::Geometry;
+use mechid_plot::{FIGURE_STYLE, content_policy, script};
 
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::rows::ModeRow;
@@ -18,12 +20,34 @@ use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
 use self::figures::Drawn;
+use self::tables::Table;
 #[cfg(feature = "parquet")]
 pub use self::trends::trends_page;
 use crate::ReportError;
 
 /// Inline, for the file stands alone.
 const STYLE: &str = include_str!("style.css");
+
+/// Head of a page: nothing is loaded, and nothing runs but the script of the figures, whatever a name in a
+/// record says.
+fn head(title: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta http-equiv="Content-Security-Policy" content=(content_policy());
+            meta name="color-scheme" content="light dark";
+            meta name="generator" content={ "mechid " (env!("CARGO_PKG_VERSION")) };
+            title { (title) }
+            style { (PreEscaped(FIGURE_STYLE)) (PreEscaped(STYLE)) }
+        }
+    }
+}
+
+/// The script of the figures, which no text of a record is part of.
+fn figure_script() -> Markup {
+    html! { script { (PreEscaped(script())) } }
+}
 
 /// Identifier and heading of each section.
 const SECTIONS: [(&str, &str); 7] = [
@@ -37,7 +61,7 @@ const SECTIONS: [(&str, &str); 7] = [
 ];
 
 /// Words of a page that the identification itself does not give.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct PageSettings {
     /// Heading; `None`: the name of the record.
     pub title: Option<String>,
@@ -45,6 +69,10 @@ pub struct PageSettings {
     pub reconstruct_force: bool,
     /// Command that writes the page again; `None`: only the saved settings are shown.
     pub command: Option<String>,
+    /// Name and value of what else is to stand on the page, such as sensors, operator, date, place and comment.
+    pub about: Vec<(String, String)>,
+    /// Places of the channels, to draw the mode shapes on; `None`: a row or a grid by their names.
+    pub geometry: Option<Geometry>,
 }
 
 /// Contents of the page.
@@ -52,10 +80,12 @@ struct Contents<'a> {
     title: String,
     review: &'a Review<'a>,
     command: Option<&'a str>,
+    about: &'a [(String, String)],
+    geometry: Option<&'a Geometry>,
 }
 
 /// Returns a page with everything that an identification has to show, as HTML that loads nothing and
-/// runs nothing.
+/// runs nothing but the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if a record cannot be read again or the force cannot be reconstructed,
@@ -68,6 +98,8 @@ pub fn page(identified: &Identified, settings: &PageSettings) -> Result<String, 
         title: settings.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
         review: &review,
         command: settings.command.as_deref(),
+        about: &settings.about,
+        geometry: settings.geometry.as_ref(),
     })
 }
 
@@ -126,16 +158,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                // Nothing is loaded and nothing runs, whatever a name in the record says.
-                meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'";
-                meta name="color-scheme" content="light";
-                meta name="generator" content={ "mechid " (env!("CARGO_PKG_VERSION")) };
-                title { (contents.title) }
-                style { (PreEscaped(STYLE)) }
-            }
+            (head(&contents.title))
             body {
                 (heading(contents))
                 nav aria-label="Sections" { ul {
@@ -143,7 +166,6 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
                     li { a href="#repeat" { "How to repeat it" } }
                 } }
                 main {
-                    (remarks(contents))
                     @for (id, name, body) in &present {
                         section id=(id) aria-labelledby={ (id) "-heading" } {
                             h2 id={ (id) "-heading" } { (name) }
@@ -152,6 +174,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
                     }
                     (repeat(contents))
                 }
+                (figure_script())
             }
         }
     };
@@ -161,38 +184,72 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
 /// A picture with its caption.
 pub(crate) fn figure(drawn: &Drawn) -> Markup {
     html! {
-        figure id={ "figure-" (drawn.id) } {
+        figure id={ "figure-" (drawn.id) } class=[(drawn.map.len() > figures::BESIDE).then_some("wide")] {
             // Made by `mechid-plot`, which escapes the words in it.
             (PreEscaped(&drawn.svg))
+            @if !drawn.map.is_empty() {
+                div.map {
+                    @for (name, svg) in &drawn.map {
+                        button type="button" { (PreEscaped(svg)) (name) }
+                    }
+                }
+            }
             figcaption { (drawn.caption) }
         }
     }
 }
 
-/// Number of frequencies and damping ratios in the heading.
-const SUMMARISED: usize = 8;
-
 fn heading(contents: &Contents<'_>) -> Markup {
     let report = contents.review.identified.summary();
-    let modes =
-        ModeRow::quantities(&ShapedMode::rows(&report.modes), false).into_iter().take(SUMMARISED);
     html! {
         header {
             h1 { (contents.title) }
             p.subtitle { (files(contents)) " · " (report.estimator) }
-            dl.summary {
-                @for (name, value, unit) in modes {
-                    @let [number, error, _] = value.cells();
-                    @let unit = if unit == "–" { String::new() } else { format!(" {unit}") };
-                    div { dt { "Mode " (name) } dd { (number) (unit) small { "± " (error) (unit) } } }
-                }
-                @if let Some(part) = report.fit.unexplained_motion {
-                    div { dt { "Motion left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }
-                }
+            @if !contents.about.is_empty() {
+                dl.about { @for (name, value) in contents.about { div { dt { (name) } dd { (value) } } } }
             }
-            @if !report.modes.is_empty() {
-                p.note { "± is one standard error; 95 % intervals are in the section on the machine." }
+            (remarks(contents))
+            (modes(&ShapedMode::rows(&report.modes)))
+            @if let Some(part) = report.fit.unexplained_motion {
+                p.note { "Motion left unexplained: " strong { (significant(100.0 * part, 3)) " %" } }
             }
+        }
+    }
+}
+
+/// All modes in a table that sorts.
+fn modes(modes: &[ModeRow]) -> Markup {
+    let row = |(number, mode): (usize, &ModeRow)| {
+        let [frequency, error, _] = mode.natural_frequency_hz.cells();
+        let [ratio, ratio_error, _] = mode.damping_ratio.cells();
+        let remark = match (&mode.pole, &mode.growth_rate) {
+            (_, Some(rate)) => format!("unstable: grows at {} 1/s", significant(rate.value, 3)),
+            (Some(pole), _) => {
+                format!("does not oscillate: pole {} 1/s", significant(pole.value, 4))
+            }
+            _ if mode.is_rigid_body => "rigid body".into(),
+            _ => String::new(),
+        };
+        let is_pair = mode.oscillates || mode.is_rigid_body || mode.partner.is_some();
+        let dash = |text: String| if is_pair { text } else { "–".into() };
+        vec![
+            number.to_string(),
+            dash(frequency),
+            dash(error),
+            dash(ratio),
+            dash(ratio_error),
+            remark,
+        ]
+    };
+    let rows: Vec<Vec<String>> = (1..).zip(modes).map(row).collect();
+    let header = ["mode", "natural frequency, Hz", "±", "damping ratio", "±", "remark"];
+    let has_remarks = rows.iter().any(|row| !row[5].is_empty());
+    let columns = if has_remarks { 6 } else { 5 };
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|row| row[..columns].to_vec()).collect();
+    html! {
+        @if !rows.is_empty() {
+            (Table { caption: "Modes found", header: &header[..columns], numbers_from: 1, rows }.sortable())
+            p.note { "± is one standard error; 95 % intervals are in the section on the machine." }
         }
     }
 }

@@ -192,6 +192,7 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let names = &report.channels;
     let kind = names.first_response().unwrap_or(ResponseQuantity::Displacement);
     let shapes = shapes(&report.modes, |dof| names.response_name(kind, dof));
+    let shapes_drawn = figures::shapes(contents, kind);
     let numbered: Vec<String> = (1..=dofs).map(|dof| dof.to_string()).collect();
     let columns: Vec<&str> =
         std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
@@ -212,7 +213,12 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
             }
         }
         @if let Some(unscaled) = &report.unscaled { p.note { (unscaled) "." } }
-        @if let Some(drawn) = &restoring { div.figures { (figure(drawn)) } }
+        @if restoring.is_some() || shapes_drawn.is_some() {
+            div.figures {
+                @if let Some(drawn) = &restoring { (figure(drawn)) }
+                @for drawn in shapes_drawn.iter().flatten() { (figure(drawn)) }
+            }
+        }
         @for remark in &contents.review.identified.fitted().remarks { p.note { "How it was done: " (remark) "." } }
     })
 }

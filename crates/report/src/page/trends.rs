@@ -1,23 +1,25 @@
 //! The page of the results of many records.
 
-use maud::{DOCTYPE, PreEscaped, html};
-use mechid_analysis::fleet::Trends;
+use maud::{DOCTYPE, html};
+use mechid_analysis::fleet::{SIGNIFICANT, Trends};
 use mechid_analysis::text::significant;
 use mechid_plot::Figure;
 
 use super::figures::drawn;
 use super::tables::Table;
-use super::{STYLE, figure};
+use super::{figure, figure_script, head};
 use crate::ReportError;
 use crate::figures::trends::{DRAWN, panel};
 
 /// Returns a page of the results of many records: what failed, every quantity over the records, and
-/// outliers; HTML that loads nothing and runs nothing.
+/// outliers; HTML that loads nothing and runs nothing but the
+/// script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] if a figure cannot be drawn.
 pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> {
     let mut figures = Vec::new();
+    let categories: Vec<String> = trends.series.iter().map(|one| one.category().into()).collect();
     for (number, series) in (1..).zip(&trends.series) {
         let all = series.points.len();
         let thinned =
@@ -44,6 +46,23 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
         header: &header,
         numbers_from: 2,
         rows: quantities.collect(),
+    };
+    let changes = trends.changes().map(|(series, change)| {
+        vec![
+            series.name.clone(),
+            change.kind.name().into(),
+            change.record.clone(),
+            significant(change.size, 3),
+            series.unit.clone(),
+            significant(change.p_value, 2),
+        ]
+    });
+    let header = ["quantity", "change", "begins with", "size", "unit", "p"];
+    let changes = Table {
+        caption: "Steps and drifts",
+        header: &header,
+        numbers_from: 3,
+        rows: changes.collect(),
     };
     let outliers = trends.series.iter().flat_map(|series| {
         series.outliers().map(|point| {
@@ -74,16 +93,7 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                // Nothing is loaded and nothing runs, whatever a name in the table says.
-                meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'";
-                meta name="color-scheme" content="light";
-                meta name="generator" content={ "mechid " (env!("CARGO_PKG_VERSION")) };
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
-            }
+            (head(title))
             body {
                 header {
                     h1 { (title) }
@@ -99,16 +109,23 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
                     }
                 }
                 main {
-                    section id="quantities" aria-labelledby="quantities-heading" {
+                    @if !changes.rows.is_empty() {
+                        section id="changes" aria-labelledby="changes-heading" {
+                            h2 id="changes-heading" { "Steps and drifts" }
+                            (changes.sortable())
+                            p.note { "p is the share of orders at random in which the ranks of the records look as changed, times the number of quantities; below " (SIGNIFICANT) " a change is told." }
+                        }
+                    }
+                    section id="quantities" data-filter aria-labelledby="quantities-heading" {
                         h2 id="quantities-heading" { "Quantities" }
-                        (quantities.html())
+                        (quantities.of_categories(&categories))
                         p.note { "Spread: 1.4826 times the median distance from the median, the standard deviation of normal values. Where it is larger than the standard error, the machine changes from record to record, or the standard errors are too small." }
-                        div.figures { @for one in &figures { (figure(one)) } }
+                        div.figures { @for (one, category) in figures.iter().zip(&categories) { div data-category=(category) { (figure(one)) } } }
                     }
                     @if !outliers.rows.is_empty() {
                         section id="outliers" aria-labelledby="outliers-heading" {
                             h2 id="outliers-heading" { "Outliers" }
-                            (outliers.html())
+                            (outliers.sortable())
                         }
                     }
                     @if !failures.rows.is_empty() {
@@ -118,6 +135,7 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
                         }
                     }
                 }
+                (figure_script())
             }
         }
     };

@@ -1,0 +1,35 @@
+//! Writes an interactive page of a frequency response into the folder given (default: the current one).
+#![allow(clippy::print_stdout)]
+
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+use mechid_plot::Axis;
+use mechid_plot::charts::{FrequencyResponse, bode};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
+    // 10 kg on 5,000 N/m and 18 N·s/m.
+    let response = |hz: f64| {
+        let omega = TAU * hz;
+        let (re, im) = (5000.0 - 10.0 * omega * omega, 18.0 * omega);
+        (1.0 / re.hypot(im), -im.atan2(re).to_degrees())
+    };
+    let hz: Vec<f64> = (1..=400).map(|k| 0.025 * f64::from(k)).collect();
+    let (magnitude, phase_deg): (Vec<f64>, Vec<f64>) = hz.iter().map(|hz| response(*hz)).unzip();
+    let standard_error: Vec<f64> = magnitude.iter().map(|m| 0.05 * m).collect();
+    let exact = FrequencyResponse {
+        name: "exact",
+        frequency: &hz,
+        magnitude: &magnitude,
+        phase_deg: &phase_deg,
+        standard_error: &[],
+    };
+    let measured = FrequencyResponse { name: "measured", standard_error: &standard_error, ..exact };
+    let axes = (Axis::linear("Frequency", "Hz"), Axis::log10("Receptance", "m/N"));
+    let figure = bode("Mass on a spring", axes.0, axes.1, &[measured], &[exact]);
+    let file = folder.join("response.html");
+    std::fs::write(&file, figure.to_html()?)?;
+    println!("{}", file.display());
+    Ok(())
+}

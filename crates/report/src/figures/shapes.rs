@@ -1,0 +1,375 @@
+//! Shapes of modes on the points of a structure: deflected lines, likeness of the shapes, stabilisation.
+
+use mechid_analysis::modal::ShapedMode;
+use mechid_analysis::text::{compact, significant};
+use mechid_io::{Geometry, PointShape};
+use mechid_plot::{
+    Anchor, Axis, Canvas, Color, Curve, DrawnSet, Figure, Panel, Stroke, TextStyle, with_metadata,
+};
+use nalgebra::{Complex, DMatrix};
+use serde::Serialize;
+
+/// Modes with their shapes at the points of a structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeShapes {
+    /// The points, and the lines between them.
+    pub geometry: Geometry,
+    /// The modes, by rising frequency; each with a displacement for every point.
+    pub modes: Vec<PointShape>,
+}
+
+/// A pole of a model of some order, in a stabilisation diagram.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StabilisationPole {
+    /// Order of the model.
+    pub order: usize,
+    /// Natural frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Damping ratio, a pure number.
+    pub damping_ratio: f64,
+    /// `true` if frequency and damping repeat those of the order below.
+    pub is_stable: bool,
+}
+
+/// Size of the drawing, px.
+const SIZE: (f64, f64) = (640.0, 340.0);
+
+/// Size of a small drawing, px.
+const SMALL: (f64, f64) = (120.0, 64.0);
+
+/// Turn about the vertical axis, and tilt towards the reader, of the first view, in radians.
+const VIEW: (f64, f64) = (-0.5, 0.42);
+
+/// Largest displacement drawn, over the size of the structure; the script uses the same.
+const DEFLECTION: f64 = 0.16;
+
+/// Scale of the drawing over the smaller side of the sheet; the script uses the same.
+const FILLED: f64 = 0.62;
+
+/// Number of points up to which their names are written.
+const NAMED: usize = 40;
+
+#[derive(Serialize)]
+struct ShapeData<'a> {
+    w: f64,
+    h: f64,
+    turn: f64,
+    tilt: f64,
+    points: Vec<[f64; 3]>,
+    names: Vec<&'a str>,
+    lines: &'a [[usize; 2]],
+    modes: Vec<ModeData>,
+}
+
+#[derive(Serialize)]
+struct ModeData {
+    n: String,
+    s: Vec<[f64; 6]>,
+}
+
+impl ModeShapes {
+    /// Gathers identified modes whose entries have these names, such as `1+Z`, on a geometry; without one, on a
+    /// row or a grid of points by their names. `None` without modes that oscillate, for fewer than two entries, and
+    /// where an entry has no point.
+    pub fn from_modes(
+        modes: &[ShapedMode],
+        names: &[String],
+        geometry: Option<&Geometry>,
+    ) -> Option<Self> {
+        let geometry = match geometry {
+            Some(geometry) => geometry.clone(),
+            None => Geometry::from_names(names.iter().map(String::as_str)),
+        };
+        let of_mode = |mode: &ShapedMode| {
+            let shape: Vec<[f64; 2]> = mode.shape.iter().map(|entry| entry.value).collect();
+            Some(PointShape {
+                frequency_hz: mode.row.natural_frequency_hz.value,
+                damping_ratio: mode.row.damping_ratio.value,
+                displacement: geometry.displacement(names, &shape)?,
+            })
+        };
+        let oscillating = modes.iter().filter(|mode| mode.row.oscillates);
+        let modes: Vec<PointShape> = oscillating.map(of_mode).collect::<Option<_>>()?;
+        (!modes.is_empty() && names.len() > 1).then_some(Self { geometry, modes })
+    }
+
+    /// Returns the largest modulus of a displacement of a mode, or 1 if nothing moves.
+    fn largest(mode: &PointShape) -> f64 {
+        let sizes = mode.displacement.iter().flatten().map(|[re, im]| re.hypot(*im));
+        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        if largest > 0.0 { largest } else { 1.0 }
+    }
+
+    fn name(number: usize, mode: &PointShape) -> String {
+        format!(
+            "mode {number}: {} Hz, damping ratio {} %",
+            compact(mode.frequency_hz, 5),
+            significant(100.0 * mode.damping_ratio, 3)
+        )
+    }
+
+    /// Draws the first mode at its largest deflection over the undeformed lines, and every mode small; with the
+    /// numbers for the script, which animates them: complex modes travel.
+    pub fn draw(&self, label: &str) -> DrawnSet {
+        let data = ShapeData {
+            w: SIZE.0,
+            h: SIZE.1,
+            turn: VIEW.0,
+            tilt: VIEW.1,
+            points: self.geometry.points.iter().map(|point| point.position).collect(),
+            names: self.geometry.points.iter().map(|point| point.name.as_str()).collect(),
+            lines: &self.geometry.lines,
+            modes: (1..).zip(&self.modes).map(|(number, mode)| mode_data(number, mode)).collect(),
+        };
+        // Numbers and texts have no way to fail.
+        let json = serde_json::to_string(&data).unwrap_or_default();
+        let svg = match self.modes.first() {
+            Some(mode) => self.sheet(mode, SIZE, true).finish(label),
+            None => Canvas::new(SIZE.0, SIZE.1).finish(label),
+        };
+        let svg = svg.replacen("<svg ", "<svg class=\"shape\" ", 1);
+        let small = |(number, mode): (usize, &PointShape)| {
+            let words = format!("{number}: {} Hz", compact(mode.frequency_hz, 4));
+            (words, self.sheet(mode, SMALL, false).finish(&Self::name(number, mode)))
+        };
+        DrawnSet {
+            svg: with_metadata(&svg, &json),
+            map: (1..).zip(&self.modes).map(small).collect(),
+        }
+    }
+
+    /// Draws a mode at the phase of its largest entry.
+    fn sheet(&self, mode: &PointShape, size: (f64, f64), has_words: bool) -> Canvas {
+        let mut sheet = Canvas::new(size.0, size.1);
+        let view = View::new(&self.geometry, size);
+        let factor = DEFLECTION * view.size / Self::largest(mode);
+        let still: Vec<[f64; 3]> = self.geometry.points.iter().map(|p| p.position).collect();
+        let moved: Vec<[f64; 3]> = still
+            .iter()
+            .zip(&mode.displacement)
+            .map(|(at, by)| [0, 1, 2].map(|axis| at[axis] + factor * by[axis][0]))
+            .collect();
+        let mut lines = |positions: &[[f64; 3]], stroke: Stroke| {
+            let ends = |pair: &[usize; 2]| {
+                let [a, b] = pair.map(|k| positions.get(k).map(|at| view.project(*at)));
+                Some((a?, b?))
+            };
+            sheet.segments(self.geometry.lines.iter().filter_map(ends), stroke);
+        };
+        lines(&still, Stroke::solid(Color::GREY, if has_words { 1.0 } else { 0.6 }));
+        lines(&moved, Stroke::solid(Color::BLUE, if has_words { 2.0 } else { 1.2 }));
+        let spots: Vec<(f64, f64)> = moved.iter().map(|at| view.project(*at)).collect();
+        sheet.discs(&spots, if has_words { 3.0 } else { 1.6 }, Color::VERMILION);
+        if has_words && spots.len() <= NAMED {
+            let style = TextStyle::new(11.5).anchored(Anchor::Start);
+            for ((x, y), point) in spots.iter().zip(&self.geometry.points) {
+                sheet.text((x + 7.0, y - 6.0), &point.name, &style);
+            }
+        }
+        sheet
+    }
+
+    /// Returns the modal assurance criterion of each pair of modes: 1 for the same shape, 0 for orthogonal ones.
+    ///
+    /// # Source
+    /// R. J. Allemang and D. L. Brown, "A correlation coefficient for modal vector analysis", IMAC 1 (1982).
+    pub fn assurance(&self) -> DMatrix<f64> {
+        let entries = |mode: &PointShape| -> Vec<Complex<f64>> {
+            mode.displacement.iter().flatten().map(|[re, im]| Complex::new(*re, *im)).collect()
+        };
+        let shapes: Vec<Vec<Complex<f64>>> = self.modes.iter().map(entries).collect();
+        let product = |a: &[Complex<f64>], b: &[Complex<f64>]| -> Complex<f64> {
+            a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
+        };
+        DMatrix::from_fn(shapes.len(), shapes.len(), |i, j| {
+            let power = product(&shapes[i], &shapes[i]).re * product(&shapes[j], &shapes[j]).re;
+            let common = product(&shapes[i], &shapes[j]).norm_sqr();
+            if power > 0.0 { (common / power).min(1.0) } else { 0.0 }
+        })
+    }
+}
+
+fn mode_data(number: usize, mode: &PointShape) -> ModeData {
+    let largest = ModeShapes::largest(mode);
+    // Four digits of the largest: less than a dot of the screen.
+    let short = |value: f64| (1e4 * value / largest).round() / 1e4 + 0.0;
+    let point = |by: &[[f64; 2]; 3]| {
+        let [[a, b], [c, d], [e, f]] = by.map(|entry| entry.map(short));
+        [a, b, c, d, e, f]
+    };
+    let s = mode.displacement.iter().map(point).collect();
+    ModeData { n: ModeShapes::name(number, mode), s }
+}
+
+/// Parallel projection of a structure onto a sheet.
+struct View {
+    middle: [f64; 3],
+    size: f64,
+    sheet: (f64, f64),
+}
+
+impl View {
+    fn new(geometry: &Geometry, sheet: (f64, f64)) -> Self {
+        let ends = [0, 1, 2].map(|axis| {
+            let values = geometry.points.iter().map(|point| point.position[axis]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
+        });
+        let size = ends.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+        let middle = ends.map(|[low, high]| f64::midpoint(low, high));
+        Self { middle, size: if size > 0.0 { size } else { 1.0 }, sheet }
+    }
+
+    fn project(&self, at: [f64; 3]) -> (f64, f64) {
+        let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] - self.middle[axis]) / self.size);
+        let (turn, tilt) = VIEW;
+        let (w, h) = self.sheet;
+        let unit = FILLED * w.min(1.6 * h);
+        let depth = turn.sin() * x + turn.cos() * y;
+        (
+            w / 2.0 + unit * (turn.cos() * x - turn.sin() * y),
+            h / 2.0 - unit * (z * tilt.cos() + depth * tilt.sin()),
+        )
+    }
+}
+
+/// Number of modes above which a matrix has no numbers in its squares: they would not fit.
+const NUMBERED: usize = 20;
+
+/// Draws a matrix of numbers from 0 to 1 as squares, darker for more, with the numbers in them.
+pub fn assurance_svg(values: &DMatrix<f64>, label: &str) -> String {
+    const EDGE: f64 = 34.0;
+    let side = (440.0 / values.ncols().max(1) as f64).clamp(14.0, 46.0);
+    let at = |k: usize| EDGE + side * k as f64;
+    let (width, height) = (at(values.ncols()) + 8.0, at(values.nrows()) + 8.0);
+    let mut sheet = Canvas::new(width.max(160.0), height);
+    let words = TextStyle::new(11.5);
+    let every = (18.0 / side).ceil().max(1.0) as usize;
+    for column in (0..values.ncols()).step_by(every) {
+        let middle = at(column) + side / 2.0;
+        sheet.text((middle, EDGE - 7.0), &(column + 1).to_string(), &words);
+        sheet.text((EDGE - 14.0, middle + 4.0), &(column + 1).to_string(), &words);
+    }
+    for row in 0..values.nrows() {
+        for column in 0..values.ncols() {
+            let value = values[(row, column)];
+            // Light enough for dark digits.
+            sheet.open_faded(0.06 + 0.4 * value);
+            let corner = (at(column) + 1.0, at(row) + 1.0);
+            sheet.rect(corner, (side - 2.0, side - 2.0), Some(Color::BLUE), None);
+            sheet.close_group();
+            if values.ncols() <= NUMBERED {
+                let style = TextStyle::new(if side > 30.0 { 11.5 } else { 9.0 });
+                let (x, y) = (at(column) + side / 2.0, at(row) + side / 2.0 + 4.0);
+                let digits = if side > 30.0 { 2 } else { 1 };
+                sheet.text((x, y), &format!("{value:.digits$}"), &style);
+            }
+        }
+    }
+    sheet.finish(label)
+}
+
+/// Draws the poles of models of rising order over the sum of the responses, which is scaled to the height of the
+/// diagram: its logarithm from the smallest to the largest value. `sum` has frequencies, in Hz, and magnitudes.
+pub fn stabilisation(title: &str, poles: &[StabilisationPole], sum: (&[f64], &[f64])) -> Figure {
+    let highest = poles.iter().map(|pole| pole.order).max().unwrap_or(1) as f64;
+    let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Order", ""));
+    let positive = || sum.0.iter().zip(sum.1).filter(|(_, value)| **value > 0.0);
+    let (low, high) =
+        positive().fold((f64::INFINITY, 0.0f64), |(a, b), (_, v)| (a.min(*v), b.max(*v)));
+    if high > low {
+        let x: Vec<f64> = positive().map(|(hz, _)| *hz).collect();
+        let scaled = |value: f64| highest * (value / low).ln() / (high / low).ln();
+        let y: Vec<f64> = positive().map(|(_, value)| scaled(*value)).collect();
+        let curve = Curve::line("sum of the responses, logarithm", &x, &y);
+        panel = panel.curve(curve.color(Color::GREY).width(1.2));
+    }
+    for (name, is_stable, slot) in [("stable", true, 0), ("new or moving", false, 5)] {
+        let some: Vec<&StabilisationPole> =
+            poles.iter().filter(|pole| pole.is_stable == is_stable).collect();
+        if some.is_empty() {
+            continue;
+        }
+        let x: Vec<f64> = some.iter().map(|pole| pole.frequency_hz).collect();
+        let y: Vec<f64> = some.iter().map(|pole| pole.order as f64).collect();
+        let words = |pole: &&StabilisationPole| {
+            format!(
+                "order {}: {} Hz, damping ratio {} %",
+                pole.order,
+                compact(pole.frequency_hz, 6),
+                significant(100.0 * pole.damping_ratio, 3)
+            )
+        };
+        let notes = some.iter().map(words).collect();
+        let color = if is_stable { Color::BLUE } else { Color::VERMILION };
+        panel = panel.curve(Curve::points(name, &x, &y).slot(slot).color(color).notes(notes));
+    }
+    Figure::new(title).panel(panel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shapes(rows: &[[[f64; 2]; 2]]) -> ModeShapes {
+        let names = ["1+Z".to_owned(), "2+Z".to_owned()];
+        let geometry = Geometry::from_names(names.iter().map(String::as_str));
+        let mode = |shape: &[[f64; 2]; 2]| PointShape {
+            frequency_hz: 10.0,
+            damping_ratio: 0.01,
+            displacement: geometry.displacement(&names, shape).unwrap(),
+        };
+        let modes = rows.iter().map(mode).collect();
+        ModeShapes { geometry: geometry.clone(), modes }
+    }
+
+    /// Judge: (1, 1) and (1, −1) are orthogonal, (1, i) is as far from both, and a turned shape is the same.
+    #[test]
+    fn assurance_is_that_of_the_definition() {
+        let shapes = shapes(&[
+            [[1.0, 0.0], [1.0, 0.0]],
+            [[1.0, 0.0], [-1.0, 0.0]],
+            [[1.0, 0.0], [0.0, 1.0]],
+            [[0.0, 2.0], [0.0, 2.0]],
+        ]);
+        let values = shapes.assurance();
+        let expected = [
+            [1.0, 0.0, 0.5, 1.0],
+            [0.0, 1.0, 0.5, 0.0],
+            [0.5, 0.5, 1.0, 0.5],
+            [1.0, 0.0, 0.5, 1.0],
+        ];
+        for (i, row) in expected.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                assert!((values[(i, j)] - value).abs() < 1e-15, "{i} {j}");
+            }
+        }
+        let svg = assurance_svg(&values, "MAC");
+        assert_eq!(svg.matches("0.50<").count(), 6);
+    }
+
+    #[test]
+    fn the_largest_entry_is_drawn_at_its_height_whatever_its_scale() {
+        let [one, hundred] =
+            [1.0, 100.0].map(|scale| shapes(&[[[scale, 0.0], [0.0, 0.0]]]).draw("a"));
+        let drawing = |drawn: &DrawnSet| drawn.svg.replacen("</metadata>", "|", 1);
+        assert_eq!(drawing(&one), drawing(&hundred));
+        assert!(one.svg.contains("class=\"shape\""));
+        assert_eq!(one.map.len(), 1);
+    }
+
+    #[test]
+    fn poles_are_drawn_with_their_words_over_the_scaled_sum() {
+        let pole = |order, frequency_hz, is_stable| StabilisationPole {
+            order,
+            frequency_hz,
+            damping_ratio: 0.02,
+            is_stable,
+        };
+        let poles = [pole(2, 5.0, false), pole(4, 5.01, true)];
+        let figure = stabilisation("", &poles, (&[1.0, 5.0, 9.0], &[1e-6, 1e-3, 0.0]));
+        let curves = figure.panels()[0].data();
+        assert_eq!(curves[0].y(), [0.0, 4.0]);
+        let svg = figure.to_interactive_svg("s", "s").unwrap();
+        assert!(svg.contains("order 4: 5.01 Hz, damping ratio 2.00 %"), "{svg}");
+    }
+}
