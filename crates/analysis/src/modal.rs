@@ -150,6 +150,25 @@ impl ShapedMode {
         modes.iter().map(|mode| mode.row.clone()).collect()
     }
 
+    /// Returns a mode that oscillates, identified by frequency (Hz) and damping ratio.
+    pub(crate) fn from_pole(
+        eigenvalue: [f64; 2],
+        [natural_frequency_hz, damped_frequency_hz, damping_ratio]: [Uncertain; 3],
+        shape: Vec<ShapeEntry>,
+    ) -> Self {
+        let row = ModeRow {
+            oscillates: true,
+            is_rigid_body: false,
+            natural_frequency_hz,
+            damped_frequency_hz,
+            damping_ratio,
+            pole: None,
+            partner: None,
+            growth_rate: None,
+        };
+        Self { row, eigenvalue, shape }
+    }
+
     pub(crate) fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
         let eigenvalue = mode.mode.eigenvalue();
         let entries = mode.mode.shape().iter().zip(mode.shape_standard_error.iter());

@@ -20,6 +20,15 @@ pub enum CliError {
     /// A file cannot be read, understood or written.
     #[error(transparent)]
     Io(#[from] IoError),
+    /// Shapes that cannot be placed.
+    #[error(
+        "no mode shapes: they need modes that oscillate, at two channels or more, and a point in --geometry for each of \
+         {names}"
+    )]
+    NoShapes {
+        /// Names of the channels.
+        names: String,
+    },
     /// The file about a measurement cannot be read.
     #[error("{file}: {source}")]
     About {

@@ -8,6 +8,7 @@ use mechid::io::{
     BegunFile, OutputFile, escaped, is_standard_output, refuse_replaced_inputs, write_all,
 };
 use mechid::plot::Figure;
+use mechid::report::{FigureStyle, ToFigure, figure_page};
 use serde::Serialize;
 
 use crate::args::{PlotArgs, ReportArgs};
@@ -15,6 +16,12 @@ use crate::error::CliError;
 
 /// Pixels of a PNG file for each px of the drawing.
 const PNG_SCALE: f64 = 2.0;
+
+/// A page of one figure.
+fn page(figure: Figure) -> Result<String, CliError> {
+    let title = figure.name().to_owned();
+    Ok(figure_page(&title, vec![(String::new(), figure)], None)?)
+}
 
 /// Files that a subcommand reads and writes, as far as its arguments name them.
 #[derive(Debug, Default)]
@@ -118,10 +125,23 @@ impl Outcome {
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
         let content = match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("png") => figure.to_png(PNG_SCALE)?,
-            Some("html") => figure.to_html()?.into_bytes(),
+            Some("html") => page(figure)?.into_bytes(),
             _ => figure.to_svg()?.into_bytes(),
         };
         Ok(self.with_file(path, content))
+    }
+
+    /// The same outcome with the figure or page of a result that `--plot` asks for.
+    pub fn with_result_plot(
+        self,
+        plot: &PlotArgs,
+        result: &impl ToFigure,
+        style: FigureStyle,
+    ) -> Result<Self, CliError> {
+        match &plot.plot {
+            Some(path) if plot.is_page() => Ok(self.with_file(path, result.styled_page(style)?)),
+            _ => self.with_plot(plot, || Ok(result.styled_figure(style)?)),
+        }
     }
 
     /// Writes the files, all or none, and prints the report: on the error stream where a file goes

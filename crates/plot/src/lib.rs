@@ -49,6 +49,7 @@ mod marks;
 mod panel;
 mod render;
 mod save;
+mod shapes;
 mod style;
 mod text;
 mod ticks;
@@ -60,8 +61,11 @@ pub use canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 pub use curve::{Curve, Reference};
 pub use error::PlotError;
 pub use figure::Figure;
-pub use interactive::{DrawnSet, FIGURE_STYLE, FigureSet, content_policy, script, with_metadata};
+pub use interactive::{
+    DrawnSet, FIGURE_STYLE, FigureSet, content_policy, page_of, script, with_metadata,
+};
 pub use panel::{Legend, Panel, ResponsePart};
 pub use save::save_svg;
+pub use shapes::{DrawnMode, ShapeDrawing, matrix_of_squares};
 pub use style::{Color, Dash, Marker};
 pub use text::{Weight, text_width};

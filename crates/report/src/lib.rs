@@ -20,9 +20,9 @@ pub mod page;
 mod spectrum_csv;
 
 pub use error::ReportError;
-pub use figures::shapes::{ModeShapes, StabilisationPole, assurance_svg, stabilisation};
+pub use figures::shapes::{ModeShapes, StabilisationPole, stabilisation};
 pub use figures::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle, ToFigure};
 #[cfg(feature = "parquet")]
 pub use page::trends_page;
-pub use page::{PageSettings, page};
+pub use page::{PageSettings, figure_page, page};
 pub use spectrum_csv::spectrum_csv;

@@ -19,7 +19,7 @@ use super::{Modes, ModesSpectrum};
 use crate::AnalysisError;
 use crate::identify::rows::{Uncertain, WindowRow};
 use crate::measurement::Measurement;
-use crate::modal::ShapeEntry;
+use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::significant;
 
 /// Finds the modes of the only record of an ambient test.
@@ -104,13 +104,10 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
             interval: value.interval().map(|interval| interval.map(scale)),
         }
     };
+    let values = [uncertain(f), damped(f), uncertain(zeta)];
+    let eigenvalue = [-zeta.value * omega, root * omega];
     ModalModeRow {
-        natural_frequency_hz: uncertain(f),
-        damped_frequency_hz: damped(f),
-        damping_ratio: uncertain(zeta),
-        oscillates: true,
-        eigenvalue: [-zeta.value * omega, root * omega],
-        shape: entries.collect(),
+        mode: ShapedMode::from_pole(eigenvalue, values, entries.collect()),
         participation: Vec::new(),
         phase_collinearity: mode.mpc.value,
         driven_share: None,

@@ -21,7 +21,7 @@ use super::{Modes, ModesSpectrum};
 use crate::AnalysisError;
 use crate::hits::HitRow;
 use crate::identify::rows::Uncertain;
-use crate::modal::ShapeEntry;
+use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
 /// Records of a test, and the band that is fitted.
@@ -195,13 +195,14 @@ fn row(mode: &IdentifiedMode, outputs: &[Output], points: &[(usize, usize)]) -> 
     });
     // The driving point that moves most in this mode determines the mass best.
     let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
+    let values = [
+        uncertain(&mode.natural_frequency_hz),
+        damped_frequency(mode),
+        uncertain(&mode.damping_ratio),
+    ];
+    let shape = entries(&mode.shape, &mode.shape_standard_error, Complex::from(1.0));
     ModalModeRow {
-        natural_frequency_hz: uncertain(&mode.natural_frequency_hz),
-        damped_frequency_hz: damped_frequency(mode),
-        damping_ratio: uncertain(&mode.damping_ratio),
-        oscillates: true,
-        eigenvalue: [mode.pole.re, mode.pole.im],
-        shape: entries(&mode.shape, &mode.shape_standard_error, Complex::from(1.0)),
+        mode: ShapedMode::from_pole([mode.pole.re, mode.pole.im], values, shape),
         participation: entries(&mode.participation, &mode.participation_standard_error, scale),
         phase_collinearity: indicators::mpc(&vector(&mode.shape)),
         driven_share: mode.driven_share,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::settings::ModesSettings;
 use crate::hits::{self, HitRow};
 use crate::identify::rows::{CONFIDENCE, Uncertain, WindowRow};
-use crate::modal::ShapeEntry;
+use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, paged_table, significant, text_table};
 
 /// Decimal places of a phase, in degrees.
@@ -87,18 +87,9 @@ pub struct OutputRow {
 /// One mode.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModalModeRow {
-    /// Natural frequency |λ|/2π, in Hz.
-    pub natural_frequency_hz: Uncertain,
-    /// Damped frequency Im λ/2π, in Hz.
-    pub damped_frequency_hz: Uncertain,
-    /// Damping ratio −Re λ/|λ|, a pure number.
-    pub damping_ratio: Uncertain,
-    /// `true`: only modes that oscillate are found.
-    pub oscillates: bool,
-    /// Real and imaginary part of the pole λ, in rad/s.
-    pub eigenvalue: [f64; 2],
-    /// One entry per response; the largest is 1.
-    pub shape: Vec<ShapeEntry>,
+    /// Frequencies, damping, pole, and the shape with one entry per response.
+    #[serde(flatten)]
+    pub mode: ShapedMode,
     /// One entry per force; the largest is 1. Empty without forces.
     pub participation: Vec<ShapeEntry>,
     /// Modal phase collinearity of the shape: 1 if all entries have one phase or its opposite.
@@ -149,6 +140,20 @@ pub struct ModalCheck {
 }
 
 impl ModesSummary {
+    /// Returns the modes with their shapes and the names of the entries: at the responses, or, where more
+    /// points are struck than measured, by reciprocity at the forces.
+    pub fn shapes(&self) -> (Vec<ShapedMode>, Vec<String>) {
+        if self.inputs.len() <= self.outputs.len() {
+            let modes = self.modes.iter().map(|row| row.mode.clone()).collect();
+            return (modes, self.outputs.iter().map(|output| output.column.clone()).collect());
+        }
+        let at_forces = |row: &ModalModeRow| {
+            let shape = row.participation.clone();
+            ShapedMode { shape, ..row.mode.clone() }
+        };
+        (self.modes.iter().map(at_forces).collect(), self.inputs.clone())
+    }
+
     fn heading(&self) -> String {
         let rate = self.records.first().map_or(0.0, |record| record.window.sample_rate_hz);
         let rate = compact(rate, 6);
@@ -188,8 +193,8 @@ impl ModesSummary {
         let mut rows = vec![header[..columns].iter().map(|cell| cell.to_string()).collect()];
         for (number, mode) in (1..).zip(&self.modes) {
             let mut row = vec![number.to_string()];
-            row.extend(cells(&mode.natural_frequency_hz));
-            row.extend(cells(&mode.damping_ratio.percent()));
+            row.extend(cells(&mode.mode.row.natural_frequency_hz));
+            row.extend(cells(&mode.mode.row.damping_ratio.percent()));
             row.push(mode.driven_share.map_or("–".into(), |s| significant(100.0 * s, 4)));
             row.truncate(columns);
             rows.push(row);
@@ -255,7 +260,7 @@ impl fmt::Display for ModesSummary {
             self.outputs.iter().map(|output| output.column.clone()).collect();
         write!(f, "{}\n{}", self.heading(), self.mode_table())?;
         if self.outputs.len() > 1 {
-            write!(f, "\n{}", self.entries("shape", &outputs, |mode| &mode.shape))?;
+            write!(f, "\n{}", self.entries("shape", &outputs, |mode| &mode.mode.shape))?;
         }
         if self.inputs.len() > 1 {
             let inputs = self.entries("participation", &self.inputs, |mode| &mode.participation);

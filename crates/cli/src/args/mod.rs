@@ -9,12 +9,16 @@ mod style;
 use std::path::PathBuf;
 
 use clap::Args;
+use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
+use mechid::io::Geometry;
+use mechid::report::ModeShapes;
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
 use self::choices::DetrendChoice;
 pub use self::style::StyleArgs;
 use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
 
 /// Format of the printed result.
 #[derive(Debug, Default, Args)]
@@ -34,6 +38,58 @@ pub struct PlotArgs {
     /// zooms and has a cursor
     #[arg(long, value_name = "FILE.svg|.png|.html", value_parser = plot_file, help_heading = "Output")]
     pub plot: Option<PathBuf>,
+}
+
+impl PlotArgs {
+    /// Returns whether a page is asked for.
+    pub fn is_page(&self) -> bool {
+        let ending = self.plot.as_ref().and_then(|path| path.extension());
+        ending.is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
+    }
+}
+
+/// Mode shapes to draw and to write.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Mode shapes")]
+pub struct ShapeArgs {
+    /// Places of the channels: a universal file (datasets 15 or 2411, and 82), or a table with rows name,x,y,z in m
+    /// and line,name,name [default: a row, or a grid, by names such as 1+Z and 1.2+Z]
+    #[arg(long, value_name = "FILE")]
+    geometry: Option<PathBuf>,
+    /// Write geometry and complex shapes into this universal file (datasets 164, 15, 82, 55; SI units)
+    #[arg(long, value_name = "FILE.unv")]
+    shapes: Option<PathBuf>,
+}
+
+impl ShapeArgs {
+    /// Adds the files that the arguments name.
+    pub fn add_files<'a>(&'a self, files: Files<'a>) -> Files<'a> {
+        files.reads(&self.geometry).writes(&self.shapes)
+    }
+
+    /// Returns the shapes of modes whose entries have these names; `None` where there is nothing to draw.
+    pub fn of(
+        &self,
+        modes: &[ShapedMode],
+        names: &[String],
+    ) -> Result<Option<ModeShapes>, CliError> {
+        let geometry = self.geometry.as_ref().map(Geometry::read).transpose()?;
+        let shapes = ModeShapes::from_modes(modes, names, geometry.as_ref());
+        if shapes.is_none() && (self.geometry.is_some() || self.shapes.is_some()) {
+            return Err(CliError::NoShapes { names: names.join(", ") });
+        }
+        Ok(shapes)
+    }
+
+    /// Returns the outcome with the file of shapes, if it is asked for.
+    pub fn with_shapes(&self, outcome: Outcome, shapes: Option<&ModeShapes>) -> Outcome {
+        match (&self.shapes, shapes) {
+            (Some(path), Some(shapes)) => {
+                outcome.with_file(path, shapes.geometry.universal_file(&shapes.modes))
+            }
+            _ => outcome,
+        }
+    }
 }
 
 fn plot_file(text: &str) -> Result<PathBuf, String> {

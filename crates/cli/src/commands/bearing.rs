@@ -6,7 +6,7 @@ use clap::Args;
 use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable};
 use mechid::analysis::{IdentifyBearing, Measurement};
 use mechid::io::FrequencyResponses;
-use mechid::report::ToFigure as _;
+use mechid::report::FigureStyle;
 use mechid::{BearingData, identify_bearing};
 
 use crate::args::choices::CoefficientsChoice;
@@ -132,8 +132,11 @@ impl BearingArgs {
         if self.campaign {
             let plan: BearingPlan = mechid::io::read_json(&self.input.record)?;
             let speeds = plan.run()?;
-            let outcome = Outcome::new(speeds.to_string(), &speeds)?
-                .with_plot(&self.plot, || Ok(speeds.figure()?))?;
+            let outcome = Outcome::new(speeds.to_string(), &speeds)?.with_result_plot(
+                &self.plot,
+                &speeds,
+                FigureStyle::default(),
+            )?;
             return Ok(self.with_table(outcome, &speeds));
         }
         let how = self.settings();
@@ -156,8 +159,11 @@ impl BearingArgs {
             false => Some(data(&mut self.baseline.iter())?),
         };
         let identified = identify_bearing(&tests, baseline.as_ref(), &how)?;
-        let outcome = Outcome::new(identified.to_string(), &identified)?
-            .with_plot(&self.plot, || Ok(identified.figure()?))?;
+        let outcome = Outcome::new(identified.to_string(), &identified)?.with_result_plot(
+            &self.plot,
+            &identified,
+            FigureStyle::default(),
+        )?;
         Ok(self.with_table(outcome, &BearingTable::new([identified])))
     }
 

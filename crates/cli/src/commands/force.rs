@@ -10,7 +10,7 @@ use mechid::analysis::reconstruct::{
 };
 use mechid::analysis::{AnalysisError, Machine};
 use mechid::io::{BegunFile, CsvFile, LineSpec};
-use mechid::report::{ToFigure as _, spectrum_csv};
+use mechid::report::{FigureStyle, spectrum_csv};
 
 use crate::args::choices::{ForceMethodChoice, RuleChoice};
 use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
@@ -107,7 +107,7 @@ impl ForceArgs {
             }
             outcome = outcome.with_begun(file);
         }
-        outcome.with_plot(&self.plot, || Ok(reconstructed.figure()?))
+        outcome.with_result_plot(&self.plot, &reconstructed, FigureStyle::default())
     }
 
     /// Returns the settings of the reconstruction.

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mechid::analysis::FrfSettings;
-use mechid::report::ToFigure as _;
 
 use crate::args::choices::EstimatorChoice;
 use crate::args::fit::{LineArgs, SegmentArgs};
@@ -99,8 +98,11 @@ impl FrfArgs {
             records.push(self.input.open_other(record, channels, self.input.window())?);
         }
         let table = mechid::frf_of_records(&records, &how)?;
-        let mut outcome = Outcome::new(table.to_string(), &table)?
-            .with_plot(&self.plot, || Ok(table.styled_figure(self.style.style())?))?;
+        let mut outcome = Outcome::new(table.to_string(), &table)?.with_result_plot(
+            &self.plot,
+            &table,
+            self.style.style(),
+        )?;
         if let Some(path) = &self.output {
             let universal = path.extension().is_some_and(|ending| {
                 ["unv", "uff"].iter().any(|known| ending.eq_ignore_ascii_case(known))

@@ -1,7 +1,6 @@
 //! `mechid identify`: the machine behind a record.
 
 use clap::Args;
-use mechid::report::ToFigure as _;
 
 use crate::args::fit::{FitArgs, TableArgs};
 use crate::args::{PlotArgs, ReportArgs, StyleArgs};
@@ -60,11 +59,17 @@ impl IdentifyArgs {
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         if let Some(identified) = self.fit.identify_tables(&self.table)? {
-            return Outcome::new(identified.to_string(), &identified)?
-                .with_plot(&self.plot, || Ok(identified.styled_figure(self.style.style())?));
+            return Outcome::new(identified.to_string(), &identified)?.with_result_plot(
+                &self.plot,
+                &identified,
+                self.style.style(),
+            );
         }
         let identified = self.fit.identify()?;
-        Outcome::new(self.fit.text(&identified), &identified)?
-            .with_plot(&self.plot, || Ok(identified.styled_figure(self.style.style())?))
+        Outcome::new(self.fit.text(&identified), &identified)?.with_result_plot(
+            &self.plot,
+            &identified,
+            self.style.style(),
+        )
     }
 }

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use mechid::analysis::InspectSettings;
-use mechid::report::ToFigure as _;
+use mechid::report::FigureStyle;
 
 use crate::args::{PlotArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
@@ -49,7 +49,10 @@ impl InfoArgs {
             InspectSettings { columns: self.columns.clone(), curves: self.plot.plot.is_some() };
         let (reading, window) = (self.input.reading(), self.input.window());
         let inspected = mechid::inspect(&self.input.record, &reading, &window, &how)?;
-        Outcome::new(inspected.to_string(), &inspected)?
-            .with_plot(&self.plot, || Ok(inspected.figure()?))
+        Outcome::new(inspected.to_string(), &inspected)?.with_result_plot(
+            &self.plot,
+            &inspected,
+            FigureStyle::default(),
+        )
     }
 }

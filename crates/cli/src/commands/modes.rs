@@ -6,16 +6,17 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mechid::analysis::identify::Band;
 use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
+use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{AnalysisError, Machine, ModalSummary};
 use mechid::integrate::ModeSearch;
 use mechid::io::{input_name, read_sparse_system};
-use mechid::report::ToFigure as _;
+use mechid::report::{FigureStyle, ModeShapes, ToFigure, figure_page};
 use mechid::selected_modes::SelectedModes;
 use mechid::{DecaySettings, Measurement};
 
 use crate::args::hits::HitRuleArgs;
 use crate::args::{
-    ChannelArgs, PlotArgs, RecordArgs, ReportArgs, StyleArgs, at_least_one, positive,
+    ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one, positive,
 };
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -39,6 +40,7 @@ use crate::outcome::{Files, Outcome};
   mechid modes examples/decay.csv --acceleration a1,a2,a3
   mechid modes bridge.csv --acceleration a1,a2,a3 --ambient --band-hz 0.5:20
   mechid modes examples/machine.json --plot modes.svg
+  mechid modes found.json --geometry frame.csv --plot modes.html --shapes modes.unv
   mechid modes casing.json --modes 4 --near-hz 50")]
 pub struct ModesArgs {
     #[command(flatten)]
@@ -77,6 +79,8 @@ pub struct ModesArgs {
     #[command(flatten)]
     unmeasured: UnmeasuredArgs,
     #[command(flatten)]
+    shapes: ShapeArgs,
+    #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
     style: StyleArgs,
@@ -110,10 +114,30 @@ struct UnmeasuredArgs {
     no_offset: bool,
 }
 
+/// Adds what `--plot` asks for: the figure of a result, or a page of it with the shapes of its modes.
+pub fn draw(
+    outcome: Outcome,
+    plot: &PlotArgs,
+    shapes: Option<&ModeShapes>,
+    result: &impl ToFigure,
+    style: FigureStyle,
+) -> Result<Outcome, CliError> {
+    match &plot.plot {
+        Some(path) if plot.is_page() => {
+            let figure = result.styled_figure(style)?;
+            let title = figure.name().to_owned();
+            let page = figure_page(&title, vec![(String::new(), figure)], shapes)?;
+            Ok(outcome.with_file(path, page))
+        }
+        _ => outcome.with_plot(plot, || Ok(result.styled_figure(style)?)),
+    }
+}
+
 impl ModesArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        Files::default().reads([&self.input.record]).reads(&self.more).writes(&self.plot.plot)
+        let files = Files::default().reads([&self.input.record]).reads(&self.more);
+        self.shapes.add_files(files.writes(&self.plot.plot))
     }
 
     /// Reads what there is, finds the modes, and reports.
@@ -125,8 +149,11 @@ impl ModesArgs {
         if channels.force.is_empty() && !self.unmeasured.ambient {
             self.refuse("a free decay", &self.of_forces())?;
             let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
-            return Outcome::new(decayed.to_string(), &decayed)?
-                .with_plot(&self.plot, || Ok(decayed.styled_figure(self.style.style())?));
+            let summary = decayed.summary();
+            let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
+            let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
+            let outcome = Outcome::new(decayed.to_string(), &decayed)?;
+            return self.drawn(outcome, &decayed, &modes, &names);
         }
         let mut records = vec![self.input.open(&channels)?];
         for record in &self.more {
@@ -137,8 +164,21 @@ impl ModesArgs {
 
     fn of_records(&self, records: &[Measurement]) -> Result<Outcome, CliError> {
         let modes = mechid::modes(records, &self.settings())?;
-        Outcome::new(modes.to_string(), &modes)?
-            .with_plot(&self.plot, || Ok(modes.styled_figure(self.style.style())?))
+        let (shaped, names) = modes.summary().shapes();
+        self.drawn(Outcome::new(modes.to_string(), &modes)?, &modes, &shaped, &names)
+    }
+
+    /// Adds the pictures and the files of shapes that are asked for.
+    fn drawn(
+        &self,
+        outcome: Outcome,
+        result: &impl ToFigure,
+        modes: &[ShapedMode],
+        names: &[String],
+    ) -> Result<Outcome, CliError> {
+        let shapes = self.shapes.of(modes, names)?;
+        let outcome = self.shapes.with_shapes(outcome, shapes.as_ref());
+        draw(outcome, &self.plot, shapes.as_ref(), result, self.style.style())
     }
 
     /// Refuses the first of some options that was given.
@@ -177,8 +217,13 @@ impl ModesArgs {
         }
         let machine = Machine::read(path)?;
         let modes = ModalSummary::of(&machine)?;
-        Outcome::new(modes.to_string(), &modes)?
-            .with_plot(&self.plot, || Ok(machine.styled_figure(self.style.style())?))
+        let names = if modes.response_names.is_empty() {
+            (1..=modes.degrees_of_freedom).map(|dof| dof.to_string()).collect()
+        } else {
+            modes.response_names.clone()
+        };
+        let outcome = Outcome::new(modes.to_string(), &modes)?;
+        self.drawn(outcome, &machine, &modes.modes, &names)
     }
 
     fn settings(&self) -> ModesSettings {

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use mechid::analysis::identify::KnownMass;
 use mechid::analysis::sweep::{Kind, Settings, SweepSettings, SweepSummary, sweep_record};
 use mechid::io::{Experiment, read_system};
-use mechid::report::ToFigure as _;
+use mechid::report::FigureStyle;
 
 use crate::args::choices::SweepEstimatorChoice;
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
@@ -128,7 +128,11 @@ impl SweepArgs {
         };
         bar.finish_and_clear();
         let swept = swept?;
-        Outcome::new(swept.text(self.best), &swept)?.with_plot(&self.plot, || Ok(swept.figure()?))
+        Outcome::new(swept.text(self.best), &swept)?.with_result_plot(
+            &self.plot,
+            &swept,
+            FigureStyle::default(),
+        )
     }
 
     fn over_experiment(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mechid::analysis::fleet::Trends;
-use mechid::report::{ToFigure as _, trends_page};
+use mechid::report::{FigureStyle, trends_page};
 
 use super::report::html_file;
 use crate::args::choices::TrendAxisChoice;
@@ -67,6 +67,6 @@ impl TrendsArgs {
         if let Some(file) = &self.table {
             outcome = outcome.with_file(file, trends.csv());
         }
-        outcome.with_plot(&self.plot, || Ok(trends.figure()?))
+        outcome.with_result_plot(&self.plot, &trends, FigureStyle::default())
     }
 }

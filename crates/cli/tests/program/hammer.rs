@@ -27,7 +27,7 @@ fn channels_keep_their_names_and_the_picture_has_the_coherence() {
     let found = mechid(folder, &format!("identify {ROVING} --plot fit.svg --json"));
     let picture = fs::read_to_string(folder.join("fit.svg")).unwrap();
     for words in
-        ["x at a1 / force at a1", "x at a1 / force at a2", "x at a2 / force at a2", "Coherence"]
+        ["a1 / force at a1", "a1 / force at a2", "a2 / force at a2", "Coherence"]
     {
         assert!(picture.contains(&format!(">{words}<")), "no {words}");
     }

@@ -33,8 +33,8 @@ pub fn content_policy() -> &'static str {
 /// Look of what the script adds beside a figure.
 pub const FIGURE_STYLE: &str = include_str!("figure.css");
 
-/// A page of one drawn figure.
-pub(super) fn page(title: &str, svg: &str) -> String {
+/// A page of drawn figures.
+pub(super) fn page(title: &str, figures: &str) -> String {
     let heading = if title.is_empty() { "Figure".into() } else { escape(title) };
     let above = if title.is_empty() { String::new() } else { format!("<h1>{heading}</h1>") };
     format!(
@@ -42,7 +42,7 @@ pub(super) fn page(title: &str, svg: &str) -> String {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{heading}</title>\
-         <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}<figure class=\"wide\">{svg}</figure></main>\
+         <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}{figures}</main>\
          <script>{}</script></body></html>\n",
         content_policy(),
         script()

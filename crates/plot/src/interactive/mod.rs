@@ -81,6 +81,27 @@ impl FigureSet {
     }
 }
 
+impl DrawnSet {
+    /// Returns the drawing, with the small ones to choose by, as elements of an HTML document.
+    pub fn html(&self) -> String {
+        let button = |(name, svg): &(String, String)| {
+            format!("<button type=\"button\">{svg}{}</button>", crate::canvas::escape(name))
+        };
+        let buttons: String = self.map.iter().map(button).collect();
+        match buttons.is_empty() {
+            true => self.svg.clone(),
+            false => format!("{}<div class=\"map\">{buttons}</div>", self.svg),
+        }
+    }
+}
+
+/// Returns an HTML page of drawings below one another, which zooms, has a cursor and loads nothing.
+pub fn page_of(title: &str, drawings: &[DrawnSet]) -> String {
+    let figures: String =
+        drawings.iter().map(|drawn| format!("<figure class=\"wide\">{}</figure>", drawn.html())).collect();
+    html::page(title, &figures)
+}
+
 impl Figure {
     /// Returns the figure as [`Figure::to_inline_svg`] does, with its numbers for the [`script()`] that makes
     /// it answer.
@@ -96,8 +117,8 @@ impl Figure {
     /// # Errors
     /// As [`Figure::to_svg`].
     pub fn to_html(&self) -> Result<String, PlotError> {
-        let svg = self.to_interactive_svg("figure", &self.title)?;
-        Ok(html::page(&self.title, &svg))
+        let set = FigureSet::new([(String::new(), self.clone().titled(""))]);
+        Ok(page_of(&self.title, &[set.draw("figure", &self.title)?]))
     }
 }
 

@@ -3,51 +3,99 @@
 use std::f64::consts::TAU;
 
 use mechid_analysis::FrfTable;
-use mechid_plot::charts::Quantity;
+use mechid_analysis::frf::table::{Coherence, Response};
+use mechid_model::ResponseQuantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 use nalgebra::Complex;
 
-use super::style::{FigureStyle, FrequencyScale};
+use super::style::{FigureStyle, FrequencyScale, derivative, per_force};
 use super::trace::Trace;
+
+/// Title of the figure.
+pub fn title(report: &FrfTable) -> String {
+    format!("{}, {}", report.file, report.estimator)
+}
 
 /// Magnitude above phase above coherence, one curve for every pair of motion and force.
 pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     let alone = report.responses.len() == 1;
+    let name = |response: &Response| if alone { String::new() } else { report.pair(response) };
     let traces: Vec<Trace> = report
         .responses
         .iter()
-        .map(|r| {
-            let name = match alone {
-                true => String::new(),
-                false => report.pair(r),
-            };
-            let values = r.real.iter().zip(&r.imaginary).map(|(re, im)| Complex::new(*re, *im));
-            let omega = report.frequency_hz.iter().map(|hz| hz * TAU);
-            let points: Vec<(f64, Complex<f64>)> = omega.zip(values).collect();
-            let errors = points.iter().zip(&r.standard_error);
-            let errors = errors.filter(|((omega, h), _)| Trace::is_drawn(style, *omega, *h));
-            let errors = errors.map(|(_, error)| *error).collect();
-            Trace::line(style, name, points.into_iter()).standard_error(style, errors)
-        })
+        .map(|response| trace(report, response, name(response), style))
         .collect();
-    let name = match report.quantity.as_str() {
-        "displacement" => "Receptance",
-        "velocity" => "Mobility",
-        _ => "Accelerance",
-    };
-    let title = format!("{}, {}", report.file, report.estimator);
-    let frequency = style.frequency_axis(FrequencyScale::Linear);
-    let mut coherence = Panel::new(frequency, Axis::linear("Coherence", "").range(0.0, 1.0));
-    for c in &report.coherence {
+    let mut panel = coherence_panel(style);
+    for coherence in &report.coherence {
         let name = match report.coherence.len() {
             1 => String::new(),
-            _ => report.response_names[c.motion - 1].clone(),
+            _ => report.response_names[coherence.motion - 1].clone(),
         };
-        // 0 Hz has no place on a logarithmic axis.
-        let hidden = report.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
-        let (hz, values) = (&report.frequency_hz[hidden..], &c.values[hidden..]);
-        coherence = coherence.curve(Curve::line(name, hz, values));
+        panel = panel.curve(coherence_curve(report, coherence, name));
     }
-    let quantity = Quantity::new(name, report.unit);
-    style.chart(&title, FrequencyScale::Linear, quantity, [&[], &traces]).panel(coherence)
+    chart(report, &title(report), &traces, style).panel(panel)
+}
+
+/// The same as a figure for each pair, by its name, with the coherence of its motion.
+pub fn figures(report: &FrfTable, style: FigureStyle) -> Vec<(String, Figure)> {
+    let of_pair = |response: &Response| {
+        let trace = trace(report, response, String::new(), style);
+        let figure = chart(report, "", &[trace], style);
+        let of_motion = |coherence: &&Coherence| coherence.motion == response.motion;
+        let figure = match report.coherence.iter().find(of_motion) {
+            Some(coherence) => {
+                let curve = coherence_curve(report, coherence, String::new());
+                figure.panel(coherence_panel(style).curve(curve))
+            }
+            None => figure,
+        };
+        (report.pair(response), figure)
+    };
+    report.responses.iter().map(of_pair).collect()
+}
+
+fn trace(report: &FrfTable, response: &Response, name: String, style: FigureStyle) -> Trace {
+    let shown = style.quantity.unwrap_or(measured(report));
+    let values = response.real.iter().zip(&response.imaginary);
+    let turned = |omega: f64| derivative(shown, omega) / derivative(measured(report), omega);
+    let points: Vec<(f64, Complex<f64>)> = report
+        .frequency_hz
+        .iter()
+        .map(|hz| hz * TAU)
+        .zip(values)
+        .map(|(omega, (re, im))| {
+            let h = Complex::new(*re, *im);
+            // As it was measured, to the last digit.
+            (omega, if shown == measured(report) { h } else { h * turned(omega) })
+        })
+        .collect();
+    let errors = points.iter().zip(&response.standard_error);
+    let errors = errors.filter(|((omega, h), _)| Trace::is_drawn(style, *omega, *h));
+    let scale = |omega: f64| if shown == measured(report) { 1.0 } else { turned(omega).norm() };
+    let errors = errors.map(|((omega, _), error)| error * scale(*omega)).collect();
+    Trace::line(style, name, points.into_iter()).standard_error(style, errors)
+}
+
+fn measured(report: &FrfTable) -> ResponseQuantity {
+    match report.quantity.as_str() {
+        "displacement" => ResponseQuantity::Displacement,
+        "velocity" => ResponseQuantity::Velocity,
+        _ => ResponseQuantity::Acceleration,
+    }
+}
+
+fn chart(report: &FrfTable, title: &str, traces: &[Trace], style: FigureStyle) -> Figure {
+    let quantity = per_force(style.quantity.unwrap_or(measured(report)));
+    style.chart(title, FrequencyScale::Linear, quantity, [&[], traces])
+}
+
+fn coherence_panel(style: FigureStyle) -> Panel {
+    let frequency = style.frequency_axis(FrequencyScale::Linear);
+    Panel::new(frequency, Axis::linear("Coherence", "").range(0.0, 1.0))
+}
+
+fn coherence_curve(report: &FrfTable, coherence: &Coherence, name: String) -> Curve {
+    // 0 Hz has no place on a logarithmic axis.
+    let hidden = report.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
+    Curve::line(name, &report.frequency_hz[hidden..], &coherence.values[hidden..])
 }

@@ -31,6 +31,7 @@ use mechid_spectra::FrequencyData;
 use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
+use crate::page::figure_page;
 
 /// A result that can be drawn.
 pub trait ToFigure {
@@ -48,6 +49,17 @@ pub trait ToFigure {
     /// # Errors
     /// As [`ToFigure::figure`].
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError>;
+
+    /// Returns an HTML page of the figure, which zooms and has a cursor and loads nothing; of several responses one is
+    /// shown large and all small.
+    ///
+    /// # Errors
+    /// As [`ToFigure::figure`].
+    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        let figure = self.styled_figure(style)?;
+        let title = figure.name().to_owned();
+        figure_page(&title, vec![(String::new(), figure)], None)
+    }
 }
 
 fn receptance_or_responses(
@@ -75,6 +87,14 @@ pub(crate) fn displacement_name(channels: &Channels, kind: ResponseQuantity, dof
     }
 }
 
+fn motion_letter(quantity: ResponseQuantity) -> &'static str {
+    match quantity {
+        ResponseQuantity::Displacement => "x",
+        ResponseQuantity::Velocity => "v",
+        ResponseQuantity::Acceleration => "a",
+    }
+}
+
 /// Name of a motion as it is drawn: that of its channel where this is what is drawn, or of the place.
 pub(crate) fn motion_name(
     channels: &Channels,
@@ -85,12 +105,7 @@ pub(crate) fn motion_name(
     let name = channels.response_name(measured, dof);
     match drawn {
         Some(drawn) if drawn != measured => {
-            let motion = match drawn {
-                ResponseQuantity::Displacement => "x",
-                ResponseQuantity::Velocity => "v",
-                ResponseQuantity::Acceleration => "a",
-            };
-            format!("{motion} at {name}")
+            format!("{} at {name}", motion_letter(drawn))
         }
         _ => name,
     }
@@ -159,6 +174,10 @@ impl ToFigure for FrfTable {
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         Ok(frf::figure(self, style))
     }
+
+    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        figure_page(&frf::title(self), frf::figures(self, style), None)
+    }
 }
 
 impl ToFigure for Decayed {
@@ -218,9 +237,10 @@ impl ToFigure for Machine {
             .iter()
             .map(|mode| (mode.natural_frequency_hz.value, mode.damping_ratio.value))
             .collect();
+        let drawn = style.quantity.unwrap_or(ResponseQuantity::Displacement);
         let displacement = |dof: usize| match self.names.first_response() {
-            Some(kind) => displacement_name(&self.names, kind, dof),
-            None => format!("x{}", dof + 1),
+            Some(kind) => motion_name(&self.names, kind, dof, Some(drawn)),
+            None => format!("{}{}", motion_letter(drawn), dof + 1),
         };
         let force = |dof: usize| match self.names.force.is_empty() {
             true => format!("F{}", dof + 1),

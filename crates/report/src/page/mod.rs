@@ -1,5 +1,6 @@
 //! The HTML page of an identification: one file that needs nothing else.
 
+mod alone;
 mod checks;
 mod figures;
 mod sections;
@@ -19,6 +20,7 @@ use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
+pub use self::alone::figure_page;
 use self::figures::Drawn;
 use self::tables::Table;
 #[cfg(feature = "parquet")]

@@ -1,0 +1,59 @@
+//! Pages of figures alone, without an identification around them.
+
+use maud::{DOCTYPE, html};
+use mechid_plot::{Figure, matrix_of_squares};
+
+use super::figures::{Drawn, drawn_set};
+use super::{figure, figure_script, head};
+use crate::ReportError;
+use crate::figures::shapes::ModeShapes;
+
+/// Caption of deflected lines.
+pub(super) const SHAPES: &str = "Mode shapes: lines of the largest deflection over those at rest; of a complex mode \
+                                 the points do not reach theirs together.";
+
+/// Caption of the modal assurance criterion.
+pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, \
+                                   0 for orthogonal ones.";
+
+/// Returns a page of one figure or of several to choose from, by their names, and of mode shapes if there are any: HTML that
+/// loads nothing and runs nothing but the script of its figures.
+///
+/// # Errors
+/// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
+pub fn figure_page(
+    title: &str,
+    figures: Vec<(String, Figure)>,
+    shapes: Option<&ModeShapes>,
+) -> Result<String, ReportError> {
+    let figures = figures.into_iter().map(|(name, figure)| (name, figure.titled(""))).collect();
+    let mut drawn = vec![drawn_set("figure".into(), figures, title.into())?];
+    if let Some(shapes) = shapes {
+        drawn.extend(shape_figures(shapes));
+    }
+    let title = if title.is_empty() { "Figure" } else { title };
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (head(title))
+            body {
+                header { h1 { (title) } }
+                main {
+                    @for one in &drawn { (figure(one)) }
+                }
+                (figure_script())
+            }
+        }
+    };
+    Ok(page.into_string() + "\n")
+}
+
+/// Deflected lines and the likeness of the shapes.
+pub(super) fn shape_figures(shapes: &ModeShapes) -> [Drawn; 2] {
+    let drawn = shapes.draw(SHAPES);
+    let matrix = matrix_of_squares(&shapes.assurance(), LIKENESS);
+    [
+        Drawn { id: "shapes".into(), svg: drawn.svg, map: drawn.map, caption: SHAPES.into() },
+        Drawn { id: "assurance".into(), svg: matrix, map: Vec::new(), caption: LIKENESS.into() },
+    ]
+}

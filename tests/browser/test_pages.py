@@ -1,0 +1,359 @@
+"""What a browser shows of the pages, and does with them.
+
+Usage: test_pages.py PROGRAM PAGES [--pictures FOLDER]: the program `mechid`, the example `pages`, and a folder for pictures at
+four widths. Without a browser on a user's machine it says so and ends well; in CI (`CI` is set) that is an error.
+"""
+
+import argparse
+import json
+import os
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from chromium import Browser, Page, find  # noqa: E402
+from samples import make  # noqa: E402
+
+WIDTHS = (390, 768, 1280, 1920)
+PAGES = ("response", "matrix", "shapes", "one", "three", "force", "trends", "nonlinear", "bearing", "decay", "frf")
+
+# Texts of figures whose boxes intersect: two of one drawing, of which neither holds the other.
+OVERLAPS = """
+[...document.querySelectorAll('figure > svg')].flatMap(svg => {
+    const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim() && t.getBoundingClientRect().width);
+    const boxes = texts.map(t => t.getBoundingClientRect());
+    const found = [];
+    boxes.forEach((a, i) => boxes.forEach((b, j) => {
+        const across = Math.min(a.right, b.right) - Math.max(a.left, b.left), down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        if (i < j && across > 1 && down > 2.5) found.push(texts[i].textContent + ' | ' + texts[j].textContent);
+    }));
+    return found;
+})
+"""
+
+# Elements that reach beyond the window, other than what scrolls by itself.
+BEYOND = """
+[...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1
+    && !e.closest('.scroll > *, svg *')).map(e => e.tagName + '.' + e.className)
+"""
+
+# Texts whose contrast is below that of WCAG AA: 4.5, of large ones 3.
+FAINT = """
+(() => {
+    const channel = c => { c /= 255; return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4; };
+    const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+    const parse = text => text.match(/[\\d.]+/g)?.map(Number) ?? [0, 0, 0, 0];
+    const behind = e => { for (; e; e = e.parentElement) { const c = parse(getComputedStyle(e).backgroundColor); if (c.length < 4 || c[3] > 0.99) return c; }
+        return matchMedia('(prefers-color-scheme: dark)').matches ? [18, 18, 18] : [255, 255, 255]; };
+    return [...document.querySelectorAll('h1, h2, p, dt, dd, li, th, td, figcaption, button, label, select, a, b, span, svg text')].filter(e => {
+        if (!e.textContent.trim() || !e.getBoundingClientRect().width) return false;
+        const style = getComputedStyle(e), isSvg = e.namespaceURI.endsWith('svg');
+        const paper = isSvg ? parse(getComputedStyle(e.ownerSVGElement.querySelector('rect')).fill) : behind(e);
+        const [a, b] = [light(parse(isSvg ? style.fill : style.color)), light(paper)].sort((x, y) => y - x);
+        const large = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.6 && style.fontWeight >= 700);
+        return (a + 0.05) / (b + 0.05) < (large ? 3 : 4.5);
+    }).map(e => e.tagName + ': ' + e.textContent.slice(0, 40));
+})()
+"""
+
+
+def box(page, figure, panel=0):
+    """Left, top, right, bottom of the frame of a panel, in px of the window; scrolls there."""
+    page.run(f"document.querySelector('{figure}').scrollIntoView()")
+    page.settle(4)
+    return page.run(
+        f"(() => {{ const b = document.querySelectorAll('{figure} .frame')[{panel}].getBoundingClientRect();"
+        " return [b.left, b.top, b.right, b.bottom]; })()"
+    )
+
+
+def values(page, figure):
+    """Names and numbers that the cursor shows."""
+    rows = page.run(f"[...document.querySelectorAll('{figure} .values span')].map(s => s.textContent)")
+    return [row.replace("−", "-") for row in rows]
+
+
+def ticks(page, figure):
+    return page.run(
+        f"[...document.querySelectorAll('{figure} text[text-anchor=middle]')].map(t => t.textContent)"
+        ".filter(t => /^[−0-9.]+$/.test(t)).map(t => +t.replace('−', '-'))"
+    )
+
+
+def path(page, selector):
+    return page.run(f"document.querySelector('{selector}').getAttribute('d')")
+
+
+class Tests:
+    def __init__(self, browser, folder, pictures):
+        self.browser, self.folder, self.pictures = browser, folder, pictures
+        self.failures, self.numbers = [], {}
+
+    def check(self, is_right, what):
+        if not is_right:
+            self.failures.append(what)
+            print("FAILED", what, flush=True)
+
+    def page(self, name, width=1280, **more):
+        return Page(self.browser, width, **more).open(self.folder / f"{name}.html")
+
+    def close(self, page, name):
+        self.check(page.complaints == [], f"{name}: the console says {page.complaints[:2]}")
+        own = (self.folder / f"{name}.html").resolve().as_uri()
+        self.check(set(page.requests) == {own}, f"{name}: it asks for {page.requests}")
+
+    def cursor_and_zoom(self):
+        page = self.page("response")
+        page.everything()
+        expected = json.loads((self.folder / "expected.json").read_text())
+        for known in expected:
+            left, top, right, bottom = box(page, "figure")
+            scale = (right - left) / (256 * 1.0)
+            # The axis ends where the markers have room: from the ticks.
+            at = page.run(
+                "(() => { const t = [...document.querySelectorAll('figure text')].filter(t => t.textContent === '50' || t.textContent === '100');"
+                " const x = {}; t.forEach(e => { const b = e.getBoundingClientRect(); x[e.textContent] = (b.left + b.right) / 2; });"
+                " return x; })()"
+            )
+            if "50" in at and "100" in at:
+                scale = (at["100"] - at["50"]) / 50
+                x = at["100"] + (known["hz"] - 100) * scale
+            else:
+                self.check(False, f"no ticks 50 and 100: {ticks(page, 'figure')}")
+                continue
+            page.mouse("mouseMoved", x, (top + bottom) / 2)
+            seen = values(page, "figure")
+            hz = float(re.search(r"Frequency ([\d.]+) Hz", " ".join(seen)).group(1))
+            self.check(abs(hz - known["hz"]) <= 0.3, f"cursor at {known['hz']} Hz shows {seen}")
+            # With the keys to the very line.
+            steps = round((known["hz"] - hz) / 0.0625)
+            page.run("document.querySelector('figure svg').focus()")
+            for _ in range(abs(steps)):
+                name = "ArrowRight" if steps > 0 else "ArrowLeft"
+                page.call("Input.dispatchKeyEvent", type="keyDown", key=name)
+                page.call("Input.dispatchKeyEvent", type="keyUp", key=name)
+            page.settle()
+            seen = values(page, "figure")
+            self.check(any(row.startswith(f"Frequency {known['hz']:g} Hz") for row in seen), f"{seen}")
+            row = next((row for row in seen if "Accelerance, measured" in row), "")
+            number = re.search(r"measured ([-\d.e]+)", row)
+            value = float(number.group(1)) if number else float("nan")
+            # Six digits are shown.
+            self.check(abs(value / known["magnitude"] - 1) < 6e-6, f"{row} is not {known['magnitude']}")
+        left, top, right, bottom = box(page, "figure")
+        before = ticks(page, "figure")
+        page.drag((left + 0.2 * (right - left), top + 60), (left + 0.3 * (right - left), top + 62))
+        after = ticks(page, "figure")
+        self.check(max(after[-8:]) < 0.5 * max(before), f"zoom: {before} {after}")
+        page.mouse("mousePressed", left + 90, top + 50, button="left", clickCount=2)
+        page.mouse("mouseReleased", left + 90, top + 50, button="left", clickCount=2)
+        page.run("document.querySelector('.tools button').click()")
+        page.settle()
+        self.check(ticks(page, "figure") == before, "reset brings the first view back")
+        # Pan by the button.
+        page.run("document.querySelectorAll('.tools button')[1].click()")
+        page.drag((left + 300, top + 50), (left + 200, top + 50))
+        self.check(ticks(page, "figure") != before, "panning moves the axis")
+        page.run("document.querySelectorAll('.tools button')[1].click(); document.querySelector('.tools button').click()")
+        page.settle()
+        # Legend.
+        count = lambda: page.run("document.querySelectorAll('figure .curve').length")
+        curves = count()
+        page.run("document.querySelector('.keys button').click()")
+        page.settle()
+        self.check(count() < curves, "the legend hides a curve")
+        self.check(page.run("document.querySelector('.keys button').getAttribute('aria-pressed')") == "false", "legend state")
+        page.run("document.querySelector('.keys button').click()")
+        page.settle()
+        self.check(count() == curves, "the legend shows it again")
+        # Every choice of every list draws something without a complaint.
+        for at in range(page.run("document.querySelectorAll('.tools select').length")):
+            for option in range(page.run(f"document.querySelectorAll('.tools select')[{at}].options.length")):
+                page.run(
+                    f"(() => {{ const s = document.querySelectorAll('.tools select')[{at}]; s.selectedIndex = {option}; s.onchange(); }})()"
+                )
+                drawn = page.run("document.querySelectorAll('figure .curve path').length")
+                overlaps = page.run(OVERLAPS)
+                self.check(drawn > 0 and not overlaps, f"choice {at}.{option}: {drawn} paths, {overlaps[:3]}")
+            page.run(f"(() => {{ const s = document.querySelectorAll('.tools select')[{at}]; s.selectedIndex = 0; s.onchange(); }})()")
+        self.close(page, "response")
+
+    def quantities(self):
+        """Receptance is accelerance over (iω)²."""
+        page = self.page("response")
+        page.everything()
+        left, top, right, bottom = box(page, "figure")
+        read = {}
+        for order in (2, 0):
+            page.run(f"(() => {{ const s = document.querySelectorAll('.tools select')[3]; s.value = {order}; s.onchange(); }})()")
+            page.settle()
+            page.mouse("mouseMoved", left + 300, top + 50)
+            page.mouse("mouseMoved", left + 301, top + 50)
+            text = " ".join(values(page, "figure"))
+            hz = float(re.search(r"Frequency ([\d.e-]+) Hz", text).group(1))
+            read[order] = float(re.search(r"measured ([-\d.e]+)", text).group(1))
+        ratio = read[2] / read[0] / (2 * 3.141592653589793 * hz) ** 2
+        self.check(abs(ratio - 1) < 2e-5, f"accelerance over receptance at {hz} Hz: {ratio}")
+
+    def matrix(self):
+        size = (self.folder / "matrix.html").stat().st_size
+        self.numbers["28 × 2 × 4096: bytes"] = size
+        self.check(size <= 3_000_000, f"28 × 2 responses take {size} bytes")
+        page = self.page("matrix")
+        paint = page.run(
+            "new Promise(done => new PerformanceObserver(list => done(list.getEntries()[0].startTime))"
+            ".observe({type: 'paint', buffered: true}))"
+        )
+        self.numbers["28 × 2 × 4096: first paint, ms"] = round(paint)
+        page.everything()
+        count = page.run("document.querySelectorAll('.map button').length")
+        self.check(count == 56, f"{count} small drawings")
+        title = "[...document.querySelectorAll('figure svg text[font-weight=bold]')].map(t => t.textContent)[0]"
+        page.run("document.querySelectorAll('.map button')[30].click()")
+        page.settle()
+        self.check(page.run(title) == "a3 / F2", f"the third of the second row is {page.run(title)}")
+        # Cursor: time of a frame in which the pointer moves.
+        left, top, right, bottom = box(page, "figure")
+        spent = page.run(
+            f"""(async () => {{
+                const svg = document.querySelector('figure svg'), times = [];
+                const frame = () => new Promise(done => requestAnimationFrame(done));
+                for (let k = 0; k < 120; k++) {{
+                    svg.dispatchEvent(new PointerEvent('pointermove', {{clientX: {left} + 5 + 4 * k, clientY: {(top + bottom) / 2}, bubbles: true}}));
+                    const start = performance.now();
+                    await frame();
+                    times.push(performance.now() - start);
+                }}
+                times.sort((a, b) => a - b);
+                return [times[60], times[114]];
+            }})()"""
+        )
+        self.numbers["cursor: ms a frame, median and 95 %"] = [round(v, 1) for v in spent]
+        self.close(page, "matrix")
+
+    def shapes(self):
+        page = self.page("shapes", reduced=False)
+        page.everything()
+        page.run("document.querySelector('svg.shape').scrollIntoView()")
+        page.settle(4)
+        first = path(page, "svg.shape .moved")
+        page.run("new Promise(done => setTimeout(done, 400))")
+        second = path(page, "svg.shape .moved")
+        self.check(first != second, "the animation moves")
+        self.check(path(page, "svg.shape .rest") not in (first, second), "the structure at rest is another line")
+        pause = "document.querySelector('svg.shape').parentElement.querySelector('.tools button')"
+        page.run(f"{pause}.click()")
+        page.settle()
+        first = path(page, "svg.shape .moved")
+        page.run("new Promise(done => setTimeout(done, 200))")
+        self.check(path(page, "svg.shape .moved") == first, "the pause stops it")
+        page.run("document.querySelectorAll('svg.shape ~ .map button')[2].click()")
+        page.settle()
+        self.check("55.5 Hz" in page.run("document.querySelector('svg.shape ~ .values').textContent"), "third mode")
+        # Poles have words.
+        left, top, right, bottom = box(page, "figure")
+        spots = page.run(
+            "(() => { const p = [...document.querySelectorAll('figure .curve')].find(c => c.dataset.name === 'stable').querySelector('path');"
+            " const m = p.getAttribute('d').match(/M([\\d.]+) ([\\d.]+)/), s = p.ownerSVGElement, b = s.getBoundingClientRect();"
+            " const u = b.width / s.viewBox.baseVal.width; return [b.left + m[1] * u, b.top + m[2] * u]; })()"
+        )
+        page.mouse("mouseMoved", *spots)
+        text = " ".join(values(page, "figure"))
+        self.check("order 4: 12.4 Hz" in text, f"pole: {text}")
+        self.close(page, "shapes")
+        still = self.page("shapes", reduced=True)
+        still.everything()
+        first = path(still, "svg.shape .moved")
+        still.run("new Promise(done => setTimeout(done, 300))")
+        self.check(path(still, "svg.shape .moved") == first, "who wants less motion gets none")
+
+    def tables(self):
+        page = self.page("trends")
+        page.everything()
+        column = "[...document.querySelectorAll('#quantities tbody tr')].map(r => parseFloat(r.cells[2].textContent.replace('−', '-')))"
+        page.run("document.querySelectorAll('#quantities thead button')[2].click()")
+        order = page.run(column)
+        self.check(order == sorted(order), f"sorted: {order}")
+        page.run("document.querySelectorAll('#quantities thead button')[2].click()")
+        self.check(page.run(column) == sorted(order, reverse=True), "and the other way")
+        shown = "[...document.querySelectorAll('#quantities figure')].filter(f => f.getBoundingClientRect().height).length"
+        all_of = page.run(shown)
+        page.run("(() => { const s = document.querySelector('#quantities .tools select'); s.selectedIndex = 1; s.onchange(); })()")
+        self.check(0 < page.run(shown) < all_of, "a category is shown alone")
+        text = page.run("document.querySelector('#changes')?.textContent ?? ''")
+        self.check("run-025" in text and "step" in text, f"the step of the stiffness: {text}")
+        self.close(page, "trends")
+
+    def names_stay_text(self):
+        page = self.page("three")
+        text = page.run("document.querySelector('.about').textContent")
+        self.check("<script>alert(1)</script>" in text, f"about: {text}")
+        self.check(page.run("document.scripts.length") == 1, "one script")
+
+    def print(self):
+        for name, most in (("three", 6), ("one", 6), ("matrix", 3)):
+            page = self.page(name)
+            page.everything()
+            pdf = page.print()
+            pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
+            self.numbers[f"{name}: printed pages"] = pages
+            self.check(0 < pages <= most, f"{name}: {pages} printed pages")
+            if self.pictures:
+                (self.pictures / f"{name}.pdf").write_bytes(pdf)
+
+    def widths(self):
+        for name in PAGES:
+            for width in WIDTHS:
+                for dark in (False, True) if width == 1280 else (False,):
+                    page = self.page(name, width, dark=dark)
+                    page.everything()
+                    seen = page.run("document.documentElement.scrollWidth")
+                    what = f"{name} at {width}{' dark' if dark else ''}"
+                    self.check(seen <= width, f"{what}: {seen} px wide, {page.run(BEYOND)[:5]}")
+                    overlaps = page.run(OVERLAPS)
+                    self.check(not overlaps, f"{what}: texts overlap: {overlaps[:4]}")
+                    faint = page.run(FAINT)
+                    self.check(not faint, f"{what}: faint: {faint[:4]}")
+                    if self.pictures:
+                        page.screenshot(self.pictures / f"{name}-{width}{'-dark' if dark else ''}.png")
+                    self.close(page, name)
+                    self.browser.call("Target.closeTarget", targetId=page.target)
+
+    def run(self):
+        for test in (self.cursor_and_zoom, self.quantities, self.matrix, self.shapes, self.tables,
+                     self.names_stay_text, self.print, self.widths):
+            start = time.monotonic()
+            try:
+                test()
+            except (AssertionError, TimeoutError, AttributeError, TypeError) as error:
+                self.check(False, f"{test.__name__}: {type(error).__name__}: {error}")
+            print(f"{test.__name__}: {time.monotonic() - start:.1f} s", flush=True)
+        for name, number in self.numbers.items():
+            print(f"{name}: {number}")
+        return self.failures
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("program", type=Path)
+    parser.add_argument("pages", type=Path)
+    parser.add_argument("--pictures", type=Path)
+    arguments = parser.parse_args()
+    if not find():
+        print("no Chromium on this machine: the pages are not tried in a browser")
+        return 1 if os.environ.get("CI") else 0
+    if arguments.pictures:
+        arguments.pictures.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        make(arguments.program.resolve(), arguments.pages.resolve(), Path(folder))
+        with Browser() as browser:
+            failures = Tests(browser, Path(folder), arguments.pictures).run()
+    print(f"{len(failures)} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
