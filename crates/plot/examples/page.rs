@@ -1,4 +1,5 @@
 //! Writes interactive pages of a response and of the shapes of a frame into the folder given (default: the current one).
+//! Writes an interactive page of a frequency response into the folder given (default: the current one).
 #![allow(clippy::print_stdout)]
 
 use std::f64::consts::TAU;
@@ -6,6 +7,7 @@ use std::path::PathBuf;
 
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{Axis, DrawnMode, ShapeDrawing, page_of};
+use mechid_plot::Axis;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
