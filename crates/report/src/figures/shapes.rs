@@ -33,42 +33,6 @@ pub struct StabilisationPole {
     pub is_stable: bool,
 }
 
-/// Size of the drawing, px.
-const SIZE: (f64, f64) = (640.0, 340.0);
-
-/// Size of a small drawing, px.
-const SMALL: (f64, f64) = (120.0, 64.0);
-
-/// Turn about the vertical axis, and tilt towards the reader, of the first view, in radians.
-const VIEW: (f64, f64) = (-0.5, 0.42);
-
-/// Largest displacement drawn, over the size of the structure; the script uses the same.
-const DEFLECTION: f64 = 0.16;
-
-/// Scale of the drawing over the smaller side of the sheet; the script uses the same.
-const FILLED: f64 = 0.62;
-
-/// Number of points up to which their names are written.
-const NAMED: usize = 40;
-
-#[derive(Serialize)]
-struct ShapeData<'a> {
-    w: f64,
-    h: f64,
-    turn: f64,
-    tilt: f64,
-    points: Vec<[f64; 3]>,
-    names: Vec<&'a str>,
-    lines: &'a [[usize; 2]],
-    modes: Vec<ModeData>,
-}
-
-#[derive(Serialize)]
-struct ModeData {
-    n: String,
-    s: Vec<[f64; 6]>,
-}
-
 impl ModeShapes {
     /// Gathers identified modes whose entries have these names, such as `1+Z`, on a geometry; without one, on a
     /// row or a grid of points by their names. `None` without modes that oscillate, for fewer than two entries, and
