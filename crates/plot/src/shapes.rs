@@ -40,8 +40,9 @@ const VIEW: (f64, f64) = (-0.5, 0.42);
 /// Largest displacement drawn, over the size of the structure; the script uses the same.
 const DEFLECTION: f64 = 0.16;
 
-/// Scale of the drawing over the smaller side of the sheet; the script uses the same.
-const FILLED: f64 = 0.62;
+/// Parts of width and height of the sheet that the structure fills at most, and part of its length that its depth adds to
+/// its height; the script uses the same.
+const FILLED: (f64, f64, f64) = (0.7, 0.8, 0.45);
 
 /// Number of points up to which their names are written.
 const NAMED: usize = 40;
@@ -165,6 +166,7 @@ impl ShapeDrawing {
 struct View {
     middle: [f64; 3],
     size: f64,
+    unit: f64,
     sheet: (f64, f64),
 }
 
@@ -176,14 +178,19 @@ impl View {
         });
         let size = ends.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
         let middle = ends.map(|[low, high]| f64::midpoint(low, high));
-        Self { middle, size: if size > 0.0 { size } else { 1.0 }, sheet }
+        let size = if size > 0.0 { size } else { 1.0 };
+        let [x, y, tall] = ends.map(|[low, high]| (high - low) / size);
+        let flat = if x.hypot(y) > 0.0 { x.hypot(y) } else { 1.0 };
+        let (wide, high, deep) = FILLED;
+        let unit = (wide * sheet.0 / flat).min(high * sheet.1 / (tall + deep * flat));
+        Self { middle, size, unit, sheet }
     }
 
     fn project(&self, at: [f64; 3]) -> (f64, f64) {
         let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] - self.middle[axis]) / self.size);
         let (turn, tilt) = VIEW;
         let (w, h) = self.sheet;
-        let unit = FILLED * w.min(1.6 * h);
+        let unit = self.unit;
         let depth = turn.sin() * x + turn.cos() * y;
         (
             w / 2.0 + unit * (turn.cos() * x - turn.sin() * y),

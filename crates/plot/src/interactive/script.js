@@ -402,8 +402,9 @@ const shapes = svg => {
     const [{w, h, points, lines, names, modes, turn, tilt}, tools, out, figure] = begin(svg);
     const state = {mode: 0, amplitude: 1, phase: 0, running: false, turn, tilt}, ends = [0, 1, 2].map(d => points.map(p => p[d])).map(v => [min(...v), max(...v)]);
     const size = max(...ends.map(([a, b]) => b - a)) || 1;
+    const [a, b, tall] = ends.map(([a, b]) => (b - a) / size), flat = Math.hypot(a, b) || 1, unit = min(0.7 * w / flat, 0.8 * h / (tall + 0.45 * flat));
     const project = p => {
-        const [x, y, z] = p.map((v, d) => (v - (ends[d][0] + ends[d][1]) / 2) / size), c = cos(state.turn), s = sin(state.turn), unit = 0.62 * min(w, 1.6 * h);
+        const [x, y, z] = p.map((v, d) => (v - (ends[d][0] + ends[d][1]) / 2) / size), c = cos(state.turn), s = sin(state.turn);
         return [w / 2 + unit * (c * x - s * y), h / 2 - unit * (z * cos(state.tilt) + (s * x + c * y) * sin(state.tilt))];
     };
     clear(svg, w, h);
