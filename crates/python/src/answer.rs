@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::sync::Arc;
 
-use mechid::report::{ReportError, ToFigure};
+use mechid::report::{FigureStyle, ReportError, ToFigure};
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -19,6 +19,9 @@ pub trait Told: Send + Sync {
 
     /// Returns the picture that the program draws.
     fn svg(&self) -> Result<String, ReportError>;
+
+    /// Returns the picture as a page that answers, as HTML.
+    fn html(&self) -> Result<String, ReportError>;
 }
 
 impl<T: Serialize + Display + ToFigure + Send + Sync> Told for T {
@@ -33,11 +36,20 @@ impl<T: Serialize + Display + ToFigure + Send + Sync> Told for T {
     fn svg(&self) -> Result<String, ReportError> {
         Ok(self.figure()?.to_svg()?)
     }
+
+    fn html(&self) -> Result<String, ReportError> {
+        self.styled_page(FigureStyle::default())
+    }
 }
 
 /// Draws a result off the lock.
 pub fn svg(py: Python<'_>, told: Arc<impl Told + ?Sized + 'static>) -> PyResult<String> {
     work::watched(py, None, || Ok(()), move || told.svg())
+}
+
+/// Makes the page of a result off the lock.
+pub fn html(py: Python<'_>, told: Arc<impl Told + ?Sized + 'static>) -> PyResult<String> {
+    work::watched(py, None, || Ok(()), move || told.html())
 }
 
 /// A result that is told and drawn.
@@ -66,5 +78,10 @@ impl Answer {
     /// The picture of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         svg(py, Arc::clone(&self.0))
+    }
+
+    /// The picture as a page that answers, as HTML.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        html(py, Arc::clone(&self.0))
     }
 }

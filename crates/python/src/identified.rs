@@ -92,6 +92,11 @@ impl Identified {
         answer::svg(py, Arc::clone(&self.0))
     }
 
+    /// The picture as a page that answers, as HTML.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        answer::html(py, Arc::clone(&self.0))
+    }
+
     /// The page of the program's report, as HTML.
     fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
         let settings = PageSettings { title, reconstruct_force: force, ..PageSettings::default() };

@@ -9,6 +9,8 @@ use mechid::io::parse_sparse_system;
 use mechid::model::{SecondOrderSystem, StateTransition};
 use mechid::report::{ReportError, ToFigure as _};
 use mechid::selected_modes::SelectedModes;
+use mechid::modes::SelectedModes;
+use mechid::report::{FigureStyle, ReportError, ToFigure as _};
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -98,6 +100,13 @@ impl Machine {
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         let machine = self.0.clone();
         let draw = move || -> Result<String, ReportError> { Ok(machine.figure()?.to_svg()?) };
+        work::watched(py, None, || Ok(()), draw)
+    }
+
+    /// The picture as a page that answers, as HTML.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        let machine = self.0.clone();
+        let draw = move || machine.styled_page(FigureStyle::default());
         work::watched(py, None, || Ok(()), draw)
     }
 

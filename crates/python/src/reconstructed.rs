@@ -53,6 +53,11 @@ impl Reconstructed {
         answer::svg(py, Arc::clone(&self.0))
     }
 
+    /// The picture as a page that answers, as HTML.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        answer::html(py, Arc::clone(&self.0))
+    }
+
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         arrays::record(py, self.0.force().record().clone())

@@ -126,6 +126,11 @@ impl IdentifiedResponses {
         answer::svg(py, Arc::clone(&self.0))
     }
 
+    /// The picture as a page that answers, as HTML.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        answer::html(py, Arc::clone(&self.0))
+    }
+
     /// Confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
         work::brief(py, || {

@@ -232,6 +232,7 @@ class _Compiled(Protocol):
     def to_json(self) -> str: ...
     def text(self) -> str: ...
     def svg(self) -> str: ...
+    def html(self) -> str: ...
 
 
 class Drawn(Result):
@@ -256,12 +257,25 @@ class Drawn(Result):
         """
         return self._compiled.svg()
 
+    def to_html(self) -> str:
+        """Return the picture as an HTML page that zooms and has a cursor and loads nothing.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return self._compiled.html()
+
     def _repr_html_(self) -> str:
         text = f"<pre>{html.escape(str(self))}</pre>"
         try:
-            return f"<div>{self.to_svg()}{text}</div>"
+            page = html.escape(self.to_html())
         except MechidError:
             return text
+        # A document of its own, whose script reaches nothing of the notebook.
+        frame = f'<iframe sandbox="allow-scripts" srcdoc="{page}" width="100%" height="640" style="border:0"></iframe>'
+        return f"<div>{frame}{text}</div>"
 
     def __str__(self) -> str:
         return self._compiled.text()

@@ -184,6 +184,60 @@ def modes(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | Non
     return axes
 
 
+def shape(machine: Machine | Identified | IdentifiedResponses, mode: int = 1, *, ax: Axes | None = None) -> Axes:
+    """Plot real and imaginary part of a mode shape over the degrees of freedom.
+
+    Parameters
+    ----------
+    machine : Machine, Identified or IdentifiedResponses
+        A machine with modes.
+    mode : int
+        Number of the mode, counted from 1.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    IndexError
+        If there is no such mode.
+    """
+    if mode < 1:
+        raise IndexError(f"modes are counted from 1, not {mode}")
+    axes = _axes(ax)
+    values = np.asarray(machine.modes[mode - 1].shape)
+    places = np.arange(1, len(values) + 1)
+    axes.axhline(0.0, color="0.7", linewidth=0.8)
+    axes.plot(places, values.real, "o-", label="real part")
+    axes.plot(places, values.imag, "s--", label="imaginary part")
+    axes.set_xticks(places)
+    axes.set_xlabel("Degree of freedom")
+    axes.set_ylabel("Mode shape")
+    axes.legend()
+    return axes
+
+
+def assurance(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | None = None) -> Axes:
+    """Plot the modal assurance criterion of each pair of modes as squares with numbers."""
+    axes = _axes(ax)
+    shapes = np.array([mode.shape for mode in machine.modes])
+    power = np.sum(np.abs(shapes) ** 2, axis=1)
+    values = np.abs(shapes.conj() @ shapes.T) ** 2 / np.outer(power, power)
+    numbers = np.arange(1, len(shapes) + 1)
+    axes.imshow(values, vmin=0, vmax=1, cmap="Blues", extent=(0.5, len(shapes) + 0.5, len(shapes) + 0.5, 0.5))
+    for row, column in np.ndindex(values.shape):
+        value = values[row, column]
+        axes.text(column + 1, row + 1, f"{value:.2f}", ha="center", va="center", color="w" if value > 0.6 else "k")
+    axes.set_xticks(numbers)
+    axes.set_yticks(numbers)
+    axes.set_xlabel("Mode")
+    axes.set_ylabel("Mode")
+    return axes
+
+
 def _degrees(values: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> np.ndarray[
     tuple[int], np.dtype[np.float64]
 ]:
