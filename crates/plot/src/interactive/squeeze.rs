@@ -63,8 +63,9 @@ fn is_idle(blank: char, before: Option<char>, after: Option<char>) -> bool {
     match blank {
         '\n' => ";{,([".contains(before) || "}])".contains(after),
         _ => {
-            let joins = is_word(before) && is_word(after);
-            !joins && !("+-".contains(before) && "+-".contains(after))
+            let joins_words = is_word(before) && is_word(after);
+            let joins_signs = "+-".contains(before) && "+-".contains(after);
+            !(joins_words || joins_signs)
         }
     }
 }
