@@ -126,7 +126,6 @@ impl Outcome {
         let content = match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("png") => figure.to_png(PNG_SCALE)?,
             Some("html") => page(figure)?.into_bytes(),
-            Some("html") => figure.to_html()?.into_bytes(),
             _ => figure.to_svg()?.into_bytes(),
         };
         Ok(self.with_file(path, content))

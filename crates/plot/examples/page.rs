@@ -1,5 +1,4 @@
 //! Writes interactive pages of a response and of the shapes of a frame into the folder given (default: the current one).
-//! Writes an interactive page of a frequency response into the folder given (default: the current one).
 #![allow(clippy::print_stdout)]
 
 use std::f64::consts::TAU;
@@ -7,7 +6,6 @@ use std::path::PathBuf;
 
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{Axis, DrawnMode, ShapeDrawing, page_of};
-use mechid_plot::Axis;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
@@ -34,7 +32,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(&file, figure.to_html()?)?;
     println!("{}", file.display());
 
-    let corners = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.2], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+    let corners =
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.2], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
     let still = [[0.0; 2]; 3];
     let along_x = |re: f64, im: f64| [[re, im], [0.0; 2], [0.0; 2]];
     let mode = |name: &str, moved: [[[f64; 2]; 3]; 3]| DrawnMode {

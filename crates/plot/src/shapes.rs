@@ -124,10 +124,7 @@ impl ShapeDrawing {
             let sheet = self.sheet(mode, SMALL, false).decorative();
             (mode.short_name.clone(), sheet.finish(""))
         };
-        DrawnSet {
-            svg: with_metadata(&svg, &json),
-            map: self.modes.iter().map(small).collect(),
-        }
+        DrawnSet { svg: with_metadata(&svg, &json), map: self.modes.iter().map(small).collect() }
     }
 
     /// Draws the real part of a mode.
@@ -234,4 +231,3 @@ pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     }
     sheet.finish(label)
 }
-

@@ -69,7 +69,8 @@ fn a_response_carries_each_list_once_and_its_phase() {
     let figure = bode("", axes.0, axes.1, &[one("a")], &[one("b")]);
     let svg = figure.to_interactive_svg("", "").unwrap();
     let data = metadata(&svg);
-    let lists: Vec<&str> = data["a"].as_array().unwrap().iter().map(|list| list.as_str().unwrap()).collect();
+    let lists: Vec<&str> =
+        data["a"].as_array().unwrap().iter().map(|list| list.as_str().unwrap()).collect();
     assert_eq!(lists.len(), 4, "frequencies, magnitudes, phases, errors");
     assert_eq!(lists[0], "e 0.25 1024.0 4096");
     let panels = data["v"][0]["p"].as_array().unwrap();
@@ -105,7 +106,9 @@ fn what_cannot_be_drawn_is_an_empty_sheet() {
         modes: vec![DrawnMode { displacement: vec![[[value, 0.0]; 3]; 2], ..DrawnMode::default() }],
     };
     assert!(drawing(2, vec![[0, 1]], 1.0).draw("").svg.contains("metadata"));
-    for wrong in [drawing(2, vec![[0, 2]], 1.0), drawing(3, vec![], 1.0), drawing(2, vec![], f64::NAN)] {
+    for wrong in
+        [drawing(2, vec![[0, 2]], 1.0), drawing(3, vec![], 1.0), drawing(2, vec![], f64::NAN)]
+    {
         assert!(!wrong.draw("").svg.contains("metadata"));
     }
     assert!(!ShapeDrawing::default().draw("").svg.contains("metadata"));
@@ -116,7 +119,11 @@ fn what_cannot_be_drawn_is_an_empty_sheet() {
 fn a_matrix_has_a_square_and_a_number_for_each_entry() {
     let svg = matrix_of_squares(&[vec![1.0, 0.25], vec![0.25, 1.0]], "MAC");
     let document = Document::parse(&svg).unwrap();
-    let texts: Vec<&str> = document.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+    let texts: Vec<&str> = document
+        .descendants()
+        .filter(|n| n.has_tag_name("text"))
+        .filter_map(|n| n.text())
+        .collect();
     assert_eq!(texts.iter().filter(|text| **text == "0.25").count(), 2);
     assert_eq!(texts.iter().filter(|text| **text == "1.00").count(), 2);
     // The sheet and four squares.

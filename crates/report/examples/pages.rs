@@ -16,7 +16,8 @@ const RESPONSES: usize = 28;
 const FORCES: usize = 2;
 
 /// Natural frequencies, in Hz, and damping ratios of a beam.
-const MODES: [(f64, f64); 5] = [(8.0, 0.01), (31.0, 0.008), (70.0, 0.006), (124.0, 0.005), (194.0, 0.005)];
+const MODES: [(f64, f64); 5] =
+    [(8.0, 0.01), (31.0, 0.008), (70.0, 0.006), (124.0, 0.005), (194.0, 0.005)];
 
 /// Shape of a mode of a simply supported beam at a place from 0 to 1.
 fn shape(mode: usize, place: f64) -> f64 {
@@ -64,9 +65,17 @@ fn response(i: usize, j: usize) -> (String, Figure) {
     let figure = bode("", axes.0, axes.1, &[measured], &[fitted]);
     let coherence: Vec<f64> =
         (0..LINES).map(|k| 0.98 + 0.02 * ((k * 13 + i) as f64).sin()).collect();
-    let panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Coherence", "").range(0.0, 1.0));
+    let panel =
+        Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Coherence", "").range(0.0, 1.0));
     let name = format!("a{} / F{}", i + 1, j + 1);
-    (name, if i == 0 && j == 0 { figure.panel(panel.curve(Curve::line("", &hz, &coherence))) } else { figure })
+    (
+        name,
+        if i == 0 && j == 0 {
+            figure.panel(panel.curve(Curve::line("", &hz, &coherence)))
+        } else {
+            figure
+        },
+    )
 }
 
 /// A portal frame of five points with two bending modes and one that travels.
@@ -81,7 +90,11 @@ fn frame() -> Result<ModeShapes, Box<dyn std::error::Error>> {
     ];
     let mode = |(frequency_hz, damping_ratio, shape): &(f64, f64, [[f64; 2]; 4])| {
         let displacement = geometry.displacement(&names, shape)?;
-        Some(PointShape { frequency_hz: *frequency_hz, damping_ratio: *damping_ratio, displacement })
+        Some(PointShape {
+            frequency_hz: *frequency_hz,
+            damping_ratio: *damping_ratio,
+            displacement,
+        })
     };
     let modes = shapes.iter().map(mode).collect::<Option<_>>().ok_or("a channel has no point")?;
     Ok(ModeShapes { geometry: geometry.clone(), modes })
@@ -89,7 +102,10 @@ fn frame() -> Result<ModeShapes, Box<dyn std::error::Error>> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
-    fs::write(folder.join("response.html"), figure_page("One response", vec![response(0, 0)], None)?)?;
+    fs::write(
+        folder.join("response.html"),
+        figure_page("One response", vec![response(0, 0)], None)?,
+    )?;
     let all = (0..FORCES).flat_map(|j| (0..RESPONSES).map(move |i| response(i, j)));
     fs::write(folder.join("matrix.html"), figure_page("28 × 2 responses", all.collect(), None)?)?;
     let hz: Vec<f64> = (1..=600).map(|k| 0.1 * f64::from(k)).collect();

@@ -21,7 +21,6 @@ mod spectrum_csv;
 
 pub use error::ReportError;
 pub use figures::shapes::{ModeShapes, StabilisationPole, stabilisation};
-pub use figures::shapes::{ModeShapes, StabilisationPole, assurance_svg, stabilisation};
 pub use figures::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle, ToFigure};
 #[cfg(feature = "parquet")]
 pub use page::trends_page;

@@ -1,10 +1,10 @@
 //! Forces that are seen or act in the place of one another, and sensors with another gain.
 
-use mechid_checks::Gain;
 use mechid_analysis::{
     FrfSettings, FrfTable, Identify, Measurement, ResponseQuantity, Segmentation, frf, identify,
 };
 use mechid_checks::Finding;
+use mechid_checks::Gain;
 use mechid_model::SecondOrderSystem;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, chain};

@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use mechid_checks::{HighestMode, UnequalPeriods};
 use mechid_analysis::identify::{Band, Fit, LineChoice, Method, SampleFit};
 use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     identify,
 };
 use mechid_checks::{Finding, Subject};
+use mechid_checks::{HighestMode, UnequalPeriods};
 use mechid_model::{Discretisation, Response, Sdof};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};

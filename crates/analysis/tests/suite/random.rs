@@ -1,6 +1,5 @@
 //! Random tests: windows cut out of the closed-form steady state under a random force of a far longer period.
 
-use mechid_checks::Linearity;
 use mechid_analysis::frf::{Estimator, frf};
 use mechid_analysis::identify::{Fit, Method};
 use mechid_analysis::sweep::{self, Kind};
@@ -9,6 +8,7 @@ use mechid_analysis::{
     Predict, ResponseQuantity, Segmentation, SweepSettings, identify, identify_responses, predict,
     sweep_record,
 };
+use mechid_checks::Linearity;
 use mechid_checks::{Finding, Power, Subject};
 use mechid_estimate::Estimate;
 use mechid_io::FrequencyResponses;

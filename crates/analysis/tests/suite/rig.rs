@@ -1,11 +1,11 @@
 //! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
 
-use mechid_checks::Misfit;
 use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     Window, frf, frf_of_records, identify,
 };
+use mechid_checks::Misfit;
 use mechid_checks::{Concentration, Finding};
 use mechid_model::{Response, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;

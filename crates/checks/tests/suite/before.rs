@@ -282,7 +282,9 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     // One claimed period that holds one and a half; a fifth of the period is no whole number.
     let force = wide().unwrap().sample(sampling).unwrap().repeated(2).unwrap();
     let found = claimed_period(&force.window(0, 1536).unwrap(), 1536).unwrap();
-    let Finding::WrongPeriod(WrongPeriod { claimed: 1536, fault }) = found else { panic!("{found:?}") };
+    let Finding::WrongPeriod(WrongPeriod { claimed: 1536, fault }) = found else {
+        panic!("{found:?}")
+    };
     let PeriodFault::Other { period: 1024, samples: 1536, .. } = fault else {
         panic!("{fault:?}");
     };
@@ -323,8 +325,10 @@ fn a_gap_in_the_record_is_no_other_period() {
             let broken = Record::from_channel(sampling, broken[..7 * 256].to_vec()).unwrap();
             let found = claimed_period(&broken, 256).unwrap();
             assert_eq!((found.verdict(), found.value()), (Verdict::Bad, 256.0), "{found}");
-            let Finding::WrongPeriod(WrongPeriod { fault: PeriodFault::Interruption { sample, .. }, .. }) =
-                found
+            let Finding::WrongPeriod(WrongPeriod {
+                fault: PeriodFault::Interruption { sample, .. },
+                ..
+            }) = found
             else {
                 panic!("{found:?}");
             };

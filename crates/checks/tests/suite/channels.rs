@@ -104,7 +104,8 @@ fn instruments_rid_a_parameter_of_its_bias() {
         let finding = noise_on_response(&response, &force, &found).unwrap()?;
         assert_eq!(finding.subject(), Subject::Bias);
         assert_eq!(finding.verdict(), Verdict::Doubtful);
-        let Finding::Bias(Bias { parameter, estimate, unbiased: instrumental, .. }) = finding else {
+        let Finding::Bias(Bias { parameter, estimate, unbiased: instrumental, .. }) = finding
+        else {
             panic!("{finding:?}");
         };
         let truth = system.matrix(parameter.matrix())[(0, 0)];

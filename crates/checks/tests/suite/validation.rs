@@ -1,7 +1,7 @@
 //! Checks of spectral fits and of residuals, and predictions of records that were not fitted.
 
-use mechid_checks::CrossCorrelation;
 use mechid_checks as checks;
+use mechid_checks::CrossCorrelation;
 use mechid_checks::{
     Finding, Subject, Verdict, after_fit, before_equation_of_motion, before_spectral_fit,
     fitted_band, steady_periods,
@@ -159,7 +159,10 @@ fn residuals_are_judged_channel_by_channel() {
         (0..6).filter(|at| checks[*at].verdict() == Verdict::Doubtful).collect();
     assert_eq!(doubtful, [2, 3], "{checks:?}");
     assert!(
-        matches!(checks[2], Finding::CrossCorrelation(CrossCorrelation { residual: 0, force: 1, .. })),
+        matches!(
+            checks[2],
+            Finding::CrossCorrelation(CrossCorrelation { residual: 0, force: 1, .. })
+        ),
         "{checks:?}"
     );
 

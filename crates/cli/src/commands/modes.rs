@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mechid::analysis::identify::Band;
-use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
 use mechid::analysis::modal::ShapedMode;
+use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary};
 use mechid::integrate::ModeSearch;
 use mechid::io::{input_name, read_sparse_system};

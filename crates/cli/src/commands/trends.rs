@@ -68,6 +68,5 @@ impl TrendsArgs {
             outcome = outcome.with_file(file, trends.csv());
         }
         outcome.with_result_plot(&self.plot, &trends, FigureStyle::default())
-        outcome.with_plot(&self.plot, || Ok(trends.figure()?))
     }
 }

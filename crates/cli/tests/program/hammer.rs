@@ -26,9 +26,7 @@ fn channels_keep_their_names_and_the_picture_has_the_coherence() {
     let folder = place.path();
     let found = mechid(folder, &format!("identify {ROVING} --plot fit.svg --json"));
     let picture = fs::read_to_string(folder.join("fit.svg")).unwrap();
-    for words in
-        ["a1 / force at a1", "a1 / force at a2", "a2 / force at a2", "Coherence"]
-    {
+    for words in ["a1 / force at a1", "a1 / force at a2", "a2 / force at a2", "Coherence"] {
         assert!(picture.contains(&format!(">{words}<")), "no {words}");
     }
     fs::write(folder.join("found.json"), found).unwrap();

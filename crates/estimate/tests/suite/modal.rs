@@ -250,7 +250,9 @@ fn warnings(damping: f64, noise: f64, runs: u64) -> (usize, usize) {
     let found: Vec<Finding> = found.into_iter().flatten().collect();
     let warned = found.iter().filter(|finding| finding.verdict() > Verdict::Good);
     for finding in found.iter() {
-        let Finding::Instability(Instability { growth_rate, standard_error, .. }) = finding else { panic!() };
+        let Finding::Instability(Instability { growth_rate, standard_error, .. }) = finding else {
+            panic!()
+        };
         assert!((growth_rate + damping / 20.0).abs() < 5.0 * standard_error, "{finding}");
     }
     (found.len(), warned.count())

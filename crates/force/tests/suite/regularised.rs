@@ -186,8 +186,10 @@ fn the_standard_error_is_what_is_seen() {
             let drive = noise::white(sampling(len), 1, 30.0, 1000 + seed).unwrap();
             let truth = force(len, 2, &[1], |k, _| drive.channel(0)[k]);
             let exact = exact_harmonic_periodic(&system, &truth).unwrap();
-            let exact =
-                Measurement::from_record(ResponseQuantity::Displacement, exact.displacement().clone());
+            let exact = Measurement::from_record(
+                ResponseQuantity::Displacement,
+                exact.displacement().clone(),
+            );
             let noisy =
                 noise::add_white(exact.record(), NoiseLevel::FractionOfRms(0.02), seed).unwrap();
             let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
@@ -236,7 +238,8 @@ fn velocities_leave_the_mean_force_at_zero() {
     let system = random_stable(2, 5);
     let truth = force(63, 2, &[1], |k, i| 3.0 + wobble(k, i));
     let response = exact_harmonic_periodic(&system, &truth).unwrap();
-    let measured = Measurement::from_record(ResponseQuantity::Velocity, response.velocity().clone());
+    let measured =
+        Measurement::from_record(ResponseQuantity::Velocity, response.velocity().clone());
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::TruncatedSvd(Rule::Gcv)] {
         let noise = Noise::Unknown;
         let found =

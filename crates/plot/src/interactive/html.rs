@@ -43,7 +43,6 @@ pub(super) fn page(title: &str, figures: &str) -> String {
          <meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{heading}</title>\
          <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}{figures}</main>\
-         <style>{FIGURE_STYLE}</style></head>\n<body><main>{above}<figure class=\"wide\">{svg}</figure></main>\
          <script>{}</script></body></html>\n",
         content_policy(),
         script()

@@ -97,8 +97,10 @@ impl DrawnSet {
 
 /// Returns an HTML page of drawings below one another, which zooms, has a cursor and loads nothing.
 pub fn page_of(title: &str, drawings: &[DrawnSet]) -> String {
-    let figures: String =
-        drawings.iter().map(|drawn| format!("<figure class=\"wide\">{}</figure>", drawn.html())).collect();
+    let figures: String = drawings
+        .iter()
+        .map(|drawn| format!("<figure class=\"wide\">{}</figure>", drawn.html()))
+        .collect();
     html::page(title, &figures)
 }
 

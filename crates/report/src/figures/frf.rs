@@ -24,19 +24,6 @@ pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
         .responses
         .iter()
         .map(|response| trace(report, response, name(response), style))
-        .map(|r| {
-            let name = match alone {
-                true => String::new(),
-                false => report.pair(r),
-            };
-            let values = r.real.iter().zip(&r.imaginary).map(|(re, im)| Complex::new(*re, *im));
-            let omega = report.frequency_hz.iter().map(|hz| hz * TAU);
-            let points: Vec<(f64, Complex<f64>)> = omega.zip(values).collect();
-            let errors = points.iter().zip(&r.standard_error);
-            let errors = errors.filter(|((omega, h), _)| Trace::is_drawn(style, *omega, *h));
-            let errors = errors.map(|(_, error)| *error).collect();
-            Trace::line(style, name, points.into_iter()).standard_error(style, errors)
-        })
         .collect();
     let mut panel = coherence_panel(style);
     for coherence in &report.coherence {

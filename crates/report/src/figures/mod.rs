@@ -106,12 +106,6 @@ pub(crate) fn motion_name(
     match drawn {
         Some(drawn) if drawn != measured => {
             format!("{} at {name}", motion_letter(drawn))
-            let motion = match drawn {
-                ResponseQuantity::Displacement => "x",
-                ResponseQuantity::Velocity => "v",
-                ResponseQuantity::Acceleration => "a",
-            };
-            format!("{motion} at {name}")
         }
         _ => name,
     }

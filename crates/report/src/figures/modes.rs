@@ -14,7 +14,8 @@ pub fn figure(modes: &Modes) -> Figure {
     let every = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(step).collect() };
     let frequency = every(&spectrum.frequency_hz);
     let summary = modes.summary();
-    let natural: Vec<f64> = summary.modes.iter().map(|m| m.mode.row.natural_frequency_hz.value).collect();
+    let natural: Vec<f64> =
+        summary.modes.iter().map(|m| m.mode.row.natural_frequency_hz.value).collect();
     let curve = |name: &str, values: &[f64]| Curve::line(name, &frequency, &every(values));
     let mut panel =
         Panel::new(Axis::linear("Frequency", "Hz"), Axis::log10("Responses over their RMS", ""))

@@ -5,11 +5,6 @@ use mechid_analysis::text::{compact, significant};
 use mechid_io::{Geometry, PointShape};
 use mechid_plot::{Axis, Color, Curve, DrawnMode, DrawnSet, Figure, Panel, ShapeDrawing};
 use nalgebra::Complex;
-use mechid_plot::{
-    Anchor, Axis, Canvas, Color, Curve, DrawnSet, Figure, Panel, Stroke, TextStyle, with_metadata,
-};
-use nalgebra::{Complex, DMatrix};
-use serde::Serialize;
 
 /// Modes with their shapes at the points of a structure.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,75 +72,6 @@ impl ModeShapes {
             modes: (1..).zip(&self.modes).map(mode).collect(),
         };
         drawing.draw(label)
-    /// Returns the largest modulus of a displacement of a mode, or 1 if nothing moves.
-    fn largest(mode: &PointShape) -> f64 {
-        let sizes = mode.displacement.iter().flatten().map(|[re, im]| re.hypot(*im));
-        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
-        if largest > 0.0 { largest } else { 1.0 }
-    }
-
-    fn name(number: usize, mode: &PointShape) -> String {
-        format!(
-            "mode {number}: {} Hz, damping ratio {} %",
-            compact(mode.frequency_hz, 5),
-            significant(100.0 * mode.damping_ratio, 3)
-        )
-    }
-
-    /// Draws the first mode at its largest deflection over the undeformed lines, and every mode small; with the
-    /// numbers for the script, which animates them: complex modes travel.
-        let data = ShapeData {
-            w: SIZE.0,
-            h: SIZE.1,
-            turn: VIEW.0,
-            tilt: VIEW.1,
-            points: self.geometry.points.iter().map(|point| point.position).collect(),
-            names: self.geometry.points.iter().map(|point| point.name.as_str()).collect(),
-            lines: &self.geometry.lines,
-            modes: (1..).zip(&self.modes).map(|(number, mode)| mode_data(number, mode)).collect(),
-        // Numbers and texts have no way to fail.
-        let json = serde_json::to_string(&data).unwrap_or_default();
-        let svg = match self.modes.first() {
-            Some(mode) => self.sheet(mode, SIZE, true).finish(label),
-            None => Canvas::new(SIZE.0, SIZE.1).finish(label),
-        let svg = svg.replacen("<svg ", "<svg class=\"shape\" ", 1);
-        let small = |(number, mode): (usize, &PointShape)| {
-            let words = format!("{number}: {} Hz", compact(mode.frequency_hz, 4));
-            (words, self.sheet(mode, SMALL, false).finish(&Self::name(number, mode)))
-        DrawnSet {
-            svg: with_metadata(&svg, &json),
-            map: (1..).zip(&self.modes).map(small).collect(),
-        }
-    }
-
-    /// Draws a mode at the phase of its largest entry.
-    fn sheet(&self, mode: &PointShape, size: (f64, f64), has_words: bool) -> Canvas {
-        let mut sheet = Canvas::new(size.0, size.1);
-        let view = View::new(&self.geometry, size);
-        let factor = DEFLECTION * view.size / Self::largest(mode);
-        let still: Vec<[f64; 3]> = self.geometry.points.iter().map(|p| p.position).collect();
-        let moved: Vec<[f64; 3]> = still
-            .iter()
-            .zip(&mode.displacement)
-            .map(|(at, by)| [0, 1, 2].map(|axis| at[axis] + factor * by[axis][0]))
-            .collect();
-        let mut lines = |positions: &[[f64; 3]], stroke: Stroke| {
-            let ends = |pair: &[usize; 2]| {
-                let [a, b] = pair.map(|k| positions.get(k).map(|at| view.project(*at)));
-                Some((a?, b?))
-            };
-            sheet.segments(self.geometry.lines.iter().filter_map(ends), stroke);
-        lines(&still, Stroke::solid(Color::GREY, if has_words { 1.0 } else { 0.6 }));
-        lines(&moved, Stroke::solid(Color::BLUE, if has_words { 2.0 } else { 1.2 }));
-        let spots: Vec<(f64, f64)> = moved.iter().map(|at| view.project(*at)).collect();
-        sheet.discs(&spots, if has_words { 3.0 } else { 1.6 }, Color::VERMILION);
-        if has_words && spots.len() <= NAMED {
-            let style = TextStyle::new(11.5).anchored(Anchor::Start);
-            for ((x, y), point) in spots.iter().zip(&self.geometry.points) {
-                sheet.text((x + 7.0, y - 6.0), &point.name, &style);
-            }
-        }
-        sheet
     }
 
     /// Returns the modal assurance criterion of each pair of modes: 1 for the same shape, 0 for orthogonal ones.
@@ -153,7 +79,6 @@ impl ModeShapes {
     /// # Source
     /// R. J. Allemang and D. L. Brown, "A correlation coefficient for modal vector analysis", IMAC 1 (1982).
     pub fn assurance(&self) -> Vec<Vec<f64>> {
-    pub fn assurance(&self) -> DMatrix<f64> {
         let entries = |mode: &PointShape| -> Vec<Complex<f64>> {
             mode.displacement.iter().flatten().map(|[re, im]| Complex::new(*re, *im)).collect()
         };
@@ -169,76 +94,6 @@ impl ModeShapes {
     }
 }
 
-        DMatrix::from_fn(shapes.len(), shapes.len(), |i, j| {
-            let power = product(&shapes[i], &shapes[i]).re * product(&shapes[j], &shapes[j]).re;
-            let common = product(&shapes[i], &shapes[j]).norm_sqr();
-            if power > 0.0 { (common / power).min(1.0) } else { 0.0 }
-        })
-fn mode_data(number: usize, mode: &PointShape) -> ModeData {
-    let largest = ModeShapes::largest(mode);
-    // Four digits of the largest: less than a dot of the screen.
-    let short = |value: f64| (1e4 * value / largest).round() / 1e4 + 0.0;
-    let point = |by: &[[f64; 2]; 3]| {
-        let [[a, b], [c, d], [e, f]] = by.map(|entry| entry.map(short));
-        [a, b, c, d, e, f]
-    };
-    let s = mode.displacement.iter().map(point).collect();
-    ModeData { n: ModeShapes::name(number, mode), s }
-/// Parallel projection of a structure onto a sheet.
-struct View {
-    middle: [f64; 3],
-    size: f64,
-    sheet: (f64, f64),
-impl View {
-    fn new(geometry: &Geometry, sheet: (f64, f64)) -> Self {
-        let ends = [0, 1, 2].map(|axis| {
-            let values = geometry.points.iter().map(|point| point.position[axis]);
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
-        });
-        let size = ends.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
-        let middle = ends.map(|[low, high]| f64::midpoint(low, high));
-        Self { middle, size: if size > 0.0 { size } else { 1.0 }, sheet }
-    fn project(&self, at: [f64; 3]) -> (f64, f64) {
-        let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] - self.middle[axis]) / self.size);
-        let (turn, tilt) = VIEW;
-        let (w, h) = self.sheet;
-        let unit = FILLED * w.min(1.6 * h);
-        let depth = turn.sin() * x + turn.cos() * y;
-        (
-            w / 2.0 + unit * (turn.cos() * x - turn.sin() * y),
-            h / 2.0 - unit * (z * tilt.cos() + depth * tilt.sin()),
-        )
-/// Number of modes above which a matrix has no numbers in its squares: they would not fit.
-const NUMBERED: usize = 20;
-/// Draws a matrix of numbers from 0 to 1 as squares, darker for more, with the numbers in them.
-pub fn assurance_svg(values: &DMatrix<f64>, label: &str) -> String {
-    const EDGE: f64 = 34.0;
-    let side = (440.0 / values.ncols().max(1) as f64).clamp(14.0, 46.0);
-    let at = |k: usize| EDGE + side * k as f64;
-    let (width, height) = (at(values.ncols()) + 8.0, at(values.nrows()) + 8.0);
-    let mut sheet = Canvas::new(width.max(160.0), height);
-    let words = TextStyle::new(11.5);
-    let every = (18.0 / side).ceil().max(1.0) as usize;
-    for column in (0..values.ncols()).step_by(every) {
-        let middle = at(column) + side / 2.0;
-        sheet.text((middle, EDGE - 7.0), &(column + 1).to_string(), &words);
-        sheet.text((EDGE - 14.0, middle + 4.0), &(column + 1).to_string(), &words);
-    for row in 0..values.nrows() {
-        for column in 0..values.ncols() {
-            let value = values[(row, column)];
-            // Light enough for dark digits.
-            sheet.open_faded(0.06 + 0.4 * value);
-            let corner = (at(column) + 1.0, at(row) + 1.0);
-            sheet.rect(corner, (side - 2.0, side - 2.0), Some(Color::BLUE), None);
-            sheet.close_group();
-            if values.ncols() <= NUMBERED {
-                let style = TextStyle::new(if side > 30.0 { 11.5 } else { 9.0 });
-                let (x, y) = (at(column) + side / 2.0, at(row) + side / 2.0 + 4.0);
-                let digits = if side > 30.0 { 2 } else { 1 };
-                sheet.text((x, y), &format!("{value:.digits$}"), &style);
-            }
-        }
-    sheet.finish(label)
 /// Draws the poles of models of rising order over the sum of the responses, which is scaled to the height of the
 /// diagram: its logarithm from the smallest to the largest value. `sum` has frequencies, in Hz, and magnitudes.
 pub fn stabilisation(title: &str, poles: &[StabilisationPole], sum: (&[f64], &[f64])) -> Figure {
@@ -317,8 +172,6 @@ mod tests {
             }
         }
         let svg = matrix_of_squares(&values, "MAC");
-                assert!((values[(i, j)] - value).abs() < 1e-15, "{i} {j}");
-        let svg = assurance_svg(&values, "MAC");
         assert_eq!(svg.matches("0.50<").count(), 6);
     }
 

@@ -1,10 +1,8 @@
 //! Look of frequency responses.
 
+use mechid_model::ResponseQuantity;
 use mechid_plot::Axis;
 use mechid_plot::charts::Quantity;
-use mechid_model::ResponseQuantity;
-use mechid_plot::charts::{Quantity, bode};
-use mechid_plot::{Axis, Figure};
 use nalgebra::Complex;
 
 use super::trace::Trace;

@@ -19,7 +19,6 @@ use crate::FigureStyle;
 use crate::ReportError;
 use crate::figures::receptance::{self as picture, Names};
 use crate::figures::shapes::ModeShapes;
-use crate::figures::shapes::{ModeShapes, assurance_svg};
 use crate::figures::{displacement_name, restoring as surface};
 
 /// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
@@ -377,15 +376,6 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
         (0..dofs).map(|dof| report.channels.response_name(kind, dof)).collect();
     let shapes = ModeShapes::from_modes(&report.modes, &names, contents.geometry)?;
     Some(shape_figures(&shapes))
-    let caption = "Mode shapes: lines of the largest deflection over those at rest; of a complex mode the points do not \
-                   reach theirs together.";
-    let drawn = shapes.draw(caption);
-    let likeness = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, 0 for orthogonal ones.";
-    let matrix = assurance_svg(&shapes.assurance(), likeness);
-    Some([
-        Drawn { id: "shapes".into(), svg: drawn.svg, map: drawn.map, caption: caption.into() },
-        Drawn { id: "assurance".into(), svg: matrix, map: Vec::new(), caption: likeness.into() },
-    ])
 }
 
 /// The restoring force of a machine with nonlinear terms, of the first record.
