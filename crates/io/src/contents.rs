@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::IoError;
-use crate::limits::Limit;
+use crate::limits::{Limit, Limits};
 
 /// Position in a file, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +14,8 @@ pub enum Place {
     Sample(usize),
     /// A byte, in a binary file.
     Byte(usize),
+    /// A column.
+    Column(usize),
 }
 
 impl fmt::Display for Place {
@@ -22,6 +24,7 @@ impl fmt::Display for Place {
             Place::Line(n) => write!(f, "line {n}"),
             Place::Sample(n) => write!(f, "sample {n}"),
             Place::Byte(n) => write!(f, "byte {n}"),
+            Place::Column(n) => write!(f, "column {n}"),
         }
     }
 }
@@ -45,6 +48,18 @@ pub(crate) struct Contents {
 }
 
 impl Contents {
+    /// Refuses names and units that are longer than the limit.
+    pub fn check_names(&self, file: &str, limits: &Limits) -> Result<(), IoError> {
+        let most = limits.name_bytes;
+        let is_long = |column: &Column| column.name.len().max(column.about.len()) > most;
+        let place = match self.columns.iter().position(is_long) {
+            Some(column) => Place::Column(column + 1),
+            None if self.scalars.iter().any(|(name, _)| name.len() > most) => Place::Byte(1),
+            None => return Ok(()),
+        };
+        Err(IoError::TooLarge { file: file.into(), at: place, limit: Limit::NameBytes(most) })
+    }
+
     /// Sets `samples` to the most frequent length of a column, the longest of equally frequent ones.
     pub fn with_usual_length(mut self) -> Self {
         let lengths: Vec<usize> =

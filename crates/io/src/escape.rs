@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt::{self, Write as _};
+use std::path::Path;
 
 /// A text in which characters that a terminal obeys instead of showing them are written as Rust
 /// writes them, such as `\u{1b}` or `\n`: control characters, those that turn the direction of
@@ -23,6 +24,30 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
         push(&mut shown, c);
+    }
+    Cow::Owned(shown)
+}
+
+/// Returns the name of a file as text. Bytes that are no UTF-8 are written as Rust writes them, such as
+/// `\xff`, so that two names never look alike.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use mechid_io::path_text;
+///
+/// assert_eq!(path_text(Path::new("day 1/µ.csv")), "day 1/µ.csv");
+/// ```
+pub fn path_text(path: &Path) -> Cow<'_, str> {
+    if let Some(text) = path.to_str() {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::new();
+    for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+        shown.push_str(chunk.valid());
+        for byte in chunk.invalid() {
+            let _ = write!(shown, "\\x{byte:02x}");
+        }
     }
     Cow::Owned(shown)
 }

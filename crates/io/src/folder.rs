@@ -29,6 +29,27 @@ impl FileStamp {
     }
 }
 
+/// Returns what a path is if it can be no record: `a named pipe`, `a socket`, `a device`. Opening one waits for
+/// whoever writes into it, for ever if nobody does.
+pub fn special_kind(path: impl AsRef<Path>) -> Option<&'static str> {
+    let kind = fs::metadata(path).ok()?.file_type();
+    if kind.is_file() || kind.is_dir() {
+        return None;
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+
+        if kind.is_fifo() {
+            return Some("a named pipe");
+        }
+        if kind.is_socket() {
+            return Some("a socket");
+        }
+    }
+    Some("a device")
+}
+
 /// Creates a folder, with those above it, unless it exists.
 ///
 /// # Errors

@@ -44,7 +44,7 @@ pub use contents::{DecimalSign, Place};
 pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
-pub use escape::escaped;
+pub use escape::{escaped, path_text};
 pub use experiment::{
     Experiment, ExperimentStudy, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion,
     Level, LoadBeyond, MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice,
@@ -52,6 +52,7 @@ pub use experiment::{
 };
 pub use folder::{FileStamp, create_folder, files_of};
 pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
+pub use folder::{FileStamp, create_folder, files_of, special_kind};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
@@ -62,7 +63,7 @@ pub use output::{
 #[cfg(feature = "parquet")]
 pub use parquet::{
     ParquetCell, ParquetColumn, ParquetFile, ParquetRecordWriter, ParquetValues, RecordRows,
-    parquet_bytes, read_parquet_metadata, read_parquet_rows, write_parquet,
+    parquet_bytes, parse_parquet_rows, read_parquet_metadata, read_parquet_rows, write_parquet,
 };
 pub use responses::{
     ADDED_DECAY, AveragedSegments, CoherenceFunction, DERIVATIVE, FrequencyResponses,

@@ -2,6 +2,12 @@
 
 use std::fmt;
 
+/// Bytes that a number takes while a file is read: itself, and a copy while its column grows.
+pub(crate) const NUMBER_BYTES: usize = 16;
+
+/// Number of bytes that every text in gzip may have, however small its file.
+const TEXT_BYTES: usize = 64 << 20;
+
 /// Options for reading a record file.
 ///
 /// ```
@@ -39,22 +45,82 @@ pub struct Limits {
     /// Numbers held in memory at a time, of all columns together; 2²⁸ (2 GiB) by default. A long
     /// text that is read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
     pub numbers: usize,
+    /// Bytes of a text in gzip for each byte of the file, beyond the first 64 MiB; 100 by default. Printed
+    /// numbers of a measured record take a quarter of their text.
+    pub text_per_byte: usize,
+    /// Bytes of a name: of a column, a unit, a record; 4 KiB by default.
+    pub name_bytes: usize,
+    /// Memory that a file of any size may take, in bytes; 256 MiB by default.
+    pub memory_bytes: usize,
+    /// Further memory for each byte of the file, in bytes; 512 by default. A number of a measured record
+    /// takes a byte of its file or more; where it takes less, the file promises numbers that nobody
+    /// measured.
+    pub memory_per_byte: usize,
+    /// Memory that the largest file may take, in bytes; 8 GiB by default.
+    pub most_memory_bytes: usize,
 }
 
 impl Limits {
     /// The default limits.
-    pub const DEFAULT: Self =
-        Self { row_bytes: 4 << 20, columns: 1 << 16, unpacked_bytes: 1 << 30, numbers: 1 << 28 };
+    pub const DEFAULT: Self = Self {
+        row_bytes: 4 << 20,
+        columns: 1 << 16,
+        unpacked_bytes: 1 << 30,
+        numbers: 1 << 28,
+        text_per_byte: 100,
+        name_bytes: 4 << 10,
+        memory_bytes: 256 << 20,
+        memory_per_byte: 512,
+        most_memory_bytes: 8 << 30,
+    };
 
     /// Returns these limits, each `factor` times as large.
     #[must_use]
     pub fn times(self, factor: usize) -> Self {
+        let times = |limit: usize| limit.saturating_mul(factor);
         Self {
-            row_bytes: self.row_bytes.saturating_mul(factor),
-            columns: self.columns.saturating_mul(factor),
-            unpacked_bytes: self.unpacked_bytes.saturating_mul(factor),
-            numbers: self.numbers.saturating_mul(factor),
+            row_bytes: times(self.row_bytes),
+            columns: times(self.columns),
+            unpacked_bytes: times(self.unpacked_bytes),
+            numbers: times(self.numbers),
+            text_per_byte: times(self.text_per_byte),
+            name_bytes: times(self.name_bytes),
+            memory_bytes: times(self.memory_bytes),
+            memory_per_byte: self.memory_per_byte,
+            most_memory_bytes: times(self.most_memory_bytes),
         }
+    }
+
+    /// Returns these limits with so many bytes of memory for a file of any size, and room for the
+    /// numbers and the unpacked bytes that fit.
+    #[must_use]
+    pub fn with_memory(self, bytes: usize) -> Self {
+        Self {
+            unpacked_bytes: self.unpacked_bytes.max(bytes),
+            numbers: self.numbers.max(bytes / NUMBER_BYTES),
+            memory_bytes: bytes,
+            most_memory_bytes: bytes,
+            ..self
+        }
+    }
+
+    /// Returns the number of bytes that a text in gzip of `file_bytes` bytes may have.
+    pub(crate) fn text_bytes(&self, file_bytes: usize) -> usize {
+        TEXT_BYTES.saturating_add(self.text_per_byte.saturating_mul(file_bytes))
+    }
+
+    /// Returns the memory, in bytes, that a file of `file_bytes` bytes may take.
+    ///
+    /// ```
+    /// use mechid_io::Limits;
+    ///
+    /// assert_eq!(Limits::DEFAULT.memory(0), 256 << 20);
+    /// assert_eq!(Limits::DEFAULT.memory(1 << 20), (256 << 20) + (512 << 20));
+    /// assert_eq!(Limits::DEFAULT.memory(1 << 40), 8 << 30);
+    /// ```
+    pub fn memory(&self, file_bytes: usize) -> usize {
+        let of_file = self.memory_per_byte.saturating_mul(file_bytes);
+        self.memory_bytes.saturating_add(of_file).min(self.most_memory_bytes)
     }
 }
 
@@ -76,6 +142,17 @@ pub enum Limit {
     UnpackedBytes(usize),
     /// [`Limits::numbers`].
     Numbers(usize),
+    /// [`Limits::name_bytes`].
+    NameBytes(usize),
+    /// [`Limits::memory`] of the file, in bytes.
+    Memory(usize),
+}
+
+impl Limit {
+    /// Returns whether [`Limits::with_memory`] raises this limit.
+    pub fn is_memory(self) -> bool {
+        matches!(self, Self::Memory(_) | Self::Numbers(_) | Self::UnpackedBytes(_))
+    }
 }
 
 impl fmt::Display for Limit {
@@ -91,6 +168,15 @@ impl fmt::Display for Limit {
             Self::Numbers(limit) => {
                 write!(f, "there are more than {limit} numbers to hold in memory")
             }
+            Self::NameBytes(limit) => write!(f, "the name is longer than {limit} bytes"),
+            Self::Memory(limit) => {
+                let mebibytes = limit >> 20;
+                write!(
+                    f,
+                    "reading it takes more than {mebibytes} MiB of memory, which is the limit for a file \
+                     of this size"
+                )
+            }
         }
     }
 }
@@ -101,15 +187,29 @@ pub(crate) struct Budget {
     limits: Limits,
     columns: usize,
     numbers: usize,
+    /// Memory of the whole file, in bytes.
+    memory: usize,
+    /// The part of it that is not taken yet.
+    memory_left: usize,
 }
 
 impl Budget {
-    pub fn new(limits: &Limits) -> Self {
-        Self { limits: *limits, columns: limits.columns, numbers: limits.numbers }
+    /// The limits for a file of so many bytes.
+    pub fn new(limits: &Limits, file_bytes: usize) -> Self {
+        let memory = limits.memory(file_bytes);
+        let (columns, numbers) = (limits.columns, limits.numbers);
+        Self { limits: *limits, columns, numbers, memory, memory_left: memory }
     }
 
-    pub fn unpacked_bytes(&self) -> usize {
-        self.limits.unpacked_bytes
+    /// Returns how many bytes may be unpacked at once, and the limit on them. A buffer of them takes twice
+    /// as much while it grows.
+    pub fn unpacked_bytes(&self) -> (usize, Limit) {
+        let (unpacked, memory) = (self.limits.unpacked_bytes, self.memory_left / 2);
+        if unpacked <= memory {
+            (unpacked, Limit::UnpackedBytes(unpacked))
+        } else {
+            (memory, Limit::Memory(self.memory))
+        }
     }
 
     /// Takes room for a column.
@@ -122,6 +222,17 @@ impl Budget {
     pub fn take_numbers(&mut self, count: usize) -> Result<(), Limit> {
         self.numbers =
             self.numbers.checked_sub(count).ok_or(Limit::Numbers(self.limits.numbers))?;
+        self.take_bytes(count.saturating_mul(NUMBER_BYTES))
+    }
+
+    /// Takes room for bytes.
+    pub fn take_bytes(&mut self, count: usize) -> Result<(), Limit> {
+        self.memory_left = self.memory_left.checked_sub(count).ok_or(Limit::Memory(self.memory))?;
         Ok(())
+    }
+
+    /// Gives room back that [`Budget::take_bytes`] took.
+    pub fn give_bytes(&mut self, count: usize) {
+        self.memory_left += count;
     }
 }

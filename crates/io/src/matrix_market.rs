@@ -12,7 +12,7 @@ use mechid_signal::message;
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::contents::Place;
-use crate::table::source::Source;
+use crate::table::source::{Source, failed};
 use crate::{IoError, Limit, Limits};
 
 /// Numbers that [`Limits::numbers`] allows for each row of a matrix, which a row without entries needs
@@ -68,7 +68,8 @@ pub fn parse_matrix_market(
     matrix(Source::new(file.into(), bytes)?, limits)
 }
 
-fn matrix(mut source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError> {
+fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError> {
+    let mut source = source.bounded(limits);
     let mut lines = Lines { file: source.file.clone(), at: 0, text: Vec::new(), limits: *limits };
     if !lines.next(&mut source)? {
         return Err(lines.malformed("it is empty, a Matrix Market file begins with %%MatrixMarket"));
@@ -212,10 +213,7 @@ impl Lines {
                 Err(IoError::TooLarge { file: self.file.clone(), at, limit })
             }
             Ok(_) => Ok(true),
-            Err(cause) if source.gzip => {
-                Err(IoError::Gzip { file: self.file.clone(), source: cause })
-            }
-            Err(cause) => Err(IoError::Read { file: self.file.clone(), source: cause }),
+            Err(cause) => Err(failed(&self.file, source.gzip, cause)),
         }
     }
 

@@ -74,12 +74,12 @@ static TEMPORARIES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// names only once all are complete, those that were begun before first.
 ///
 /// A destination that is no regular file (a pipe, `/dev/null`) is written into; so is standard
-/// output, called `-` or by a name of the system such as `/dev/stdout`, whatever it is redirected to.
-/// There it is no error if the reader has seen enough and closed the pipe.
+/// output, called `-` or by a name of the system such as `/dev/stdout`, whatever it is redirected to. It comes
+/// last: a reader that has closed it takes no other file away.
 ///
 /// # Errors
 /// [`IoError::Write`] naming the file, also for two files with one destination; whatever stood at
-/// the destinations still stands there.
+/// the destinations still stands there, unless standard output alone was closed.
 pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoError> {
     let mut all = begun;
     for file in files {
@@ -97,7 +97,9 @@ pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoEr
         }
         file.complete()?;
     }
-    all.into_iter().try_for_each(BegunFile::commit)
+    let (last, first): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(BegunFile::is_for_standard_output);
+    first.into_iter().chain(last).try_for_each(BegunFile::commit)
 }
 
 /// Refuses outputs that would replace an input: the same file by whatever path or link, standard
@@ -208,10 +210,7 @@ impl BegunFile {
                 let into = File::options().write(true).open(destination);
                 into.and_then(|into| copied(stream.get_ref(), into))
             }
-            Stage::StandardOutput => match copied(stream.get_ref(), io::stdout().lock()) {
-                Err(closed) if closed.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-                other => other,
-            },
+            Stage::StandardOutput => copied(stream.get_ref(), io::stdout().lock()),
         };
         done.map_err(|source| failed(&path, source))
     }
@@ -229,18 +228,31 @@ impl Stage {
     }
 }
 
+/// Number of links to links that are followed, as the system does.
+const MOST_LINKS: usize = 40;
+
 /// A path without symbolic links, whether a file stands there or not.
 fn resolved(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| {
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        match (fs::canonicalize(folder), path.file_name()) {
-            (Ok(folder), Some(name)) => folder.join(name),
-            _ => path.to_owned(),
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(resolved) = fs::canonicalize(&path) {
+            return resolved;
         }
-    })
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        // A link to a file that is not there yet.
+        if let Ok(target) = fs::read_link(&path) {
+            path = folder.join(target);
+            continue;
+        }
+        return match (fs::canonicalize(folder), path.file_name()) {
+            (Ok(folder), Some(name)) => folder.join(name),
+            _ => path,
+        };
+    }
+    path
 }
 
 /// Creates the file that is to become `destination`.

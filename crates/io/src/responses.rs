@@ -155,7 +155,8 @@ impl FrequencyResponses {
         let file = source.file.clone();
         match source.kind() {
             Kind::Uff => {
-                uff::read_responses(&file, &source.bytes(&options.limits)?, &options.limits)
+                let bytes = source.bytes(&options.limits)?;
+                uff::read_responses(&file, &bytes, source.budget(&options.limits))
             }
             _ => Self::of_table(&Table::of_source(source, &options)?),
         }

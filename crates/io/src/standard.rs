@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::OnceLock;
 
-use crate::escaped;
+use crate::{escaped, path_text};
 
 /// Name of both.
 const DASH: &str = "-";
@@ -44,7 +44,7 @@ pub fn input_name(path: &Path) -> String {
 }
 
 fn shown(path: &Path) -> String {
-    escaped(&path.display().to_string()).into_owned()
+    escaped(&path_text(path)).into_owned()
 }
 
 /// Opens a file to be read once.

@@ -155,7 +155,13 @@ pub const TARGETS: [Target; 7] = [
 /// Limits that a small input can exceed.
 const OPTIONS: ReadOptions = ReadOptions {
     skip_lines: 0,
-    limits: Limits { row_bytes: 1 << 14, columns: 200, unpacked_bytes: 1 << 20, numbers: 1 << 17 },
+    limits: Limits {
+        row_bytes: 1 << 14,
+        columns: 200,
+        unpacked_bytes: 1 << 20,
+        numbers: 1 << 17,
+        ..Limits::DEFAULT
+    },
 };
 
 /// Longest message, in bytes: a name may be as long as a row.

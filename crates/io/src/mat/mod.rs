@@ -19,7 +19,7 @@ use self::array::{Array, Value};
 use self::element::{COMPRESSED, Elements, Endian, MATRIX};
 use crate::IoError;
 use crate::contents::{Column, Contents, Fault, Place};
-use crate::limits::{Budget, Limit, Limits};
+use crate::limits::{Budget, Limit};
 use crate::stated_rates::with_stated_rates;
 
 /// Number of bytes before the first variable.
@@ -30,8 +30,8 @@ const HEADER: usize = 128;
 const WIDEST: usize = 256;
 
 /// Reads the variables of a file as columns.
-pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents, IoError> {
-    let contents = contents(bytes, Budget::new(limits)).map_err(|fault| {
+pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents, IoError> {
+    let contents = contents(bytes, budget).map_err(|fault| {
         let at = Place::Byte(fault.at + 1);
         fault.error(file, at)
     })?;
@@ -56,6 +56,7 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
             MATRIX => Array::read(element.data, at, endian, 0, &mut budget)?,
             COMPRESSED => {
                 let inflated = inflated(element.data, at, budget.unpacked_bytes())?;
+                budget.take_bytes(inflated.len()).map_err(|limit| Fault::too_large(at, limit))?;
                 // Places inside are reported as the place of the compressed variable.
                 let inside = |fault: Fault| Fault { at, ..fault };
                 let mut elements = Elements::new(&inflated, at, endian);
@@ -63,7 +64,9 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
                 let Some(inner) = inner.filter(|e| e.kind == MATRIX) else {
                     return Err(Fault::new(at, "the compressed data are no variable"));
                 };
-                Array::read(inner.data, at, endian, 0, &mut budget).map_err(inside)?
+                let variable = Array::read(inner.data, at, endian, 0, &mut budget);
+                budget.give_bytes(inflated.len());
+                variable.map_err(inside)?
             }
             // Other elements are allowed and hold no variables.
             _ => continue,
@@ -73,11 +76,11 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
     Ok(contents)
 }
 
-fn inflated(data: &[u8], at: usize, limit: usize) -> Result<Vec<u8>, Fault> {
+fn inflated(data: &[u8], at: usize, (most, limit): (usize, Limit)) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
-    let read = ZlibDecoder::new(data).take(limit as u64 + 1).read_to_end(&mut bytes);
+    let read = ZlibDecoder::new(data).take(most as u64 + 1).read_to_end(&mut bytes);
     match read {
-        Ok(_) if bytes.len() > limit => Err(Fault::too_large(at, Limit::UnpackedBytes(limit))),
+        Ok(_) if bytes.len() > most => Err(Fault::too_large(at, limit)),
         Ok(_) => Ok(bytes),
         Err(e) => Err(Fault::new(at, format!("a compressed variable is damaged ({e})"))),
     }

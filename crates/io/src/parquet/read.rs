@@ -1,9 +1,10 @@
 //! Columns of numbers from Parquet files, row group by row group.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
@@ -11,15 +12,17 @@ use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::DataType;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::{ColumnChunkMetaData, FileMetaData};
-use ::parquet::file::reader::{ChunkReader, FileReader as _, SerializedFileReader};
+use ::parquet::file::reader::{ChunkReader, FileReader, RowGroupReader, SerializedFileReader};
 use ::parquet::record::reader::RowIter;
 use ::parquet::schema::types::ColumnDescriptor;
 use bytes::Bytes;
 
+use super::footer;
 use super::pages::{bytes_of, largest_page};
+use super::panic::caught;
 use crate::IoError;
 use crate::contents::{Column, Contents, Place};
-use crate::limits::{Budget, Limit, Limits};
+use crate::limits::{Budget, Limit};
 use crate::standard::input_name;
 use crate::stated_rates::with_stated_rates;
 
@@ -33,12 +36,12 @@ const UNITS: &str = "units";
 const PANDAS_ATTRIBUTES: &str = "PANDAS_ATTRS";
 
 /// Reads the columns of a file.
-pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
+pub(crate) fn read(file: &str, bytes: Vec<u8>, budget: Budget) -> Result<Contents, IoError> {
     let bytes = Bytes::from(bytes);
     let contents = guarded(|| {
         let columns = Columns::new(bytes.clone(), bytes)?;
         let whole = 0..columns.rows()?;
-        let mut contents = columns.contents(None, std::slice::from_ref(&whole), limits)?;
+        let mut contents = columns.contents(None, std::slice::from_ref(&whole), budget)?;
         Ok(contents.swap_remove(0))
     });
     contents.map_err(|trouble| trouble.error(file)).and_then(|contents| usable(file, contents))
@@ -103,12 +106,15 @@ impl Trouble {
 
 /// Reads something of a file; a panic of the decoder, which damaged files can cause, is an error.
 pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Trouble>) -> Result<T, Trouble> {
-    catch_unwind(AssertUnwindSafe(read))
-        .unwrap_or_else(|_| Err(Trouble::Damaged("its contents contradict each other".into())))
+    caught(read)
+        .unwrap_or_else(|| Err(Trouble::Damaged("its contents contradict each other".into())))
 }
 
-fn reader<R: ChunkReader + 'static>(source: R) -> Result<SerializedFileReader<R>, ParquetError> {
-    SerializedFileReader::new(source)
+fn reader<R: ChunkReader + 'static>(source: R) -> Result<SerializedFileReader<R>, Trouble> {
+    if !footer::is_possible(&source) {
+        return Err(Trouble::Damaged("its footer contradicts its length".into()));
+    }
+    Ok(SerializedFileReader::new(source)?)
 }
 
 /// The columns of an open file.
@@ -135,6 +141,12 @@ impl<R: ChunkReader + 'static> Columns<R> {
         rows.ok_or_else(|| Trouble::Damaged("its row groups have an impossible size".into()))
     }
 
+    /// Returns the readers of the row groups, none of which is made yet.
+    pub fn groups(&self) -> Groups<'_> {
+        let count = self.reader.metadata().num_row_groups();
+        Groups { reader: &self.reader, known: (0..count).map(|_| OnceCell::new()).collect() }
+    }
+
     /// Numbers of rows of the row groups; `None` for a negative one.
     fn group_rows(&self) -> impl Iterator<Item = Option<usize>> {
         self.reader
@@ -150,9 +162,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
         &self,
         wanted: Option<&[usize]>,
         spans: &[Range<usize>],
-        limits: &Limits,
+        mut budget: Budget,
     ) -> Result<Vec<Contents>, Trouble> {
-        let mut budget = Budget::new(limits);
         let metadata = self.reader.metadata().file_metadata();
         let stated = Stated::of(metadata);
         let empty = || Contents {
@@ -161,11 +172,11 @@ impl<R: ChunkReader + 'static> Columns<R> {
             ..Contents::default()
         };
         let mut contents: Vec<Contents> = spans.iter().map(|_| empty()).collect();
+        let groups = self.groups();
         for (at, description) in metadata.schema_descr().columns().iter().enumerate() {
             budget.take_column().map_err(|limit| Trouble::TooLarge(0, limit))?;
             let name = description.path().parts().join(".");
-            let about = stated.units.iter().find(|(column, _)| *column == name);
-            let about = about.map(|(_, unit)| unit.clone()).unwrap_or_default();
+            let about = stated.units.get(&name).cloned().unwrap_or_default();
             let columns: Vec<Column> = match Kind::of(description) {
                 Err(what) => {
                     let root = description.path().parts().first().cloned().unwrap_or_default();
@@ -178,7 +189,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
                     .map(|_| Column::unusable(name.clone(), "numbers not read"))
                     .collect(),
                 Ok(kind) => {
-                    let values = self.numbers(at, kind, spans, &mut budget)?.into_iter();
+                    let values = self.numbers(&groups, at, kind, spans, &mut budget)?.into_iter();
                     values.map(|values| Column::of_numbers(name.clone(), values)).collect()
                 }
             };
@@ -192,6 +203,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     /// Reads spans of rows of a column of numbers.
     fn numbers(
         &self,
+        groups: &Groups<'_>,
         at: usize,
         kind: Kind,
         spans: &[Range<usize>],
@@ -199,7 +211,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     ) -> Result<Vec<Vec<f64>>, Trouble> {
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); spans.len()];
         let mut first = vec![None; spans.len()];
-        self.visit(at, spans, &budget.clone(), &mut |column, span, rows| {
+        self.visit(groups, at, spans, &budget.clone(), &mut |column, span, rows| {
             budget
                 .take_numbers(rows)
                 .map_err(|limit| Trouble::TooLarge(values[span].len(), limit))?;
@@ -212,6 +224,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     /// row group, with the index of the span and the number of rows, which `take` has to read.
     pub fn visit(
         &self,
+        groups: &Groups<'_>,
         at: usize,
         spans: &[Range<usize>],
         budget: &Budget,
@@ -225,7 +238,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
             if spans.iter().any(|span| !within(span).is_empty()) {
                 let described = self.reader.metadata().row_group(group).column(at);
                 self.check_pages(described, budget).map_err(|trouble| trouble.after(start))?;
-                let mut column = self.reader.get_row_group(group)?.get_column_reader(at)?;
+                let mut column = groups.get(group)?.get_column_reader(at)?;
                 let mut position = start;
                 for (index, span) in spans.iter().enumerate() {
                     let rows = within(span);
@@ -247,11 +260,11 @@ impl<R: ChunkReader + 'static> Columns<R> {
         let len = usize::try_from(self.source.len()).unwrap_or(usize::MAX);
         let pages = bytes_of(column, len).ok_or_else(damaged)?;
         let pages = self.source.get_bytes(pages.start as u64, pages.len())?;
-        let allowed = budget.unpacked_bytes();
-        match largest_page(&pages).ok_or_else(damaged)? > allowed {
-            true => Err(Trouble::TooLarge(0, Limit::UnpackedBytes(allowed))),
-            false => Ok(()),
+        let (allowed, limit) = budget.unpacked_bytes();
+        if largest_page(&pages).ok_or_else(damaged)? > allowed {
+            return Err(Trouble::TooLarge(0, limit));
         }
+        Ok(())
     }
 
     /// Refuses a file of which any column has pages that are not there, or too large.
@@ -274,6 +287,22 @@ impl<R: ChunkReader + 'static> Columns<R> {
     /// Returns the description of a column.
     pub fn description(&self, at: usize) -> &ColumnDescriptor {
         &self.reader.metadata().file_metadata().schema_descr().columns()[at]
+    }
+}
+
+/// The readers of the row groups, each made once: making one takes time for each of its columns.
+pub(super) struct Groups<'a> {
+    reader: &'a dyn FileReader,
+    known: Vec<OnceCell<Box<dyn RowGroupReader + 'a>>>,
+}
+
+impl<'a> Groups<'a> {
+    fn get(&self, group: usize) -> Result<&(dyn RowGroupReader + 'a), Trouble> {
+        let known = &self.known[group];
+        if known.get().is_none() {
+            let _ = known.set(self.reader.get_row_group(group)?);
+        }
+        known.get().map(|reader| &**reader).ok_or_else(short)
     }
 }
 
@@ -423,12 +452,12 @@ fn append<T: DataType>(
 struct Stated {
     numbers: Vec<(String, f64)>,
     /// Columns and their units.
-    units: Vec<(String, String)>,
+    units: BTreeMap<String, String>,
 }
 
 impl Stated {
     fn of(metadata: &FileMetaData) -> Self {
-        let mut stated = Self { numbers: Vec::new(), units: Vec::new() };
+        let mut stated = Self { numbers: Vec::new(), units: BTreeMap::new() };
         for (key, value) in pairs(metadata) {
             let json = serde_json::from_str(&value);
             match (key.as_str(), json) {

@@ -9,9 +9,10 @@ use std::slice;
 use ::parquet::basic::Type;
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::{AsBytes as _, DataType};
+use ::parquet::file::reader::Length as _;
 
 use super::read::{CHUNK_ROWS, Columns, Trouble, guarded, usable};
-use crate::limits::{Budget, Limits};
+use crate::limits::{Budget, Limit, Limits};
 use crate::standard::input_name;
 use crate::{IoError, Table, escaped};
 
@@ -24,6 +25,7 @@ pub struct ParquetFile {
     head: Table,
     columns: Columns<File>,
     limits: Limits,
+    bytes: usize,
 }
 
 /// Rows of a file that belong to one record.
@@ -46,19 +48,33 @@ impl ParquetFile {
         let open =
             || File::open(&path).map_err(|source| IoError::Read { file: file.clone(), source });
         let (source, same) = (open()?, open()?);
+        let bytes = usize::try_from(source.len()).unwrap_or(usize::MAX);
         let read = guarded(|| {
             let columns = Columns::new(source, same)?;
-            let head = columns.contents(None, slice::from_ref(&(0..0)), limits)?.swap_remove(0);
+            let budget = Budget::new(limits, bytes);
+            let head = columns.contents(None, slice::from_ref(&(0..0)), budget)?.swap_remove(0);
             Ok((columns, head))
         });
         let (columns, head) = read.map_err(|trouble| trouble.error(&file))?;
-        let head = Table::of_contents(file.clone(), usable(&file, head)?);
-        Ok(Self { head, columns, limits: *limits })
+        let head = usable(&file, head)?;
+        head.check_names(&file, limits)?;
+        let head = Table::of_contents(file.clone(), head);
+        Ok(Self { head, columns, limits: *limits, bytes })
     }
 
     /// Returns the table without its rows: names, units and time axis of the columns.
     pub fn head(&self) -> &Table {
         &self.head
+    }
+
+    fn budget(&self) -> Budget {
+        Budget::new(&self.limits, self.bytes)
+    }
+
+    /// Returns the memory, in bytes, that work on a record may take: [`Limits::memory`] of the size of
+    /// the file.
+    pub fn memory(&self) -> usize {
+        self.limits.memory(self.bytes)
     }
 
     /// Returns the records that a column of texts or whole numbers tells apart, in the order of their rows.
@@ -69,11 +85,11 @@ impl ParquetFile {
     /// [`IoError::Parquet`].
     pub fn records(&self, column: &str) -> Result<Vec<RecordRows>, IoError> {
         let at = self.head.find(column)?;
-        let mut ids = Ids::default();
+        let mut ids = Ids { name_bytes: self.limits.name_bytes, ..Ids::default() };
         let trouble = guarded(|| {
             let whole = 0..self.columns.rows()?;
-            let budget = Budget::new(&self.limits);
-            self.columns.visit(at, slice::from_ref(&whole), &budget, &mut |column, _, rows| {
+            let (groups, spans) = (self.columns.groups(), slice::from_ref(&whole));
+            self.columns.visit(&groups, at, spans, &self.budget(), &mut |column, _, rows| {
                 ids.read(column, rows)
             })
         });
@@ -109,7 +125,7 @@ impl ParquetFile {
     ) -> Result<Vec<Table>, IoError> {
         let file = self.head.file();
         let spans: Vec<Range<usize>> = records.iter().map(|record| record.rows.clone()).collect();
-        let contents = guarded(|| self.columns.contents(wanted, &spans, &self.limits));
+        let contents = guarded(|| self.columns.contents(wanted, &spans, self.budget()));
         let contents = contents.map_err(|trouble| trouble.error(file))?.into_iter();
         let named = contents.zip(records).map(|(contents, record)| {
             let name = format!("{file} (record {})", escaped(&record.id));
@@ -126,6 +142,8 @@ struct Ids {
     known: BTreeSet<String>,
     rows: usize,
     refusal: Option<Refusal>,
+    /// Limit on the bytes of a name.
+    name_bytes: usize,
 }
 
 /// Reason why rows cannot be divided into records; it stands in the row after those read.
@@ -181,6 +199,9 @@ impl Ids {
 
     /// Appends rows of one identifier.
     fn push(&mut self, id: String, count: usize) -> Result<(), Trouble> {
+        if id.len() > self.name_bytes {
+            return Err(Trouble::TooLarge(self.rows, Limit::NameBytes(self.name_bytes)));
+        }
         match self.records.last_mut().filter(|record| record.id == id) {
             Some(record) => record.rows.end += count,
             None if self.known.insert(id.clone()) => {

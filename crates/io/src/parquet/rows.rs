@@ -3,7 +3,9 @@
 use std::fs::File;
 use std::path::Path;
 
+use ::parquet::file::reader::ChunkReader;
 use ::parquet::record::Field;
+use bytes::Bytes;
 
 use super::read::{Columns, Trouble, guarded};
 use crate::IoError;
@@ -39,6 +41,9 @@ impl ParquetCell {
     }
 }
 
+/// The cells of a row, with the names of their columns.
+type Cells = Vec<(String, ParquetCell)>;
+
 /// Reads all rows of a table of results, each as its cells with the names of their columns.
 ///
 /// # Errors
@@ -51,14 +56,34 @@ pub fn read_parquet_rows(
     let file = input_name(path.as_ref());
     let open = || File::open(&path).map_err(|source| IoError::Read { file: file.clone(), source });
     let (source, same) = (open()?, open()?);
-    let rows = guarded(|| {
-        let columns = Columns::new(source, same)?;
-        columns.check_all_pages(&mut Budget::new(limits))?;
-        let rows = columns.row_cells()?.map(|row| {
-            let cells = row?.into_columns().into_iter();
-            Ok(cells.map(|(name, field)| (name, ParquetCell::of(field))).collect())
-        });
-        rows.collect::<Result<_, Trouble>>()
+    guarded(|| rows(source, same, limits)).map_err(|trouble| trouble.error(&file))
+}
+
+/// Reads the rows of a table of results in the bytes of a file; `file` is its name in messages.
+///
+/// # Errors
+/// [`IoError::Parquet`] if it is damaged or none, [`IoError::TooLarge`].
+pub fn parse_parquet_rows(
+    file: &str,
+    bytes: Vec<u8>,
+    limits: &Limits,
+) -> Result<Vec<Vec<(String, ParquetCell)>>, IoError> {
+    let bytes = Bytes::from(bytes);
+    guarded(|| rows(bytes.clone(), bytes, limits)).map_err(|trouble| trouble.error(file))
+}
+
+/// Reads the rows of a file; `source` and `same` are the same one.
+fn rows<R: ChunkReader + 'static>(
+    source: R,
+    same: R,
+    limits: &Limits,
+) -> Result<Vec<Cells>, Trouble> {
+    let len = usize::try_from(source.len()).unwrap_or(usize::MAX);
+    let columns = Columns::new(source, same)?;
+    columns.check_all_pages(&mut Budget::new(limits, len))?;
+    let rows = columns.row_cells()?.map(|row| {
+        let cells = row?.into_columns().into_iter();
+        Ok(cells.map(|(name, field)| (name, ParquetCell::of(field))).collect())
     });
-    rows.map_err(|trouble| trouble.error(&file))
+    rows.collect()
 }

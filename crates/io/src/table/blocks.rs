@@ -62,7 +62,7 @@ impl<'a> Blocks<'a> {
     /// Skips the lines above the table and reads as much as tells the dialect of the text.
     pub fn open(source: Source<'a>, options: &ReadOptions) -> Result<Self, IoError> {
         let terminator = source.terminator();
-        let Source { file, gzip, mut reader, .. } = source;
+        let Source { file, gzip, mut reader, .. } = source.bounded(&options.limits);
         for _ in 0..options.skip_lines {
             match reader.skip_until(terminator) {
                 Ok(0) => {

@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 
 pub use self::inventory::{Inventory, Tally};
 pub use self::record_file::{RecordFile, Survey};
-use self::source::{Kind, Source};
+use self::source::{Kind, Source, Stored};
 use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
 use self::unit::without_unit;
@@ -72,6 +72,8 @@ struct FirstRows {
     /// Whether these are all.
     is_whole: bool,
     decimal: Option<DecimalSign>,
+    /// Counter of the bytes that the file has stored, as far as it was read.
+    stored: Stored,
 }
 
 impl Table {
@@ -128,6 +130,7 @@ impl Table {
         limit: usize,
     ) -> Result<FirstRows, IoError> {
         let (file, gzip, utf16) = (source.file.clone(), source.gzip, source.utf16);
+        let stored = source.stored.clone();
         let (mut is_whole, mut decimal) = (true, None);
         let contents = match source.kind() {
             Kind::Text => {
@@ -147,19 +150,27 @@ impl Table {
             Kind::Mat5 | Kind::Uff | Kind::Parquet if options.skip_lines > 0 => {
                 return Err(IoError::NothingToSkip { file });
             }
-            Kind::Mat5 => mat::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
-            Kind::Uff => uff::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
+            Kind::Mat5 => {
+                let bytes = source.bytes(&options.limits)?;
+                mat::read(&file, &bytes, source.budget(&options.limits))?
+            }
+            Kind::Uff => {
+                let bytes = source.bytes(&options.limits)?;
+                uff::read(&file, &bytes, source.budget(&options.limits))?
+            }
             #[cfg(feature = "parquet")]
             Kind::Parquet => {
-                crate::parquet::read(&file, source.bytes(&options.limits)?, &options.limits)?
+                let bytes = source.bytes(&options.limits)?;
+                crate::parquet::read(&file, bytes, source.budget(&options.limits))?
             }
             #[cfg(not(feature = "parquet"))]
             Kind::Parquet => return Err(IoError::UnknownFormat { file }),
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
+        contents.check_names(&file, &options.limits)?;
         let table = Self { gzip, utf16, ..Self::of_contents(file, contents) };
-        Ok(FirstRows { table, is_whole, decimal })
+        Ok(FirstRows { table, is_whole, decimal, stored })
     }
 
     /// Takes named columns from memory; `name` is that of the table in messages. A unit may stand in the

@@ -51,6 +51,8 @@ pub struct RecordFile {
     whole: bool,
     /// Decimal sign of the first samples.
     decimal: Option<DecimalSign>,
+    /// Memory that work on the record may take, in bytes.
+    memory: usize,
 }
 
 /// Result of one pass over some columns.
@@ -92,15 +94,34 @@ impl RecordFile {
         let file = !standard::is_input(&path) && fs::metadata(&path).is_ok_and(|m| m.is_file());
         let again = file && source.kind() == Kind::Text;
         let limit = if again { held } else { usize::MAX };
-        let FirstRows { table: head, is_whole: whole, decimal } =
+        let FirstRows { table: head, is_whole: whole, decimal, stored } =
             Table::first_rows(source, options, limit)?;
-        Ok(Self { path, options: *options, head, whole, decimal })
+        let whole_file = fs::metadata(&path).ok().filter(|_| file);
+        let len = whole_file.map_or(0, |m| usize::try_from(m.len()).unwrap_or(usize::MAX));
+        let stored = stored.bytes().max(len);
+        let memory = options.limits.memory(stored);
+        Ok(Self { path, options: *options, head, whole, decimal, memory })
+    }
+
+    /// Returns the memory, in bytes, that work on the record may take: [`Limits::memory`](crate::Limits::memory)
+    /// of the size of the file.
+    pub fn memory(&self) -> usize {
+        self.memory
     }
 
     /// Takes a table that was read before as a file held whole.
     pub fn of_table(table: Table) -> Self {
         let (path, options) = (PathBuf::from(table.file()), ReadOptions::default());
-        Self { path, options, head: table, whole: true, decimal: None }
+        let values = table.contents.columns.iter().filter_map(|column| column.values.as_ref().ok());
+        let bytes = values.map(|values| size_of_val(values.as_slice())).sum();
+        let memory = options.limits.memory(bytes);
+        Self { path, options, head: table, whole: true, decimal: None, memory }
+    }
+
+    /// Sets the memory, in bytes, that work on the record may take.
+    #[must_use]
+    pub fn with_memory(self, memory: usize) -> Self {
+        Self { memory, ..self }
     }
 
     /// The table, with only the first samples if the file is not held whole.

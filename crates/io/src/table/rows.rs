@@ -4,9 +4,10 @@ use super::batch::{BadRow, Batch, Plan};
 use super::blocks::Block;
 use super::dialect::is_number;
 use super::fields::{Fields, Layout, RowIter};
+use super::source::Stored;
 use crate::IoError;
 use crate::contents::{Axis, Column, Contents, DecimalSign, Lines, Place, Unusable};
-use crate::limits::{Limit, Limits};
+use crate::limits::{Budget, Limit, Limits};
 
 /// Columns that grow row by row.
 #[derive(Debug)]
@@ -14,6 +15,8 @@ pub(super) struct Rows {
     file: String,
     layout: Layout,
     limits: Limits,
+    /// Counter of the bytes read of the file.
+    stored: Stored,
     /// Decimal sign of the numbers, as far as it is known.
     decimal: Option<DecimalSign>,
     /// `None` before the first row.
@@ -46,7 +49,7 @@ impl Rows {
     pub fn new(
         file: String,
         layout: Layout,
-        limits: Limits,
+        (limits, stored): (Limits, Stored),
         decimal: Option<DecimalSign>,
         wanted: Option<Vec<usize>>,
     ) -> Self {
@@ -54,6 +57,7 @@ impl Rows {
             file,
             layout,
             limits,
+            stored,
             decimal,
             first: None,
             columns: Vec::new(),
@@ -292,12 +296,12 @@ impl Rows {
     /// Returns whether more numbers are held than the limit allows.
     pub fn check_numbers(&self) -> Result<(), IoError> {
         let width = self.wanted.as_ref().map_or(0, Vec::len);
-        if self.samples.saturating_mul(width) > self.limits.numbers {
+        let numbers = self.samples.saturating_mul(width);
+        let mut budget = Budget::new(&self.limits, self.stored.bytes());
+        budget.take_numbers(numbers).map_err(|limit| {
             let at = self.lines.place(self.samples.saturating_sub(1));
-            let limit = Limit::Numbers(self.limits.numbers);
-            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
-        }
-        Ok(())
+            IoError::TooLarge { file: self.file.clone(), at, limit }
+        })
     }
 }
 

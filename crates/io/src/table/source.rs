@@ -1,23 +1,91 @@
 //! The bytes of a file, without gzip, text as UTF-8, and their format.
 
-use std::io::{self, BufRead, BufReader, Cursor, Read as _};
+use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::contents::Place;
-use crate::limits::{Limit, Limits};
+use crate::limits::{Budget, Limit, Limits};
 use crate::{IoError, escaped, standard};
 
 /// Number of bytes read at a time.
 const CHUNK: usize = 1 << 16;
+
+/// Number of bytes unpacked between two looks at the limits.
+const AT_ONCE: u64 = 1 << 20;
 
 /// Byte order mark of UTF-8.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Number of bytes from which the format is detected.
 const HEAD: u64 = 512;
+
+/// Number of bytes, as they are stored, that were read of a file.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Stored(Arc<AtomicUsize>);
+
+impl Stored {
+    pub fn bytes(&self) -> usize {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// A stream whose bytes are counted.
+struct Counted<R> {
+    stream: R,
+    stored: Stored,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.stream.read(buffer)?;
+        self.stored.0.fetch_add(count, Ordering::Relaxed);
+        Ok(count)
+    }
+}
+
+/// An unpacked text that is held to a number of bytes for what was read of its file.
+struct Bounded<'a> {
+    text: Box<dyn BufRead + Send + 'a>,
+    /// Number of its bytes read so far.
+    bytes: usize,
+    stored: Stored,
+    limits: Limits,
+}
+
+impl BufRead for Bounded<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        let most = self.limits.text_bytes(self.stored.bytes());
+        if self.bytes > most {
+            return Err(io::Error::other(TooLong(most)));
+        }
+        self.text.fill_buf()
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.bytes += count;
+        self.text.consume(count);
+    }
+}
+
+impl Read for Bounded<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let available = self.fill_buf()?;
+        let count = available.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&available[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+/// An unpacked text has more than so many bytes.
+#[derive(Debug, thiserror::Error)]
+#[error("the unpacked text is longer than {0} bytes")]
+struct TooLong(usize);
 
 /// A file being read.
 pub(crate) struct Source<'a> {
@@ -26,6 +94,8 @@ pub(crate) struct Source<'a> {
     pub gzip: bool,
     /// Whether it is UTF-16, read as UTF-8.
     pub utf16: bool,
+    /// Counter of its bytes before they are unpacked.
+    pub stored: Stored,
     /// Its first bytes, which stand in `reader` too.
     head: Vec<u8>,
     pub reader: Box<dyn BufRead + Send + 'a>,
@@ -50,14 +120,17 @@ impl<'a> Source<'a> {
     pub fn open(path: &Path) -> Result<Source<'static>, IoError> {
         let file = standard::input_name(path);
         match standard::open(path) {
-            Ok(stream) => Source::new(file, BufReader::with_capacity(CHUNK, stream)),
+            Ok(stream) => Source::new(file, stream),
             Err(source) => Err(IoError::Read { file, source }),
         }
     }
 
     /// Looks at the first bytes of a stream; `file` is its name in messages.
-    pub fn new(file: String, mut raw: impl BufRead + Send + 'a) -> Result<Self, IoError> {
+    pub fn new(file: String, raw: impl Read + Send + 'a) -> Result<Self, IoError> {
         let file = escaped(&file).into_owned();
+        let stored = Stored::default();
+        let raw = Counted { stream: raw, stored: stored.clone() };
+        let mut raw = BufReader::with_capacity(CHUNK, raw);
         let (mut magic, mut gzip, mut utf16) = (Vec::new(), false, false);
         let looked = raw.by_ref().take(2).read_to_end(&mut magic).and_then(|_| {
             gzip = magic == [0x1f, 0x8b];
@@ -76,7 +149,7 @@ impl<'a> Source<'a> {
             Ok((head, stream))
         });
         match looked {
-            Ok((head, reader)) => Ok(Self { file, gzip, utf16, head, reader }),
+            Ok((head, reader)) => Ok(Self { file, gzip, utf16, stored, head, reader }),
             Err(source) => Err(failed(&file, gzip, source)),
         }
     }
@@ -107,19 +180,42 @@ impl<'a> Source<'a> {
         if is_old { b'\r' } else { b'\n' }
     }
 
-    /// Reads the rest of the file; what gzip unpacks is held to the limit.
+    /// Reads the rest of the file; what gzip unpacks is held to the limits.
     pub fn bytes(&mut self, limits: &Limits) -> Result<Vec<u8>, IoError> {
-        let limit = if self.gzip { limits.unpacked_bytes } else { usize::MAX };
         let mut bytes = Vec::new();
-        let most = (limit as u64).saturating_add(1);
-        match self.reader.by_ref().take(most).read_to_end(&mut bytes) {
-            Ok(_) if bytes.len() > limit => {
-                let (at, limit) = (Place::Byte(limit), Limit::UnpackedBytes(limit));
-                Err(IoError::TooLarge { file: self.file.clone(), at, limit })
+        loop {
+            match self.reader.by_ref().take(AT_ONCE).read_to_end(&mut bytes) {
+                Ok(0) => return Ok(bytes),
+                Ok(_) => self.check_unpacked(bytes.len(), limits)?,
+                Err(source) => return Err(failed(&self.file, self.gzip, source)),
             }
-            Ok(_) => Ok(bytes),
-            Err(source) => Err(failed(&self.file, self.gzip, source)),
         }
+    }
+
+    /// Refuses more unpacked bytes than the limits allow for what was read.
+    fn check_unpacked(&self, len: usize, limits: &Limits) -> Result<(), IoError> {
+        let (most, limit) = self.budget(limits).unpacked_bytes();
+        if self.gzip && len > most {
+            let at = Place::Byte(most);
+            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
+        }
+        Ok(())
+    }
+
+    /// Holds a text that is unpacked to the limits.
+    #[must_use]
+    pub fn bounded(self, limits: &Limits) -> Self {
+        if !self.gzip {
+            return self;
+        }
+        let (stored, limits) = (self.stored.clone(), *limits);
+        let reader = Box::new(Bounded { text: self.reader, bytes: 0, stored, limits });
+        Self { reader, ..self }
+    }
+
+    /// Returns the limits for what was read.
+    pub fn budget(&self, limits: &Limits) -> Budget {
+        Budget::new(limits, self.stored.bytes())
     }
 }
 
@@ -166,6 +262,13 @@ fn is_json(head: &[u8]) -> bool {
 /// The error for a failed read: of the file, or of the gzip around it.
 pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     let file = file.to_owned();
+    if let Some(TooLong(most)) = source.get_ref().and_then(|cause| cause.downcast_ref()) {
+        return IoError::TooLarge {
+            file,
+            at: Place::Byte(*most),
+            limit: Limit::UnpackedBytes(*most),
+        };
+    }
     if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }
 }
 

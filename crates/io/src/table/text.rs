@@ -49,6 +49,7 @@ impl<'a> TextReader<'a> {
         options: &ReadOptions,
         wanted: Wanted,
     ) -> Result<Self, IoError> {
+        let stored = source.stored.clone();
         let blocks = Blocks::open(source, options)?;
         let (start, terminator) = (blocks.start(), blocks.terminator());
         let delimiter = dialect::detect(start, terminator);
@@ -58,7 +59,7 @@ impl<'a> TextReader<'a> {
         let table = preamble::table(start, terminator)
             .map(|t| Beginning { line: options.skip_lines + t.line, ..t });
         let file = blocks.file().to_owned();
-        let rows = Rows::new(file, layout, options.limits, decimal, wanted.columns);
+        let rows = Rows::new(file, layout, (options.limits, stored), decimal, wanted.columns);
         Ok(Self { layout, table, blocks, rows })
     }
 

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use self::lines::{Line, Lines, is_mark, number};
 use crate::IoError;
 use crate::contents::{Contents, Fault, Place};
-use crate::limits::{Budget, Limits};
+use crate::limits::Budget;
 
 pub(crate) use self::geometry::read_geometry;
 pub(crate) use self::responses::read as read_responses;
@@ -26,9 +26,9 @@ pub(crate) use self::shapes::write_shapes;
 pub(crate) use self::write::write_responses;
 
 /// Reads the functions of a file as columns.
-pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents, IoError> {
+pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents, IoError> {
     let mut lines = Lines::new(bytes);
-    match datasets(&mut lines, Budget::new(limits)) {
+    match datasets(&mut lines, budget) {
         Ok(contents) if contents.columns.is_empty() => {
             Err(IoError::Empty { file: file.into(), found: "it has no dataset 58" })
         }

@@ -9,7 +9,7 @@ use super::lines::{Line, Lines, is_mark};
 use super::{Units, dataset_number, skip_to_end, units};
 use crate::IoError;
 use crate::contents::{Fault, Place};
-use crate::limits::{Budget, Limits};
+use crate::limits::Budget;
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 
 /// Abscissa type of a frequency.
@@ -25,10 +25,10 @@ const SAME_FREQUENCY: f64 = 2e-5;
 pub(crate) fn read(
     file: &str,
     bytes: &[u8],
-    limits: &Limits,
+    budget: Budget,
 ) -> Result<FrequencyResponses, IoError> {
     let mut lines = Lines::new(bytes);
-    match functions(file, &mut lines, Budget::new(limits)) {
+    match functions(file, &mut lines, budget) {
         Ok(responses) if responses.functions.is_empty() => Err(IoError::Empty {
             file: file.into(),
             found: "it has no dataset 58 with a frequency response function",

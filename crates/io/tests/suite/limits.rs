@@ -6,8 +6,13 @@ use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use mechid_io::{IoError, Limit, Limits, Place, ReadOptions, RecordFile, Table, TimeAxis, escaped};
 
-const LIMITS: Limits =
-    Limits { row_bytes: 1 << 16, columns: 100, unpacked_bytes: 1 << 20, numbers: 1 << 16 };
+const LIMITS: Limits = Limits {
+    row_bytes: 1 << 16,
+    columns: 100,
+    unpacked_bytes: 1 << 20,
+    numbers: 1 << 16,
+    ..Limits::DEFAULT
+};
 
 const OPTIONS: ReadOptions = ReadOptions { skip_lines: 0, limits: LIMITS };
 
@@ -120,6 +125,44 @@ fn numbers_held_have_a_limit() {
     let file = RecordFile::open(&path, &OPTIONS, 1000).unwrap();
     let survey = file.survey(&TimeAxis::RateHz(1.0), &["f"]).unwrap();
     assert_eq!(survey.sampling.len(), 1 << 18);
+}
+
+/// Memory follows what a file holds: a small one that stands for much is refused, whatever the limits on
+/// numbers and unpacked bytes.
+#[test]
+fn memory_has_a_limit_by_the_size_of_the_file() {
+    let memory = |bytes: &[u8]| match Table::parse("a", bytes) {
+        Err(IoError::TooLarge { limit: limit @ Limit::Memory(_), .. }) => limit,
+        other => panic!("{other:?}"),
+    };
+    // 30 million bytes in zlib: 240 MB as numbers, and as much while they are read.
+    let file = compressed(&bytes_variable(30_000_000));
+    assert!(file.len() < 40_000, "{}", file.len());
+    let allowed = Limits::DEFAULT.memory(file.len());
+    assert!(allowed < 400 << 20);
+    assert_eq!(memory(&file), Limit::Memory(allowed));
+    let e = Table::parse("a", &file).unwrap_err().to_string();
+    assert!(e.contains("MiB of memory, which is the limit for a file of this size"), "{e}");
+    // The same around the whole file, for the gzip counts as it is stored.
+    let whole = [&file[..128], &bytes_variable(160_000_000)].concat();
+    assert!(matches!(memory(&gzip(&whole)), Limit::Memory(_)));
+    // Whoever says so gets it.
+    let limits = Limits::DEFAULT.with_memory(1_000_000_000);
+    let options = ReadOptions { skip_lines: 0, limits };
+    let table = Table::parse_with("a", &file, &options).unwrap();
+    assert_eq!(table.len(), 30_000_000);
+}
+
+#[test]
+fn names_have_a_limit() {
+    let name = "x".repeat(Limits::DEFAULT.name_bytes + 1);
+    let refused = |bytes: &[u8]| match Table::parse("a", bytes) {
+        Err(IoError::TooLarge { at, limit: Limit::NameBytes(4096), .. }) => at,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(refused(format!("t,{name}\n0,1\n1,2\n").as_bytes()), Place::Column(2));
+    assert_eq!(refused(format!("t,f\ns,{name}\n0,1\n1,2\n").as_bytes()), Place::Column(2));
+    assert!(Table::parse("a", format!("t,{}\n0,1\n", &name[1..]).as_bytes()).is_ok());
 }
 
 #[test]

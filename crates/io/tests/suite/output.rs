@@ -241,3 +241,27 @@ fn an_output_that_is_an_input_is_refused() {
     refuse_replaced_inputs(&["/dev/null", "-"], &["/dev/null", "-", "/dev/stdout"]).unwrap();
     refuse_replaced_inputs(&[path("rec.csv")], &[std::path::PathBuf::from("-")]).unwrap();
 }
+
+/// A link to a file that is not there yet stays a link.
+#[cfg(unix)]
+#[test]
+fn a_dangling_link_stays_a_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("results")).unwrap();
+    std::os::unix::fs::symlink("results/new.csv", at("first")).unwrap();
+    std::os::unix::fs::symlink("first", at("second")).unwrap();
+    let file = OutputFile { path: at("second"), content: b"1".to_vec() };
+    write_all(Vec::new(), &[file]).unwrap();
+    assert_eq!(std::fs::read(at("results/new.csv")).unwrap(), b"1");
+    for link in ["first", "second"] {
+        assert!(std::fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
+    }
+    // Links in a ring, and into a folder that is not there.
+    std::os::unix::fs::symlink("ring", at("ring")).unwrap();
+    std::os::unix::fs::symlink("none/new.csv", at("lost")).unwrap();
+    for link in ["ring", "lost"] {
+        let file = OutputFile { path: at(link), content: b"1".to_vec() };
+        assert!(write_all(Vec::new(), &[file]).is_err(), "{link}");
+    }
+}

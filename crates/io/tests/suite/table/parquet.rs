@@ -4,7 +4,7 @@ use std::fs;
 
 use mechid_io::{
     IoError, Limit, Limits, ParquetColumn, ParquetFile, ParquetValues, Quantity, ReadOptions,
-    RecordRows, Table, TimeAxis, read_parquet_metadata, write_parquet,
+    RecordRows, Table, TimeAxis, parquet_bytes, read_parquet_metadata, write_parquet,
 };
 use mechid_model::ResponseQuantity;
 
@@ -202,4 +202,82 @@ fn damage_of_a_file_of_many_records_is_an_error_and_no_panic() {
         refused += usize::from(read.is_err());
     }
     assert!(refused > 0);
+}
+
+/// A file that ends with a footer in the compact form of Thrift.
+fn with_footer(footer: &[u8]) -> Vec<u8> {
+    let len = (footer.len() as u32).to_le_bytes();
+    [b"PAR1\x15\x00", footer, &len, b"PAR1"].concat()
+}
+
+/// The decoder reserves what the schema claims, and descends as deep as it is nested.
+#[test]
+fn a_schema_that_claims_more_than_it_has_is_refused() {
+    let element = |children: &[u8]| [&[0x48, 0x01, b'r', 0x15], children, &[0x00]].concat();
+    let forged = |elements: &[Vec<u8>], count: &[u8]| {
+        let head = [&[0x15, 0x02, 0x19, 0xfc], count].concat();
+        let tail = [0x16, 0x00, 0x19, 0x0c, 0x00];
+        with_footer(&[head, elements.concat(), tail.to_vec()].concat())
+    };
+    let refused = |file: &[u8]| match Table::parse("a", file) {
+        Err(IoError::Parquet { what, .. }) => what,
+        other => panic!("{other:?}"),
+    };
+    // A root of 2³¹ − 1 children, which would take 17 GB.
+    let root = forged(&[element(&[0xfe, 0xff, 0xff, 0xff, 0x0f])], &[0x01]);
+    assert_eq!(refused(&root), "its footer contradicts its length");
+    // A hundred thousand groups in each other, which would take the whole stack.
+    let nested = forged(&vec![element(&[0x02]); 100_000], &[0xa0, 0x8d, 0x06]);
+    assert_eq!(refused(&nested), "its footer contradicts its length");
+}
+
+/// Constant columns take next to nothing in a file.
+#[test]
+fn memory_has_a_limit_by_the_size_of_the_file() {
+    use parquet::data_type::DoubleType;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+
+    let schema = parse_message_type("message m { required double x; }").unwrap();
+    let mut file = Vec::new();
+    let properties = WriterProperties::builder().set_dictionary_enabled(true).build();
+    let mut writer =
+        SerializedFileWriter::new(&mut file, schema.into(), properties.into()).unwrap();
+    let zeros = vec![0.0; 1 << 20];
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    for _ in 0..40 {
+        column.typed::<DoubleType>().write_batch(&zeros, None, None).unwrap();
+    }
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    assert!(file.len() < 200_000, "{} bytes", file.len());
+    match Table::parse("a", &file) {
+        Err(IoError::TooLarge { limit: Limit::Memory(bytes), .. }) => {
+            assert_eq!(bytes, Limits::DEFAULT.memory(file.len()));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Sixty thousand columns were read in a time that grew with their square: 18 s.
+#[test]
+fn many_columns_are_read_in_a_time_that_grows_with_their_number() {
+    let read = |count: usize| {
+        let columns: Vec<ParquetColumn> = (0..count)
+            .map(|_| ParquetColumn {
+                name: "c",
+                values: ParquetValues::Number(vec![Some(1.0), Some(2.0)]),
+            })
+            .collect();
+        let file = parquet_bytes(&columns).unwrap();
+        let begun = std::time::Instant::now();
+        assert_eq!(Table::parse("a", &file).unwrap().width(), count);
+        begun.elapsed().as_secs_f64()
+    };
+    let (few, many) = (read(2_000), read(40_000));
+    // Twenty times as many: a square would be four hundred times.
+    assert!(many < 100.0 * few.max(1e-3), "{few} s, {many} s");
 }
