@@ -419,6 +419,44 @@ pub enum AnalysisError {
         /// Reasons, hit by hit.
         reasons: String,
     },
+    /// The work takes more memory than a file of this size may ask for.
+    #[error(
+        "{file}: the work on {numbers} numbers takes about {} GB of memory, and {} GB is the limit for a file of this size; \
+         if the record is right and the memory is there, set `memory_gb`: {}",
+        message::number(two_digits(*needed_gb)),
+        message::number(two_digits(*allowed_gb)),
+        message::number(needed_gb.ceil())
+    )]
+    Memory {
+        /// The record.
+        file: String,
+        /// Numbers that the work holds.
+        numbers: usize,
+        /// Estimate of the memory that it takes, in GB.
+        needed_gb: f64,
+        /// The limit, in GB.
+        allowed_gb: f64,
+    },
+    /// A record of a fleet took more memory than it may.
+    #[error("the record took more than {gb} GB of memory, and the process that worked on it was ended; `record_memory_gb` sets the limit",
+        gb = message::number(*gb))]
+    RecordMemory {
+        /// The limit, in GB.
+        gb: f64,
+    },
+    /// A record of a fleet took more time than it may.
+    #[error("the record took more than {seconds} s, and the process that worked on it was ended; `record_seconds` sets the limit",
+        seconds = message::number(*seconds))]
+    RecordTime {
+        /// The limit, in s.
+        seconds: f64,
+    },
+    /// The process that worked on a record of a fleet has ended.
+    #[error("the process that worked on the record has ended: {how}")]
+    RecordProcess {
+        /// How it ended, and what it said.
+        how: String,
+    },
     /// A setting cannot be understood.
     #[error("`{setting}`: {why}")]
     Setting {
@@ -481,6 +519,11 @@ impl AnalysisError {
         }
         names[names.len() - 2..].iter().map(|name| kebab(name)).collect::<Vec<_>>().join(".")
     }
+}
+
+/// Returns a size with two digits.
+fn two_digits(size: f64) -> f64 {
+    format!("{size:.1e}").parse().unwrap_or(size)
 }
 
 /// Returns the name of a variant in lower case, its words joined by hyphens.

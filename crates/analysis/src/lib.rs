@@ -54,6 +54,7 @@ pub mod frf;
 pub mod hits;
 pub mod identify;
 pub mod inspect;
+pub mod limits;
 mod machine;
 pub mod measurement;
 pub mod modal;

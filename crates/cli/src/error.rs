@@ -1,7 +1,10 @@
 //! Errors between the command line and the result.
 
+use std::io::ErrorKind;
+use std::path::Path;
+
 use mechid::analysis::AnalysisError;
-use mechid::io::IoError;
+use mechid::io::{IoError, output_name};
 use mechid::signal::message;
 
 /// A failure of a subcommand; its message is all the user sees.
@@ -98,17 +101,31 @@ pub enum CliError {
 }
 
 impl CliError {
+    /// Returns whether the reader of standard output has closed it.
+    pub fn is_closed_output(&self) -> bool {
+        match self {
+            Self::Print(source) => source.kind() == ErrorKind::BrokenPipe,
+            Self::Io(IoError::Write { file, source }) => {
+                *file == output_name(Path::new("-")) && source.kind() == ErrorKind::BrokenPipe
+            }
+            _ => false,
+        }
+    }
+
     /// Returns the message of a command that `raises` limits or has no such option; `spelled` writes the settings
     /// that the analysis names as options.
     pub fn message(&self, raises: bool, spelled: impl Fn(&str) -> String) -> String {
         match self {
             Self::Io(error @ IoError::TooLarge { file, at, limit })
             | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { file, at, limit })) => {
-                match raises {
-                    true => {
+                match (raises, limit.is_memory()) {
+                    (true, true) => {
+                        format!("{error}; if the record is really so large, use --memory-gb")
+                    }
+                    (true, false) => {
                         format!("{error}; if the record is really so large, use --raise-limits")
                     }
-                    false => format!("{file}, {at}: {limit}, which this command cannot raise"),
+                    (false, _) => format!("{file}, {at}: {limit}, which this command cannot raise"),
                 }
             }
             // A file's own words stay as they are.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::channel::{AmplitudeSpectrum, Channel, Gathered, Measured};
 use crate::AnalysisError;
 use crate::extremes::Extremes;
+use crate::limits::{INSPECT_BYTES, check_memory};
 use crate::measurement::IN_MEMORY_SAMPLES;
 
 /// A column to show, and what is taken away from it.
@@ -114,6 +115,8 @@ pub fn measured(
     dt: Option<f64>,
     period: Option<usize>,
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
+    let held = window.hold.saturating_mul(shown.len());
+    check_memory(file.head().file(), held, INSPECT_BYTES, file.memory())?;
     // A text is read once for all columns; of what is held, a copy for each thread is enough.
     let at_once = if file.is_whole() { rayon::current_num_threads() } else { shown.len() };
     let table = file.head();

@@ -46,7 +46,8 @@ pub(super) fn open_one(
             available: available.join(", "),
         });
     };
-    Ok(RecordFile::of_table(file.tables(None, from_ref(chosen))?.swap_remove(0)))
+    let table = file.tables(None, from_ref(chosen))?.swap_remove(0);
+    Ok(RecordFile::of_table(table).with_memory(file.memory()))
 }
 
 /// Opens records that follow one another in a file, of which only the columns used are read, and once.
@@ -66,7 +67,8 @@ pub(crate) fn open_all(
     let tables = file.tables(Some(&wanted), records)?.into_iter().zip(records);
     let opened = tables.map(|(table, record)| {
         let reading = Reading { record_id: Some(record.id.clone()), ..reading.clone() };
-        Measurement::of_file(RecordFile::of_table(table), Some(path), channels, &reading)
+        let record = RecordFile::of_table(table).with_memory(file.memory());
+        Measurement::of_file(record, Some(path), channels, &reading)
     });
     Ok(opened.collect())
 }

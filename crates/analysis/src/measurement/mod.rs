@@ -10,7 +10,7 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_io::{RecordFile, Unit};
+use mechid_io::{Limits, RecordFile, Unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -24,6 +24,7 @@ use self::units::ToSi;
 pub(crate) use self::window::Hold;
 pub use self::window::{Window, Windowed};
 use crate::AnalysisError;
+use crate::limits::{PREDICT_BYTES, check_memory};
 
 /// Number of samples held in memory of a window of which not all samples are needed at once.
 pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
@@ -71,6 +72,8 @@ pub(crate) struct Source {
     /// Constant to subtract from each column used, in its own unit.
     pub offsets: Vec<f64>,
     pub units: ToSi,
+    /// Memory that work on the record may take, in bytes.
+    memory: usize,
     samples: Samples,
 }
 
@@ -169,6 +172,7 @@ impl Measurement {
             peaks: survey.peaks,
             offsets: offsets(reading.detrend, survey.means),
             units,
+            memory: file.memory(),
             samples: Samples::File(Box::new(file)),
         };
         Ok(Self { source: Arc::new(source), window: Window::default() })
@@ -253,6 +257,7 @@ impl Measurement {
             peaks: data.column_iter().map(|column| column.amax()).collect(),
             offsets: vec![0.0; roles.len()],
             units,
+            memory: Limits::DEFAULT.memory(size_of_val(data.as_slice())),
             samples: Samples::Memory(data),
         };
         Ok(Self { source: Arc::new(source), window: Window::default() })
@@ -345,6 +350,7 @@ impl Measurement {
     /// [`AnalysisError::Window`], and if the file cannot be read again.
     pub(crate) fn whole_block(&self) -> Result<Block, AnalysisError> {
         let (start, len) = self.span()?;
+        self.source.check_memory(len, PREDICT_BYTES)?;
         let mut whole = None;
         self.source.blocks(start..start + len, len, len, &mut |block| {
             whole = Some(self.source.sorted(&block, start + 1)?);
@@ -392,6 +398,13 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
 }
 
 impl Source {
+    /// Refuses work on so many samples of the columns used, of `bytes` bytes a number, that takes too
+    /// much memory.
+    pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
+        let numbers = samples.saturating_mul(self.channels.roles().len());
+        check_memory(&self.name, numbers, bytes, self.memory)
+    }
+
     /// Passes the samples `window` of the columns used on in blocks of `rows` rows (samples ×
     /// columns, SI units, offsets subtracted), each beginning `advance` rows after the one before;
     /// the last may be shorter.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::many;
 use super::{Channels, Measurement, Window};
 use crate::AnalysisError;
+use crate::limits::memory_bytes;
 
 /// Settings for reading a record file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -30,6 +31,10 @@ pub struct Reading {
     /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
     /// `None`: 1.
     pub limits_factor: Option<usize>,
+    /// Memory that the numbers of a file and the work on them may take, in GB; `None`: 0.27 GB and 512
+    /// bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_gb: Option<f64>,
 }
 
 /// Constant to subtract from a channel.
@@ -64,7 +69,11 @@ impl Reading {
     }
 
     pub(super) fn limits(&self) -> Limits {
-        Limits::DEFAULT.times(self.limits_factor.unwrap_or(1))
+        let limits = Limits::DEFAULT.times(self.limits_factor.unwrap_or(1));
+        match memory_bytes(self) {
+            Some(bytes) => limits.with_memory(bytes),
+            None => limits,
+        }
     }
 
     /// Returns the time axis asked for, that of the file, or the time column found by its name.

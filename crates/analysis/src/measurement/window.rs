@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::channels::ABSENT;
 use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, Source};
 use crate::AnalysisError;
+use crate::limits::{STRETCH_BYTES, WHOLE_BYTES};
 
 /// Part of a record to use.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -78,6 +79,14 @@ impl Hold {
         };
         held.min(len)
     }
+
+    /// Bytes of memory for each number that is held.
+    fn bytes(self) -> usize {
+        match self {
+            Hold::Whole => WHOLE_BYTES,
+            Hold::Periods | Hold::Samples(_) => STRETCH_BYTES,
+        }
+    }
 }
 
 /// The window of a measurement, which can be gone through from beginning to end, however long it is.
@@ -105,6 +114,7 @@ impl Windowed {
         let (start, len) = measurement.span()?;
         let period = measurement.window_settings().period.unwrap_or(len);
         let samples = hold.samples(len, period);
+        source.check_memory(samples, hold.bytes())?;
         let mut first = None;
         source.blocks(start..start + samples, samples, samples, &mut |block| {
             first = Some(source.sorted(&block, start + 1)?);

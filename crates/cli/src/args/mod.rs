@@ -124,10 +124,14 @@ pub struct RecordArgs {
     /// Record to read of such a file, by its value in that column [default: the only one]
     #[arg(long, value_name = "ID", requires = "record_column")]
     pub record_id: Option<String>,
-    /// Factor by which to raise the limits on memory: 4 MiB a row of text, 65536 columns, 1 GiB of a
-    /// compressed file, 2^28 numbers held
+    /// Factor by which to raise all limits on a file: 4 MiB a row of text, 4 KiB a name, 65536 columns,
+    /// 1 GiB of a compressed file, 2^28 numbers held, and memory (--memory-gb)
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
     pub raise_limits: Option<usize>,
+    /// Memory that the numbers of a file and the work on them may take, in GB [default: 0.27 GB, and 512
+    /// bytes for each byte of the file; 8.6 GB at most]
+    #[arg(long, value_name = "GB", value_parser = positive)]
+    pub memory_gb: Option<f64>,
     /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
     /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
     /// column called time or t]
@@ -187,6 +191,7 @@ impl RecordArgs {
             record_column: self.record_column.clone(),
             record_id: self.record_id.clone(),
             limits_factor: self.raise_limits,
+            memory_gb: self.memory_gb,
         }
     }
 

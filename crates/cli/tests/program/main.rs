@@ -8,6 +8,7 @@ mod hammer;
 mod identification;
 mod info;
 mod large;
+mod limits;
 mod lines;
 mod modal;
 mod pictures;

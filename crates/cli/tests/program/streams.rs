@@ -69,6 +69,8 @@ fn a_reader_may_have_seen_enough() {
     let lines: Vec<&str> = text(&piped.stdout).lines().collect();
     assert_eq!((lines[0], lines.len()), ("time,force", 3));
     assert!(lines[1].starts_with("0.0,") && lines[2].starts_with("0.015625,"), "{lines:?}");
+    let closed = shell(folder.path(), &format!("{line} > /dev/null; exit ${{PIPESTATUS[0]}}"));
+    assert_eq!(closed.status.code(), Some(141), "{}", text(&closed.stderr));
 }
 
 /// Standard output may be a file, of which what stands in it already is kept.

@@ -1,0 +1,97 @@
+//! Files that promise more than they hold: a message within the limits of time and memory, in a process that
+//! the system itself holds to them.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
+
+/// Memory that the program gets, in kB: that which a file of 1 MB may take, with the program and its stacks.
+const MEMORY_KB: usize = 1_000_000;
+
+/// Time within which the program has to end. The tests run beside others, without optimisation.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Runs the program under the limits.
+fn limited(folder: &Path, arguments: &str) -> Output {
+    let begun = Instant::now();
+    let program = assert_cmd::cargo::cargo_bin("mechid");
+    let script = format!("ulimit -v {MEMORY_KB} && exec \"$0\" {arguments}");
+    let output = Command::new("sh")
+        .args(["-c", &script])
+        .arg(program)
+        .current_dir(folder)
+        .env("MALLOC_ARENA_MAX", "2")
+        .output()
+        .unwrap();
+    assert!(begun.elapsed() < PATIENCE, "{arguments}: {:?}", begun.elapsed());
+    output
+}
+
+/// Runs the program, which must refuse the file by the limit on memory and name the option.
+fn refused(folder: &Path, arguments: &str) {
+    let output = limited(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+    assert!(message.contains("--memory-gb"), "{arguments}: {message}");
+}
+
+/// A MATLAB file of one vector `v` of `len` zero bytes.
+fn matlab(len: u32) -> Vec<u8> {
+    let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
+    let words = [14, 56 + len.next_multiple_of(8), 6, 8, 9, 0, 5, 8, len, 1, 1, 1];
+    packed.write_all(&words.map(u32::to_le_bytes).concat()).unwrap();
+    packed.write_all(b"v\0\0\0\0\0\0\0").unwrap();
+    packed.write_all(&[2, len].map(u32::to_le_bytes).concat()).unwrap();
+    let zeros = vec![0; 1 << 20];
+    let mut left = len.next_multiple_of(8) as usize;
+    while left > 0 {
+        let some = left.min(zeros.len());
+        packed.write_all(&zeros[..some]).unwrap();
+        left -= some;
+    }
+    let packed = packed.finish().unwrap();
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, b' ');
+    file.extend(b"\x00\x01IM");
+    file.extend([15_u32, packed.len() as u32].map(u32::to_le_bytes).concat());
+    file.extend(packed);
+    file
+}
+
+#[test]
+fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
+    let home = tempfile::tempdir().unwrap();
+    // 250 million bytes, 2 GB as numbers.
+    let file = matlab(250_000_000);
+    assert!(file.len() < 300_000, "{}", file.len());
+    fs::write(home.path().join("a.mat"), file).unwrap();
+    refused(home.path(), "info a.mat");
+    refused(home.path(), "identify a.mat --force v --displacement v --sample-rate 1");
+    // What is read may still be too much to work on.
+    fs::write(home.path().join("b.mat"), matlab(12_000_000)).unwrap();
+    refused(home.path(), "info b.mat");
+    refused(home.path(), "predict b.mat --force v --system b.mat --sample-rate 1");
+    let allowed = limited(home.path(), "info b.mat --memory-gb 1 --quiet");
+    assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
+}
+
+#[test]
+fn a_text_that_repeats_itself_in_gzip_is_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let mut member = GzEncoder::new(Vec::new(), Compression::best());
+    let rows = "0.125,1\n".repeat(1 << 17);
+    (0..8).for_each(|_| member.write_all(rows.as_bytes()).unwrap());
+    let member = member.finish().unwrap();
+    let file = member.repeat((1 << 20) / member.len());
+    fs::write(home.path().join("a.csv.gz"), file).unwrap();
+    let output = limited(home.path(), "info a.csv.gz");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("the compressed data are longer than"), "{message}");
+}
