@@ -12,15 +12,17 @@ mod options;
 mod outcome;
 mod progress;
 mod repeat;
+mod worker;
 
 use std::ffi::OsString;
-use std::io::{ErrorKind, Write as _, stderr};
+use std::io::{Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
 use crate::commands::Cli;
 use crate::error::CliError;
+pub use crate::worker::set_worker_program;
 
 /// Exit code of every failure; the argument parser uses the same one.
 const FAILURE: u8 = 2;
@@ -41,6 +43,9 @@ const BROKEN_PIPE: u8 = 141;
 /// ```
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if let Some(code) = worker::work(&arguments) {
+        return code;
+    }
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(message) => {
@@ -56,9 +61,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(INCOMPLETE),
         // The reader has seen enough (`mechid … | head`).
-        Err(CliError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {
-            ExitCode::from(BROKEN_PIPE)
-        }
+        Err(error) if error.is_closed_output() => ExitCode::from(BROKEN_PIPE),
         Err(error) => {
             // A message that cannot be told changes nothing: the exit code stays.
             let command = arguments.get(1).and_then(|word| word.to_str()).unwrap_or_default();

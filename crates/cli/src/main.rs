@@ -3,6 +3,9 @@
 fn main() -> std::process::ExitCode {
     #[cfg(unix)]
     signals::watch();
+    if let Ok(program) = std::env::current_exe() {
+        mechid_cli::set_worker_program(program, &[]);
+    }
     mechid_cli::run(std::env::args_os())
 }
 

@@ -3,6 +3,8 @@
 //! | File | What it does |
 //! |---|---|
 //! | `part` | the unit of work: some records, whose rows become one file |
+//! | `rows` | the rows of records of a file |
+//! | `worker`, `serve`, `frames` | rows computed in processes of their own, which a record may end |
 //! | `table` | rows as columns of that file |
 //! | `trends` | the parameters of all records over their order or a number in their names |
 //! | `results` | the rows of all files, read back |
@@ -14,27 +16,34 @@
 
 mod changes;
 mod failures;
+mod frames;
 mod part;
 mod results;
+mod rows;
+mod serve;
 mod summary;
 mod table;
 mod trends;
+mod worker;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use mechid_io::{create_folder, files_of};
+use mechid_io::{create_folder, escaped, files_of, path_text, special_kind};
 use rayon::ThreadPoolBuilder;
 
 pub use self::changes::{ChangeKind, SIGNIFICANT};
 pub use self::failures::FailureCount;
 pub use self::part::{FleetRecord, Part, PartDone};
-pub use self::results::read_results;
+pub use self::results::{Results, read_results};
+pub use self::serve::serve;
 pub use self::summary::FleetSummary;
 pub use self::table::results_as_parquet;
 pub use self::trends::{OUTLIER, TrendAxis, TrendChange, TrendPoint, TrendSeries, Trends};
+pub use self::trends::{OUTLIER, TrendAxis, TrendPoint, TrendSeries, Trends};
+pub use self::worker::{Isolation, RECORD_MEMORY_GB, RECORD_SECONDS, Worker};
 use crate::{AnalysisError, SavedAnalysis};
 
 /// Number of records in a part unless it is said.
@@ -67,16 +76,19 @@ pub struct Fleet {
     analysis: SavedAnalysis,
     folder: PathBuf,
     parts: Vec<Part>,
+    left_out: Vec<String>,
 }
 
 impl Fleet {
     /// Divides records into parts of `records_per_part`, by rising path. A folder stands for the files in
     /// it, and a file with a [`Reading::record_column`](crate::measurement::Reading::record_column) for
-    /// the records in it, in the order of its rows; a record named twice is taken once.
+    /// the records in it, in the order of its rows; a record named twice is taken once. Named pipes,
+    /// sockets and devices are left out.
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], [`AnalysisError::Setting`] for parts
-    /// without records, and [`AnalysisError::Io`] if a folder cannot be listed.
+    /// without records and for results in a folder of records, and [`AnalysisError::Io`] if a folder
+    /// cannot be listed.
     pub fn new(
         analysis: SavedAnalysis,
         records: &[PathBuf],
@@ -88,19 +100,29 @@ impl Fleet {
             let why = "a part has one record at least".into();
             return Err(AnalysisError::Setting { setting: "part_records", why });
         }
+        let folder = folder.as_ref();
         let mut files = Vec::new();
         for record in records {
+            refuse_results(record, folder)?;
             files.extend(files_of(record)?);
         }
         files.sort();
         files.dedup();
+        let mut left_out = Vec::new();
+        files.retain(|file| match special_kind(file) {
+            None => true,
+            Some(kind) => {
+                left_out.push(format!("{} ({kind})", escaped(&path_text(file))));
+                false
+            }
+        });
         if files.is_empty() {
             return Err(AnalysisError::NoRecord);
         }
         let records: Vec<FleetRecord> =
             files.into_iter().flat_map(|file| FleetRecord::of_file(file, &analysis)).collect();
         let parts = records.chunks(records_per_part).map(|some| Part::new(some, &analysis));
-        Ok(Self { folder: folder.as_ref().to_owned(), parts: parts.collect(), analysis })
+        Ok(Self { folder: folder.to_owned(), parts: parts.collect(), analysis, left_out })
     }
 
     /// Returns the parts.
@@ -111,6 +133,29 @@ impl Fleet {
     /// Returns the number of records.
     pub fn record_count(&self) -> usize {
         self.parts.iter().map(|part| part.records().len()).sum()
+    }
+
+    /// Returns the paths that can be no records, each with what it is.
+    pub fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+
+    /// Computes the parts that are missing, each record in a process that it may end, with `workers` of
+    /// them at a time, and calls `done` after each part.
+    ///
+    /// # Errors
+    /// Those of [`Fleet::run`] and [`Isolation::check`], and [`AnalysisError::RecordProcess`] if a process cannot be started.
+    pub fn run_isolated(
+        &self,
+        workers: usize,
+        isolation: &Isolation,
+        done: &(dyn Fn(&PartDone) + Sync),
+    ) -> Result<FleetSummary, AnalysisError> {
+        isolation.check()?;
+        self.run_by(workers, done, &|| {
+            let mut worker = Worker::new(isolation.clone(), self.analysis.clone())?;
+            Ok(Box::new(move |part: &Part| part.run_isolated(&mut worker, &self.folder)))
+        })
     }
 
     /// Computes the parts that are missing, with `workers` threads of one record each at a time, and
@@ -124,42 +169,70 @@ impl Fleet {
         workers: usize,
         done: &(dyn Fn(&PartDone) + Sync),
     ) -> Result<FleetSummary, AnalysisError> {
+        self.run_by(workers, done, &|| {
+            // A pool of one thread: an identification that divides its work does so within its worker.
+            let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| {
+                AnalysisError::Setting { setting: "workers", why: error.to_string() }
+            })?;
+            Ok(Box::new(move |part: &Part| pool.install(|| part.run(&self.analysis, &self.folder))))
+        })
+    }
+
+    /// Computes the parts that are missing, with `workers` threads, each with what `make` makes for it.
+    fn run_by<'a>(
+        &'a self,
+        workers: usize,
+        done: &(dyn Fn(&PartDone) + Sync),
+        make: &(dyn Fn() -> Result<Box<Compute<'a>>, AnalysisError> + Sync),
+    ) -> Result<FleetSummary, AnalysisError> {
         let begun = Instant::now();
         create_folder(&self.folder)?;
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::with_capacity(self.parts.len()));
         let failure = Mutex::new(None);
-        let work = || {
+        let work = || -> Result<(), AnalysisError> {
+            let mut compute = make()?;
             while let Some(part) = self.parts.get(next.fetch_add(1, Ordering::Relaxed)) {
-                match part.run(&self.analysis, &self.folder) {
-                    Ok(result) => {
-                        done(&result);
-                        results.lock().unwrap_or_else(PoisonError::into_inner).push(result);
-                    }
-                    Err(error) => {
+                let result = compute(part)?;
+                done(&result);
+                results.lock().unwrap_or_else(PoisonError::into_inner).push(result);
+            }
+            Ok(())
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..workers.clamp(1, self.parts.len()) {
+                scope.spawn(|| {
+                    if let Err(error) = work() {
                         next.store(self.parts.len(), Ordering::Relaxed);
                         *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                     }
-                }
-            }
-        };
-        // A pool of one thread each: an identification that divides its work does so within its worker.
-        let pools = (0..workers.clamp(1, self.parts.len()))
-            .map(|_| ThreadPoolBuilder::new().num_threads(1).build());
-        let pools = pools.collect::<Result<Vec<_>, _>>().map_err(|error| {
-            AnalysisError::Setting { setting: "workers", why: error.to_string() }
-        })?;
-        std::thread::scope(|scope| {
-            for pool in &pools {
-                scope.spawn(move || pool.install(work));
+                });
             }
         });
-        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Some(error) => Err(error),
-            None => {
-                let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-                FleetSummary::of(results, &self.folder, begun.elapsed().as_secs_f64())
-            }
+        if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            return Err(error);
         }
+        let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let elapsed_s = begun.elapsed().as_secs_f64();
+        let summary = FleetSummary::of(results, &self.folder, elapsed_s)?;
+        Ok(FleetSummary { left_out: self.left_out.clone(), ..summary })
     }
+}
+
+/// What a thread computes a part with.
+type Compute<'a> = dyn FnMut(&Part) -> Result<PartDone, AnalysisError> + 'a;
+
+/// Refuses a folder of results as a record, and as the folder of one: a later run would take the results
+/// for records.
+fn refuse_results(record: &Path, results: &Path) -> Result<(), AnalysisError> {
+    let Ok(results) = results.canonicalize() else { return Ok(()) };
+    let Ok(record) = record.canonicalize() else { return Ok(()) };
+    if record == results || record.parent() == Some(&results) {
+        let why = format!(
+            "the results would be written among the records, in {}: choose another folder",
+            escaped(&path_text(&results))
+        );
+        return Err(AnalysisError::Setting { setting: "output", why });
+    }
+    Ok(())
 }

@@ -6,16 +6,15 @@ use mechid_io::{FileStamp, RecordRows, read_parquet_metadata, write_parquet};
 use serde::{Deserialize, Serialize};
 
 use super::failures::FailureCount;
+use super::rows::rows_of;
 use super::table::columns;
+use super::worker::Worker;
 use crate::batch::settings::hash;
-use crate::measurement::{Measurement, open_all, records_of};
+use crate::measurement::records_of;
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
 /// Key in a part's file under which its [`PartDone`] stands.
 const DONE: &str = "mechid.part";
-
-/// Number of rows read at a time of a file that holds many records, unless one of them has more.
-const ROWS_AT_ONCE: usize = 1 << 20;
 
 /// A record to identify: a file, or some rows of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +47,10 @@ pub struct Part {
     records: Vec<FleetRecord>,
     file_name: String,
 }
+
+/// Callback that adds the rows of records of a file, all of it where no records are given.
+type ComputeRows<'a> =
+    dyn FnMut(&Path, &[RecordRows], &mut Vec<ResultRow>) -> Result<(), AnalysisError> + 'a;
 
 /// A part that has been computed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,22 +98,50 @@ impl Part {
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be written. What is wrong with a record is in its row.
     pub fn run(&self, analysis: &SavedAnalysis, folder: &Path) -> Result<PartDone, AnalysisError> {
+        self.written(folder, &mut |path, records, rows| {
+            rows_of(path, records, analysis, &mut |row| {
+                rows.push(row);
+                Ok(())
+            })
+        })
+    }
+
+    /// Computes the rows as [`Part::run`] does, in a process of their own.
+    ///
+    /// # Errors
+    /// Those of [`Part::run`]; [`AnalysisError::RecordProcess`] if the process cannot be started.
+    pub fn run_isolated(
+        &self,
+        worker: &mut Worker,
+        folder: &Path,
+    ) -> Result<PartDone, AnalysisError> {
+        self.written(folder, &mut |path, records, rows| {
+            rows.extend(worker.rows(path, records)?);
+            Ok(())
+        })
+    }
+
+    /// Writes the rows that `compute` adds for the records of each file.
+    fn written(
+        &self,
+        folder: &Path,
+        compute: &mut ComputeRows<'_>,
+    ) -> Result<PartDone, AnalysisError> {
         let path = folder.join(&self.file_name);
         if let Some(done) = self.done(&path) {
             return Ok(done);
         }
         let mut rows = Vec::with_capacity(self.records.len());
         for file in self.records.chunk_by(|a, b| a.path == b.path) {
-            let (path, name) = (&file[0].path, file[0].path.display().to_string());
-            let records: Vec<RecordRows> = file.iter().filter_map(|r| r.rows.clone()).collect();
-            if records.is_empty() {
-                rows.push(analysis.row(&name, || analysis.open(path)));
-            }
-            for together in read_together(&records) {
-                for (record, opened) in together.iter().zip(open(path, together, analysis)) {
-                    let row = analysis.row(&name, || opened);
-                    rows.push(ResultRow { record_id: Some(record.id.clone()), ..row });
+            let mut records = Vec::new();
+            for record in file {
+                match &record.rows {
+                    Some(some) => records.push(some.clone()),
+                    None => compute(&record.path, &[], &mut rows)?,
                 }
+            }
+            if !records.is_empty() {
+                compute(&file[0].path, &records, &mut rows)?;
             }
         }
         let done = PartDone {
@@ -132,38 +163,4 @@ impl Part {
         let (_, done) = pairs.iter().find(|(key, _)| key == DONE)?;
         serde_json::from_str(done).ok()
     }
-}
-
-/// Divides records of a file into those that are read together.
-fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> {
-    let mut rest = records;
-    std::iter::from_fn(move || {
-        let start = rest.first()?.rows.start;
-        let count =
-            rest.iter().take_while(|record| record.rows.end - start <= ROWS_AT_ONCE).count();
-        let (together, others) = rest.split_at(count.max(1));
-        rest = others;
-        Some(together)
-    })
-}
-
-/// Opens records of a file that follow one another; where their rows cannot be read together, one by one.
-fn open(
-    path: &Path,
-    records: &[RecordRows],
-    analysis: &SavedAnalysis,
-) -> Vec<Result<Measurement, AnalysisError>> {
-    let SavedAnalysis { channels, reading, window, .. } = analysis;
-    let opened = open_all(path, channels, reading, records);
-    let opened = match (opened, records) {
-        (Ok(opened), _) => opened,
-        (Err(error), [_]) => vec![Err(error)],
-        (Err(_), several) => {
-            return several
-                .iter()
-                .flat_map(|one| open(path, std::slice::from_ref(one), analysis))
-                .collect();
-        }
-    };
-    opened.into_iter().map(|opened| opened?.window(window.clone())).collect()
 }

@@ -1,41 +1,78 @@
 //! The table of results, read back as rows.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 
 use mechid_checks::Verdict;
 use mechid_io::{Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
+use mechid_estimate::checks::Verdict;
+use mechid_io::{FileStamp, Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
 
 use crate::batch::{FindingRow, ModeCell, ParameterCell, RowError};
 use crate::{AnalysisError, ResultRow};
 
-/// Reads the rows of all parts in a folder of results, by rising record, as they were written.
+/// Rows of results, each record once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Results {
+    /// The rows, by rising record.
+    pub rows: Vec<ResultRow>,
+    /// Number of older rows of the same records, in parts from before a record or the analysis changed.
+    pub superseded: usize,
+}
+
+/// Reads the rows of all parts in a folder of results, by rising record, as they were written. Of several rows
+/// of one record, the one in the part written last counts.
 ///
 /// # Errors
 /// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if it holds
 /// no row.
-pub fn read_results(folder: impl AsRef<Path>) -> Result<Vec<ResultRow>, AnalysisError> {
-    let mut rows = Vec::new();
+pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> {
+    let mut parts: Vec<(u128, PathBuf)> = Vec::new();
     for path in files_of(folder.as_ref())? {
         let is_part = path
             .file_name()
             .and_then(|name| name.to_str())
             .is_some_and(|name| name.starts_with("part-") && name.ends_with(".parquet"));
         if is_part {
-            let read = read_parquet_rows(&path, &Limits::DEFAULT)?.into_iter();
-            rows.extend(read.map(|cells| Cells(cells.into_iter().collect()).row()));
+            let written = FileStamp::of(&path).map_or(0, |stamp| stamp.modified_ns);
+            parts.push((written, path));
+        }
+    }
+    // The newest last, which replaces the rows before it.
+    parts.sort();
+    let (mut places, mut rows) = (HashMap::new(), Vec::<ResultRow>::new());
+    let mut superseded = 0;
+    for (_, path) in parts {
+        for cells in read_parquet_rows(&path, &Limits::DEFAULT)? {
+            let row = Cells::new(cells).row();
+            match places.entry((row.record.clone(), row.record_id.clone())) {
+                Entry::Occupied(place) => {
+                    rows[*place.get()] = row;
+                    superseded += 1;
+                }
+                Entry::Vacant(place) => {
+                    place.insert(rows.len());
+                    rows.push(row);
+                }
+            }
         }
     }
     // Stable: the records of one file stay in the order of its rows.
     rows.sort_by(|a, b| a.record.cmp(&b.record));
-    if rows.is_empty() { Err(AnalysisError::NoRecord) } else { Ok(rows) }
+    if rows.is_empty() { Err(AnalysisError::NoRecord) } else { Ok(Results { rows, superseded }) }
 }
 
 /// Cells of a row by the names of their columns.
-struct Cells(BTreeMap<String, ParquetCell>);
+pub(super) struct Cells(BTreeMap<String, ParquetCell>);
 
 impl Cells {
-    fn row(mut self) -> ResultRow {
+    pub fn new(cells: Vec<(String, ParquetCell)>) -> Self {
+        Self(cells.into_iter().collect())
+    }
+
+    /// Returns the row.
+    pub fn row(mut self) -> ResultRow {
         let error = self
             .text("error_code")
             .map(|code| RowError { code, message: self.text("error").unwrap_or_default() });

@@ -31,6 +31,8 @@ pub struct FleetSummary {
     /// Number of parts in the folder that are of other records, of another version of these, or of
     /// another analysis.
     pub other_parts: usize,
+    /// Paths that can be no records, each with what it is: named pipes, sockets, devices.
+    pub left_out: Vec<String>,
     /// Time of the run, in s.
     pub elapsed_s: f64,
 }
@@ -57,6 +59,7 @@ impl FleetSummary {
             computed_records: computed().map(|part| part.records).sum(),
             failures,
             other_parts,
+            left_out: Vec::new(),
             elapsed_s,
         })
     }
@@ -77,6 +80,9 @@ impl fmt::Display for FleetSummary {
             let FailureCount { code, records, record, message: why } = failure;
             let count = message::count(*records, "record");
             writeln!(f, "  {code}: {count}, such as {record} ({why})")?;
+        }
+        for path in &self.left_out {
+            writeln!(f, "  left out: {path}")?;
         }
         match self.computed_parts {
             0 => writeln!(f, "all parts were there, nothing was computed")?,

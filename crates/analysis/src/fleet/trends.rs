@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::changes::{self, Change, ChangeKind};
 use super::failures::FailureCount;
-use super::read_results;
+use super::results::{Results, read_results};
 use crate::text::{significant, text_table};
 use crate::{AnalysisError, ResultRow};
 
@@ -48,6 +48,8 @@ pub struct Trends {
     pub failed: usize,
     /// Failures by their code, the most frequent first.
     pub failures: Vec<FailureCount>,
+    /// Number of older rows left out, of records that a later part holds, too.
+    pub superseded: usize,
     /// Number of records left out because their names hold no number.
     pub without_number: usize,
     /// Number of analyses and versions that the rows come from; several are not comparable.
@@ -114,7 +116,8 @@ impl Trends {
     /// # Errors
     /// As [`read_results`].
     pub fn read(folder: impl AsRef<Path>, over: TrendAxis) -> Result<Self, AnalysisError> {
-        Ok(Self::of(&read_results(folder)?, over))
+        let Results { rows, superseded } = read_results(folder)?;
+        Ok(Self { superseded, ..Self::of(&rows, over) })
     }
 
     /// Gathers rows, in the order given.
@@ -169,6 +172,7 @@ impl Trends {
             records: rows.len(),
             failed: failures.iter().map(|count| count.records).sum(),
             failures,
+            superseded: 0,
             without_number,
             analyses: analyses.len(),
             series,
@@ -342,6 +346,13 @@ impl fmt::Display for Trends {
         for FailureCount { code, records, record, message: why } in &self.failures {
             let count = message::count(*records, "record");
             writeln!(f, "  {code}: {count}, such as {record} ({why})")?;
+        }
+        if self.superseded > 0 {
+            let count = message::count(self.superseded, "older row");
+            writeln!(
+                f,
+                "left out: {count} of the same records, from before they or the analysis changed"
+            )?;
         }
         if self.without_number > 0 {
             let count = message::count(self.without_number, "record");

@@ -254,7 +254,7 @@ fn a_folder_of_results_is_read_back_as_it_was_computed() {
     let home = tempfile::tempdir().unwrap();
     let (records, folder) = (records(&home), home.path().join("results"));
     run(&records, &folder, 2);
-    let rows = read_results(&folder).unwrap();
+    let rows = read_results(&folder).unwrap().rows;
     assert_eq!(rows.len(), 10);
     for row in &rows {
         assert_eq!(*row, analysis().row(&row.record, || analysis().open(&row.record)));

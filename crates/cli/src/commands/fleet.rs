@@ -1,5 +1,6 @@
 //! `mechid fleet`: the machines behind many records.
 
+use std::ffi::OsString;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -7,11 +8,14 @@ use std::thread::available_parallelism;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use mechid::SavedAnalysis;
-use mechid::analysis::fleet::{Fleet, RECORDS_PER_PART};
+use mechid::analysis::fleet::{
+    Fleet, Isolation, PartDone, RECORD_MEMORY_GB, RECORD_SECONDS, RECORDS_PER_PART,
+};
 
-use crate::args::{ReportArgs, at_least_one};
+use crate::args::{ReportArgs, at_least_one, positive};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
+use crate::worker::worker_program;
 
 /// Identify many records by one saved analysis, into a folder of Parquet files
 ///
@@ -20,6 +24,10 @@ use crate::outcome::{Files, Outcome};
 /// records, by rising path; a part is one file of the folder, complete or not there. Run again, the
 /// command computes what is missing: the parts that were not finished, and those in which a record,
 /// the analysis or the version of the program is another one.
+///
+/// Records are worked on in processes of their own. A record that takes too much memory or time, or that
+/// ends its process, becomes a row with its error, and the others go on. Named pipes, sockets and
+/// devices are left out.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Exit code 1 says that all records were gone through and some have no result.
@@ -45,6 +53,12 @@ pub struct FleetArgs {
     #[arg(long, value_name = "COUNT", default_value_t = RECORDS_PER_PART,
           value_parser = at_least_one)]
     part_records: usize,
+    /// Memory that a record may take, in GB, before its row becomes an error (on Linux)
+    #[arg(long, value_name = "GB", default_value_t = RECORD_MEMORY_GB, value_parser = positive)]
+    record_memory_gb: f64,
+    /// Time that a record may take, in s, before its row becomes an error
+    #[arg(long, value_name = "SECONDS", default_value_t = RECORD_SECONDS, value_parser = positive)]
+    record_seconds: f64,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -53,6 +67,14 @@ impl FleetArgs {
     /// Returns the files that the arguments name; the results have names of their own.
     pub fn files(&self) -> Files<'_> {
         Files::default().reads([&self.analysis]).reads(&self.records)
+    }
+
+    fn isolation(&self, (program, arguments): &(PathBuf, Vec<OsString>)) -> Isolation {
+        Isolation {
+            record_memory_gb: self.record_memory_gb,
+            record_seconds: self.record_seconds,
+            ..Isolation::new(program, arguments.clone())
+        }
     }
 
     /// Computes the parts that are missing, and tells what there is.
@@ -70,7 +92,11 @@ impl FleetArgs {
         bar.set_style(
             ProgressStyle::with_template(style).expect("the template is written correctly"),
         );
-        let summary = fleet.run(workers, &|part| bar.inc(part.records as u64));
+        let done = |part: &PartDone| bar.inc(part.records as u64);
+        let summary = match worker_program() {
+            Some(words) => fleet.run_isolated(workers, &self.isolation(words), &done),
+            None => fleet.run(workers, &done),
+        };
         bar.finish_and_clear();
         let summary = summary?;
         let outcome = Outcome::new(summary.to_string(), &summary)?;

@@ -44,9 +44,10 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
         program(home.path(), "trends out/results --output page.html --plot trends.svg --json");
     assert_eq!(trends.status.code(), Some(0), "{}", String::from_utf8_lossy(&trends.stderr));
     let trends: Value = serde_json::from_slice(&trends.stdout).unwrap();
-    // Both versions of the second part are in the folder.
-    assert_eq!((&trends["records"], &trends["failed"]), (&5.into(), &1.into()));
-    assert_eq!(trends["series"][0]["points"].as_array().unwrap().len(), 4);
+    // Both versions of the second part are in the folder; of its record the newer one counts.
+    assert_eq!((&trends["records"], &trends["failed"]), (&4.into(), &1.into()));
+    assert_eq!(trends["superseded"], 1);
+    assert_eq!(trends["series"][0]["points"].as_array().unwrap().len(), 3);
     let page = fs::read_to_string(home.path().join("page.html")).unwrap();
     assert!(
         page.contains("io.empty")
@@ -122,4 +123,104 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
         assert!(message.contains(expected), "{arguments}: {message}");
     }
     assert!(!home.path().join("a.parquet").exists());
+}
+
+/// A record that takes too much memory, one that takes too much time, a named pipe and a socket, beside one that is well:
+/// each record has its row, and the run ends.
+#[cfg(target_os = "linux")]
+#[test]
+fn records_that_end_their_process_become_rows() {
+    use std::io::Write as _;
+    use std::os::unix::net::UnixListener;
+    use std::process::Command;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    let home = tempfile::tempdir().unwrap();
+    let day = home.path().join("day");
+    fs::create_dir(&day).unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    fs::copy(rig, day.join("well.csv")).unwrap();
+    let packed = |text: &str| {
+        let mut member = GzEncoder::new(Vec::new(), Compression::best());
+        member.write_all(text.as_bytes()).unwrap();
+        member.finish().unwrap()
+    };
+    let header = packed("time,force,displacement\n");
+    // A minute of rows to read; and columns of which some rows take more memory than there is.
+    let rows = packed(&"0,1,2\n".repeat(1 << 20));
+    fs::write(day.join("slow.csv.gz"), [header, rows.repeat(400)].concat()).unwrap();
+    let wide = format!("{}\n", ["1"; 20_000].join(","));
+    let named = format!("time,force,displacement{}\n", ",x".repeat(20_000 - 3));
+    fs::write(day.join("large.csv.gz"), [packed(&named), packed(&wide).repeat(8000)].concat())
+        .unwrap();
+    assert!(Command::new("mkfifo").arg(day.join("pipe.csv")).status().unwrap().success());
+    let _socket = UnixListener::bind(day.join("socket.csv")).unwrap();
+    let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]},
+        "reading": {"limits_factor": 1000, "memory_gb": 100}, "window": {"period": 256}}"#;
+    fs::write(home.path().join("analysis.json"), analysis).unwrap();
+    let run = "fleet day --analysis analysis.json --output results --json --part-records 2 \
+               --record-memory-gb 0.7 --record-seconds 4";
+    let done = program(home.path(), run);
+    assert_eq!(done.status.code(), Some(1), "{}", String::from_utf8_lossy(&done.stderr));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!((&report["records"], &report["failed"]), (&3.into(), &2.into()), "{report}");
+    let code_of = |record: &str| {
+        let mut failures = report["failures"].as_array().unwrap().iter();
+        let failure = failures.find(|f| f["record"].as_str().unwrap().contains(record));
+        failure.unwrap_or_else(|| panic!("{report}"))["code"].clone()
+    };
+    assert_eq!(code_of("large"), "analysis.record-memory");
+    assert_eq!(code_of("slow"), "analysis.record-time");
+    let left_out = report["left_out"].to_string();
+    assert!(left_out.contains("pipe.csv (a named pipe)"), "{left_out}");
+    assert!(left_out.contains("socket.csv (a socket)"), "{left_out}");
+    // The rows stand: nothing is tried again.
+    let again: Value = serde_json::from_slice(&program(home.path(), run).stdout).unwrap();
+    assert_eq!((&again["computed_records"], &again["failed"]), (&0.into(), &2.into()));
+}
+
+#[test]
+fn results_among_the_records_are_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let day = home.path().join("day");
+    fs::create_dir(&day).unwrap();
+    fs::write(day.join("a.csv"), "").unwrap();
+    let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]}}"#;
+    fs::write(home.path().join("analysis.json"), analysis).unwrap();
+    for records in ["day", "day/a.csv"] {
+        let run = format!("fleet {records} --analysis analysis.json --output day/../day");
+        let refused = program(home.path(), &run);
+        assert_eq!(refused.status.code(), Some(2));
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(message.contains("among the records"), "{message}");
+    }
+    assert_eq!(fs::read_dir(&day).unwrap().count(), 1);
+}
+
+/// Names that differ in bytes that are no UTF-8 are different records.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_without_a_text_stay_apart() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let home = tempfile::tempdir().unwrap();
+    let day = home.path().join("day");
+    fs::create_dir(&day).unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    for name in [b"a\xff.csv", b"a\xfe.csv"] {
+        fs::copy(&rig, day.join(OsStr::from_bytes(name))).unwrap();
+    }
+    let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]},
+        "window": {"period": 256}}"#;
+    fs::write(home.path().join("analysis.json"), analysis).unwrap();
+    let done = program(home.path(), "fleet day --analysis analysis.json --output results");
+    assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    let trends: Value =
+        serde_json::from_slice(&program(home.path(), "trends results --json").stdout).unwrap();
+    let points = trends["series"][0]["points"].as_array().unwrap();
+    let names: Vec<&str> = points.iter().map(|point| point["record"].as_str().unwrap()).collect();
+    assert_eq!(names, [r"day/a\xfe.csv", r"day/a\xff.csv"]);
 }

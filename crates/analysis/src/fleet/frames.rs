@@ -1,0 +1,53 @@
+//! Messages between a fleet and the processes that work for it: a length of four bytes, the lowest
+//! first, and so many bytes.
+
+use std::io::{self, ErrorKind, Read, Write};
+
+/// Maximum number of bytes of a message; the row of a record takes some thousand.
+const LONGEST: usize = 1 << 28;
+
+/// Writes a message.
+pub fn write(into: &mut impl Write, message: &[u8]) -> io::Result<()> {
+    let len = u32::try_from(message.len()).map_err(io::Error::other)?;
+    into.write_all(&len.to_le_bytes())?;
+    into.write_all(message)?;
+    into.flush()
+}
+
+/// Reads a message; `None` at the end.
+pub fn read(from: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
+    let mut len = [0; 4];
+    match from.read_exact(&mut len) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        Err(error) => return Err(error),
+    }
+    let len = u32::from_le_bytes(len) as usize;
+    if len > LONGEST {
+        return Err(io::Error::other("a message is too long"));
+    }
+    let mut message = vec![0; len];
+    from.read_exact(&mut message)?;
+    Ok(Some(message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_come_as_they_were_written() {
+        let mut pipe = Vec::new();
+        for message in [&b"abc"[..], b"", b"\0\x01"] {
+            write(&mut pipe, message).unwrap();
+        }
+        let mut rest = pipe.as_slice();
+        assert_eq!(read(&mut rest).unwrap().unwrap(), b"abc");
+        assert_eq!(read(&mut rest).unwrap().unwrap(), b"");
+        assert_eq!(read(&mut rest).unwrap().unwrap(), b"\0\x01");
+        assert_eq!(read(&mut rest).unwrap(), None);
+        // Cut off within a message, and a length that nothing has.
+        assert!(read(&mut &pipe[..6]).is_err());
+        assert!(read(&mut &[0xff; 8][..]).is_err());
+    }
+}

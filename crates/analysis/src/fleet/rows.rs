@@ -1,0 +1,69 @@
+//! The rows of records of a file, one after the other.
+
+use std::path::Path;
+
+use mechid_io::{RecordRows, path_text};
+
+use crate::measurement::{Measurement, open_all};
+use crate::{AnalysisError, ResultRow, SavedAnalysis};
+
+/// Number of rows read at a time of a file that holds many records, unless one of them has more.
+const ROWS_AT_ONCE: usize = 1 << 20;
+
+/// Identifies records of a file, all of it where `records` is empty, and passes their rows to `take` in
+/// their order.
+///
+/// # Errors
+/// Those of `take`. What is wrong with a record is in its row.
+pub(super) fn rows_of<E>(
+    path: &Path,
+    records: &[RecordRows],
+    analysis: &SavedAnalysis,
+    take: &mut dyn FnMut(ResultRow) -> Result<(), E>,
+) -> Result<(), E> {
+    let name = path_text(path);
+    if records.is_empty() {
+        return take(analysis.row(&name, || analysis.open(path)));
+    }
+    for together in read_together(records) {
+        for (record, opened) in together.iter().zip(open(path, together, analysis)) {
+            let row = analysis.row(&name, || opened);
+            take(ResultRow { record_id: Some(record.id.clone()), ..row })?;
+        }
+    }
+    Ok(())
+}
+
+/// Divides records of a file into those that are read together.
+fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> {
+    let mut rest = records;
+    std::iter::from_fn(move || {
+        let start = rest.first()?.rows.start;
+        let count =
+            rest.iter().take_while(|record| record.rows.end - start <= ROWS_AT_ONCE).count();
+        let (together, others) = rest.split_at(count.max(1));
+        rest = others;
+        Some(together)
+    })
+}
+
+/// Opens records of a file that follow one another; where their rows cannot be read together, one by one.
+fn open(
+    path: &Path,
+    records: &[RecordRows],
+    analysis: &SavedAnalysis,
+) -> Vec<Result<Measurement, AnalysisError>> {
+    let SavedAnalysis { channels, reading, window, .. } = analysis;
+    let opened = open_all(path, channels, reading, records);
+    let opened = match (opened, records) {
+        (Ok(opened), _) => opened,
+        (Err(error), [_]) => vec![Err(error)],
+        (Err(_), several) => {
+            return several
+                .iter()
+                .flat_map(|one| open(path, std::slice::from_ref(one), analysis))
+                .collect();
+        }
+    };
+    opened.into_iter().map(|opened| opened?.window(window.clone())).collect()
+}

@@ -1,0 +1,260 @@
+//! Processes that work for a fleet, so that a record that exhausts memory, aborts or hangs ends only its
+//! own.
+
+use std::ffi::OsString;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::slice::from_ref;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use mechid_io::{Limits, RecordRows, parse_parquet_rows, path_text};
+
+use super::frames;
+use super::results::Cells;
+use super::serve::{Order, Task};
+use crate::{AnalysisError, ResultRow, SavedAnalysis};
+
+/// Memory that a record may take unless it is said, in GB.
+pub const RECORD_MEMORY_GB: f64 = 8.0;
+
+/// Time that a record may take unless it is said, in s.
+pub const RECORD_SECONDS: f64 = 600.0;
+
+/// Maximum number of bytes of what a process says on its error stream that are kept.
+const LONGEST_MESSAGE: u64 = 4096;
+
+/// Time that a process has to end after its output, and between two looks at it.
+const FAREWELL: Duration = Duration::from_secs(5);
+const POLL: Duration = Duration::from_millis(5);
+
+/// Words with which an allocation that fails ends a process.
+const OUT_OF_MEMORY: &str = "memory allocation of";
+
+/// How records are kept apart: the program that identifies them, and what each may take.
+///
+/// The program reads its orders from standard input and ends with [`serve`](super::serve).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Isolation {
+    /// The program.
+    pub program: PathBuf,
+    /// Its arguments.
+    pub arguments: Vec<OsString>,
+    /// Memory that a record may take, in GB, with what the program itself takes; Linux alone limits it.
+    pub record_memory_gb: f64,
+    /// Time that a record may take, in s.
+    pub record_seconds: f64,
+}
+
+impl Isolation {
+    /// Creates the isolation by a program, with the limits [`RECORD_MEMORY_GB`] and [`RECORD_SECONDS`].
+    pub fn new(program: impl Into<PathBuf>, arguments: Vec<OsString>) -> Self {
+        Self {
+            program: program.into(),
+            arguments,
+            record_memory_gb: RECORD_MEMORY_GB,
+            record_seconds: RECORD_SECONDS,
+        }
+    }
+
+    /// Checks the limits.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] for a limit that is not positive and finite.
+    pub fn check(&self) -> Result<(), AnalysisError> {
+        let limits =
+            [("record_memory_gb", self.record_memory_gb), ("record_seconds", self.record_seconds)];
+        for (setting, limit) in limits {
+            if !(limit > 0.0 && limit.is_finite()) {
+                let why = format!("a positive, finite number is needed, got {limit}");
+                return Err(AnalysisError::Setting { setting, why });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Somebody who identifies records in a process, and starts another one where a record ended it.
+#[derive(Debug)]
+pub struct Worker {
+    isolation: Isolation,
+    analysis: SavedAnalysis,
+    running: Option<Running>,
+}
+
+/// A process at work.
+#[derive(Debug)]
+struct Running {
+    child: Child,
+    orders: Option<ChildStdin>,
+    rows: Receiver<Vec<u8>>,
+    /// What the process says on its error stream.
+    said: JoinHandle<String>,
+}
+
+impl Worker {
+    /// Creates a worker without a process yet.
+    ///
+    /// # Errors
+    /// Those of [`Isolation::check`].
+    pub fn new(isolation: Isolation, analysis: SavedAnalysis) -> Result<Self, AnalysisError> {
+        isolation.check()?;
+        Ok(Self { isolation, analysis, running: None })
+    }
+
+    /// Returns the rows of records of a file, all of it if there are none, in their order.
+    ///
+    /// A process that ends while it reads several records together is started again for each of them: the
+    /// row of a record is an error only where the record alone ends the process.
+    ///
+    /// # Errors
+    /// [`AnalysisError::RecordProcess`] if no process can be started.
+    pub(super) fn rows(
+        &mut self,
+        path: &Path,
+        records: &[RecordRows],
+    ) -> Result<Vec<ResultRow>, AnalysisError> {
+        let mut rows = Vec::with_capacity(records.len().max(1));
+        if records.len() > 1 {
+            self.ask(path, records, &mut rows)?;
+        }
+        // A whole file has one row.
+        for at in rows.len()..records.len().max(1) {
+            let alone = records.get(at).map(from_ref).unwrap_or_default();
+            if let Some(why) = self.ask(path, alone, &mut rows)? {
+                let failed = || Err(why);
+                let row = self.analysis.row(&path_text(path), failed);
+                let record_id = alone.first().map(|record| record.id.clone());
+                rows.push(ResultRow { record_id, ..row });
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Has records identified; returns why not all of them were.
+    fn ask(
+        &mut self,
+        path: &Path,
+        records: &[RecordRows],
+        rows: &mut Vec<ResultRow>,
+    ) -> Result<Option<AnalysisError>, AnalysisError> {
+        let order = serde_json::to_vec(&Order::new(path, records)).unwrap_or_default();
+        let mut running = match self.running.take() {
+            Some(running) => running,
+            None => self.start()?,
+        };
+        let patience = Duration::try_from_secs_f64(self.isolation.record_seconds);
+        let patience = patience.unwrap_or(Duration::MAX);
+        // Where the process has ended, the answer says so.
+        if let Some(orders) = &mut running.orders {
+            let _ = frames::write(orders, &order);
+        }
+        for _ in 0..records.len().max(1) {
+            let received = running.rows.recv_timeout(patience);
+            match received.map(row_of) {
+                Ok(Some(row)) => rows.push(row),
+                Err(RecvTimeoutError::Timeout) => {
+                    drop(running.end());
+                    let seconds = self.isolation.record_seconds;
+                    return Ok(Some(AnalysisError::RecordTime { seconds }));
+                }
+                Ok(None) => {
+                    drop(running.end());
+                    let how = "it sent something else than a row".into();
+                    return Ok(Some(AnalysisError::RecordProcess { how }));
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Ok(Some(running.cause_of_end(self.isolation.record_memory_gb)));
+                }
+            }
+        }
+        self.running = Some(running);
+        Ok(None)
+    }
+
+    fn start(&self) -> Result<Running, AnalysisError> {
+        let Isolation { program, arguments, record_memory_gb, .. } = &self.isolation;
+        let failed = |error: io::Error| AnalysisError::RecordProcess {
+            how: format!("{} cannot be started: {error}", path_text(program)),
+        };
+        let mut command = Command::new(program);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        // Every arena of the allocator would reserve addresses, which count as memory.
+        command.env("MALLOC_ARENA_MAX", "2");
+        #[cfg(unix)]
+        {
+            use std::os::unix::process::CommandExt as _;
+
+            // Ctrl-C ends the fleet; its processes end with it, and no record looks as if it had.
+            command.process_group(0);
+        }
+        let mut child = command.spawn().map_err(failed)?;
+        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(mut orders), Some(mut output), Some(errors)) = pipes else {
+            return Err(failed(io::ErrorKind::BrokenPipe.into()));
+        };
+        let (sender, rows) = channel();
+        thread::spawn(move || {
+            while let Ok(Some(row)) = frames::read(&mut output) {
+                if sender.send(row).is_err() {
+                    return;
+                }
+            }
+        });
+        let said = thread::spawn(move || {
+            let (mut said, mut errors) = (Vec::new(), errors);
+            let _ = errors.by_ref().take(LONGEST_MESSAGE).read_to_end(&mut said);
+            // The rest is read, too, for a full pipe would stop the process.
+            let _ = io::copy(&mut errors, &mut io::sink());
+            String::from_utf8_lossy(&said).into_owned()
+        });
+        // Saturates where no address space is as large.
+        let memory_bytes = Some((record_memory_gb * 1e9) as u64);
+        let task = Task { analysis: self.analysis.clone(), memory_bytes };
+        let _ = frames::write(&mut orders, &serde_json::to_vec(&task).unwrap_or_default());
+        Ok(Running { child, orders: Some(orders), rows, said })
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        if let Some(running) = self.running.take() {
+            drop(running.end());
+        }
+    }
+}
+
+impl Running {
+    /// Ends the process; returns how it ended, and what it said.
+    fn end(mut self) -> (io::Result<ExitStatus>, String) {
+        let _ = self.child.kill();
+        let status = self.child.wait();
+        (status, self.said.join().unwrap_or_default())
+    }
+
+    /// Returns why a process, which may take `memory_gb` GB of memory, has ended by itself.
+    fn cause_of_end(mut self, memory_gb: f64) -> AnalysisError {
+        // Its output has ended, and it with it or soon after.
+        self.orders = None;
+        let begun = Instant::now();
+        while matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < FAREWELL {
+            thread::sleep(POLL);
+        }
+        let (status, said) = self.end();
+        if said.contains(OUT_OF_MEMORY) {
+            return AnalysisError::RecordMemory { gb: memory_gb };
+        }
+        let status = status.map_or_else(|error| error.to_string(), |status| status.to_string());
+        let said = said.lines().next_back().unwrap_or_default();
+        let how = if said.is_empty() { status } else { format!("{status}: {said}") };
+        AnalysisError::RecordProcess { how }
+    }
+}
+
+/// Reads a row that a process has sent; `None` if it is none.
+fn row_of(bytes: Vec<u8>) -> Option<ResultRow> {
+    let mut rows = parse_parquet_rows("a row", bytes, &Limits::DEFAULT).ok()?;
+    Some(Cells::new(rows.pop()?).row())
+}
