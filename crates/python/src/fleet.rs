@@ -1,10 +1,11 @@
 //! Many records by one saved analysis: one part at a time, and the summary of all.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use mechid::SavedAnalysis;
 use mechid::analysis::fleet::{
-    Fleet, FleetRecord, FleetSummary, Part, PartDone, results_as_parquet,
+    Fleet, FleetRecord, FleetSummary, Isolation, Part, PartDone, Worker, results_as_parquet,
 };
 use mechid::io::{RecordRows, Table, create_folder};
 use numpy::PyReadonlyArray1;
@@ -13,13 +14,17 @@ use pyo3::types::PyBytes;
 
 use crate::{failure, work};
 
+/// Arguments with which the interpreter works for a fleet.
+const WORKER: [&str; 3] = ["-m", "mechid", "fleet-worker"];
+
 /// A record of a fleet: its file and, of a file of many records, its name and its rows (from, to).
 type Place = (PathBuf, Option<(String, usize, usize)>);
 
 /// Values with their names.
 type Named<T> = Vec<(String, T)>;
 
-/// Checks an analysis (JSON), creates the folder of results, and returns the records of each part.
+/// Checks an analysis (JSON), creates the folder of results, and returns the records of each part, and the paths
+/// that are left out.
 #[pyfunction]
 pub fn fleet_begin(
     py: Python<'_>,
@@ -27,7 +32,7 @@ pub fn fleet_begin(
     analysis: &str,
     folder: PathBuf,
     part_records: usize,
-) -> PyResult<Vec<Vec<Place>>> {
+) -> PyResult<(Vec<Vec<Place>>, Vec<String>)> {
     let analysis: SavedAnalysis = failure::settings(py, analysis)?;
     let fleet = work::brief(py, || Fleet::new(analysis, &records, &folder, part_records))?;
     work::brief(py, || create_folder(folder))?;
@@ -36,17 +41,28 @@ pub fn fleet_begin(
             rows.as_ref().map(|record| (record.id.clone(), record.rows.start, record.rows.end));
         (path.clone(), rows)
     };
-    Ok(fleet.parts().iter().map(|part| part.records().iter().map(place).collect()).collect())
+    let parts = fleet.parts().iter().map(|part| part.records().iter().map(place).collect());
+    Ok((parts.collect(), fleet.left_out().to_vec()))
+}
+
+/// Checks an analysis (JSON); returns the column that tells the records of a file apart.
+#[pyfunction]
+pub fn fleet_record_column(py: Python<'_>, analysis: &str) -> PyResult<Option<String>> {
+    let analysis: SavedAnalysis = failure::settings(py, analysis)?;
+    Ok(analysis.reading.record_column)
 }
 
 /// Computes the rows of some records unless they are there; returns what was done as JSON. The analysis
-/// is JSON, too.
+/// is JSON, too. `isolation` is the interpreter of the processes that work on the records, and the memory, in
+/// GB, and the time, in s, that a record may take; without, they are worked on in this process.
 #[pyfunction]
+#[pyo3(signature = (records, analysis, folder, isolation))]
 pub fn fleet_part(
     py: Python<'_>,
     records: Vec<Place>,
     analysis: &str,
     folder: PathBuf,
+    isolation: Option<(PathBuf, f64, f64)>,
 ) -> PyResult<String> {
     let record = |(path, rows): Place| FleetRecord {
         path,
@@ -54,13 +70,18 @@ pub fn fleet_part(
     };
     let records: Vec<FleetRecord> = records.into_iter().map(record).collect();
     let analysis: SavedAnalysis = failure::settings(py, analysis)?;
+    let compute = move || {
+        let part = Part::new(&records, &analysis);
+        let Some((python, record_memory_gb, record_seconds)) = isolation else {
+            return part.run(&analysis, &folder);
+        };
+        let words = WORKER.map(OsString::from).to_vec();
+        let isolation =
+            Isolation { record_memory_gb, record_seconds, ..Isolation::new(python, words) };
+        part.run_isolated(&mut Worker::new(isolation, analysis)?, &folder)
+    };
     // One thread: the engine above decides how many parts there are at a time.
-    let done = work::watched(
-        py,
-        Some(1),
-        || Ok(()),
-        move || Part::new(&records, &analysis).run(&analysis, &folder),
-    )?;
+    let done = work::watched(py, Some(1), || Ok(()), compute)?;
     failure::json(py, &done)
 }
 
@@ -98,11 +119,13 @@ pub fn fleet_rows<'py>(
 pub fn fleet_summary(
     py: Python<'_>,
     parts: Vec<String>,
+    left_out: Vec<String>,
     folder: PathBuf,
     elapsed_s: f64,
 ) -> PyResult<(String, String)> {
     let parts = parts.iter().map(|part| failure::settings::<PartDone>(py, part));
     let parts = parts.collect::<PyResult<Vec<_>>>()?;
     let summary = work::brief(py, || FleetSummary::of(parts, &folder, elapsed_s))?;
+    let summary = FleetSummary { left_out, ..summary };
     Ok((summary.to_string(), failure::json(py, &summary)?))
 }

@@ -32,7 +32,7 @@ mod _mechid {
     #[pymodule_export]
     use super::bearing::{bearing, bearing_of_responses};
     #[pymodule_export]
-    use super::fleet::{fleet_begin, fleet_part, fleet_rows, fleet_summary};
+    use super::fleet::{fleet_begin, fleet_part, fleet_record_column, fleet_rows, fleet_summary};
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]

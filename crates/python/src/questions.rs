@@ -1,17 +1,18 @@
 //! The questions whose answers are told and drawn: frequency responses, free decays, sweeps, inspection.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mechid::analysis::sweep::{SweepSettings, sweep_record};
 use mechid::analysis::{InspectSettings, RecordPlan};
-use mechid::io::Experiment;
 use mechid::{DecaySettings, FrfSettings};
 use pyo3::prelude::*;
 
 use crate::answer::Answer;
 use crate::machine::Machine;
 use crate::measurement::Measurement;
+use crate::simulated::described;
 use crate::{failure, work};
 
 /// Estimates frequency responses, averaged over all records; settings are JSON.
@@ -52,14 +53,14 @@ pub fn inspect(py: Python<'_>, plan: &str, settings: &str) -> PyResult<Answer> {
     work::watched(py, None, || Ok(()), look).map(Answer::of)
 }
 
-/// Identifies a record, or a described experiment (its name and JSON), at many sampling steps, and
+/// Identifies a record, or a described experiment (a JSON file, or a name and a JSON text), at many sampling steps, and
 /// calls `progress` with the number of steps done.
 #[pyfunction]
 #[pyo3(signature = (record, experiment, settings, reference, progress, threads))]
 pub fn sweep(
     py: Python<'_>,
     record: Option<PyRef<'_, Measurement>>,
-    experiment: (&str, &str),
+    experiment: Option<(PathBuf, Option<String>)>,
     settings: &str,
     reference: Option<PyRef<'_, Machine>>,
     progress: Option<Py<PyAny>>,
@@ -82,16 +83,16 @@ pub fn sweep(
             _ => Ok(()),
         }
     };
-    let answer = match record {
-        Some(record) => {
+    let answer = match (record, experiment) {
+        (Some(record), _) => {
             let record = record.0.clone();
             let reference = reference.map(|machine| machine.0.system().clone());
             let find = move || sweep_record(&record, &how, reference.as_ref(), &step);
             work::watched(py, threads, tell, find)?
         }
-        None => {
-            let (name, text) = experiment;
-            let experiment = work::brief(py, || Experiment::parse(name, text))?;
+        (None, experiment) => {
+            let (file, text) = experiment.unwrap_or_default();
+            let experiment = work::brief(py, || described(&file, text.as_deref()))?;
             work::watched(py, threads, tell, move || mechid::sweep(&experiment, &how, &step))?
         }
     };

@@ -1,10 +1,12 @@
 //! Responses: of a described experiment, of a machine to a force by a scheme, and exactly between
 //! samples; and excitations.
 
+use std::path::{Path, PathBuf};
+
 use mechid::SimulateError;
 use mechid::estimate::EstimateError;
 use mechid::excitation::{ExcitationDesign, ExcitationLevel};
-use mechid::io::{Experiment, LineSpec};
+use mechid::io::{Experiment, IoError, LineSpec};
 use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity};
 use mechid::signal::{Extent, Phases, Record, Sampling, SignalError};
 use nalgebra::DVector;
@@ -22,10 +24,24 @@ type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py
 /// The force, and each kind of response.
 type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
 
-/// Simulates a described experiment: its name in messages, and its JSON.
+/// Reads a described experiment: a JSON file, from whose folder on it names other files, or a JSON text and
+/// its name in messages.
+pub fn described(file: &Path, text: Option<&str>) -> Result<Experiment, IoError> {
+    match text {
+        Some(text) => Experiment::parse(file.display().to_string(), text),
+        None => Experiment::read(file),
+    }
+}
+
+/// Simulates a described experiment: a JSON file, or a name and a JSON text.
 #[pyfunction]
-pub fn simulate<'py>(py: Python<'py>, name: &str, description: &str) -> PyResult<Simulated<'py>> {
-    let experiment = work::brief(py, || Experiment::parse(name, description))?;
+#[pyo3(signature = (file, text))]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    file: PathBuf,
+    text: Option<&str>,
+) -> PyResult<Simulated<'py>> {
+    let experiment = work::brief(py, || described(&file, text))?;
     let run = work::watched(py, None, || Ok(()), move || mechid::simulate(&experiment))?;
     let fs = run.force.sampling().rate_hz();
     let machine = run.system.dense().map(|s| Machine(mechid::Machine::known(s.clone())));

@@ -11,13 +11,14 @@ use pyo3::prelude::*;
 
 use crate::{failure, work};
 
-/// Simulates the runs of a study into a Parquet file: an experiment (its name in messages, and its JSON),
+/// Simulates the runs of a study into a Parquet file: an experiment (a JSON file, or a name and a JSON text),
 /// and so many seeds or the values of some fields. Returns the summary as text and as JSON.
 #[pyfunction]
+#[pyo3(signature = (file, text, runs, fields, out))]
 pub fn fleet_simulate(
     py: Python<'_>,
-    name: &str,
-    description: &str,
+    file: PathBuf,
+    text: Option<&str>,
     runs: Option<usize>,
     fields: Vec<(String, PyReadonlyArray1<'_, f64>)>,
     out: PathBuf,
@@ -27,7 +28,10 @@ pub fn fleet_simulate(
         Some(runs) => StudyRuns::Seeds(runs),
         None => StudyRuns::Table(Table::from_columns("the study", fields)),
     };
-    let study = work::brief(py, || ExperimentStudy::parse(name, description, &runs))?;
+    let study = work::brief(py, || match text {
+        Some(text) => ExperimentStudy::parse(file.display().to_string(), text, &runs),
+        None => ExperimentStudy::read(&file, &runs),
+    })?;
     let simulate = move || -> Result<_, SimulateError> {
         let (file, summary) = simulate_runs(&study, out, &mut |_| ())?;
         write_all(vec![file], &[])?;

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 import numpy as np
 
 from . import _mechid
+from ._errors import careful
 from ._records import (
     Measurement,
     RecordOptions,
@@ -37,6 +38,7 @@ from ._results import (
     Simulation,
     Sweep,
     description_of,
+    listed,
     machine_of,
     one,
 )
@@ -76,6 +78,7 @@ SweepEstimator: TypeAlias = Literal[
 Weight: TypeAlias = Literal["hann", "hamming", "blackman", "rectangular"]
 
 
+@careful
 def identify(
     *sources: object,
     method: Method | None = None,
@@ -236,6 +239,7 @@ def identify(
     return Identified(inner)
 
 
+@careful
 def identify_responses(
     *tables: str | os.PathLike[str] | ResponseTable,
     quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
@@ -307,6 +311,7 @@ def identify_responses(
     return IdentifiedResponses(inner)
 
 
+@careful
 def bearing(
     *tests: object,
     baseline: object = (),
@@ -420,6 +425,7 @@ def _response_tables(sources: Sequence[object]) -> list[_mechid.ResponseTable]:
     return [table._inner for table in read]
 
 
+@careful
 def frf(
     *sources: object,
     estimator: Estimator = "h1",
@@ -482,6 +488,7 @@ def frf(
     return FrequencyResponses(_mechid.frf(records, json.dumps(settings), threads))
 
 
+@careful
 def decay(
     *sources: object,
     from_s: float | None = None,
@@ -537,6 +544,7 @@ def decay(
     return Decayed(_mechid.decay(found._inner, json.dumps(settings), threads))
 
 
+@careful
 def reconstruct(
     machine: Machine | Identified | IdentifiedResponses | str | os.PathLike[str],
     *sources: object,
@@ -613,6 +621,7 @@ def reconstruct(
     return Reconstructed(inner)
 
 
+@careful
 def inspect(
     path: str | os.PathLike[str],
     *,
@@ -624,6 +633,7 @@ def inspect(
     detrend: Literal["none", "mean"] = "none",
     record_column: str | None = None,
     record_id: str | None = None,
+    memory_gb: float | None = None,
     **window: Unpack[Window],
 ) -> Inspected:
     """Tell what is in a record file: format, columns, sampling, levels, strongest lines, period.
@@ -636,7 +646,7 @@ def inspect(
         Columns to show, by name or number; every column that holds numbers only, without.
     curves : bool
         Whether to gather the curves that `Inspected.to_svg` draws.
-    fs, time, skip_lines, detrend, record_column, record_id, **window
+    fs, time, skip_lines, detrend, record_column, record_id, memory_gb, **window
         As in `Measurement.open`.
 
     Returns
@@ -648,12 +658,13 @@ def inspect(
     MechidError
         If the file cannot be read or has no such columns or samples.
     """
-    reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id)
+    reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
     plan = json.dumps(plan_of(path, {}, reading, window))
     settings = json.dumps({"columns": list(columns), "curves": curves})
     return Inspected(_mechid.inspect(plan, settings))
 
 
+@careful
 def sweep(
     *sources: object,
     npi: Sequence[float] | None = None,
@@ -727,11 +738,12 @@ def sweep(
             raise TypeError(f"`{name}` belongs to a record; the experiment described has its own")
         inner, compared = None, None
     found = _mechid.sweep(
-        inner, described or ("", ""), json.dumps(settings), compared, progress, threads
+        inner, described, json.dumps(settings), compared, progress, threads
     )
     return Sweep(found)
 
 
+@careful
 def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulation:
     """Simulate a described experiment: the record that it would give.
 
@@ -758,6 +770,7 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
     return Simulation(_mechid.simulate(*described))
 
 
+@careful
 def selected_modes(
     mass: Any,
     damping: Any,
@@ -795,11 +808,11 @@ def selected_modes(
     if near_hz is not None and not 0 < near_hz < float("inf"):
         raise ValueError(f"`near_hz` must be positive, got {near_hz}")
     matrices = {"mass": mass, "damping": damping, "stiffness": stiffness}
-    described = description_of({"system": matrices})
-    assert described is not None
-    return SelectedModes(_mechid.selected_modes(described[1], count, near_hz))
+    described = json.dumps({"system": matrices}, default=listed)
+    return SelectedModes(_mechid.selected_modes(described, count, near_hz))
 
 
+@careful
 def integrate(
     machine: Machine | Identified | IdentifiedResponses,
     force: ArrayLike,
@@ -868,6 +881,7 @@ def integrate(
     return MappingProxyType(dict(_mechid.integrate(json.dumps(described), forces, float(fs))))
 
 
+@careful
 def predict(
     machine: Machine | Identified | IdentifiedResponses,
     force: ArrayLike,
@@ -925,6 +939,7 @@ def predict(
     return MappingProxyType(dict(found))
 
 
+@careful
 def multisine(
     samples: int,
     fs: float,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from functools import cached_property, wraps
 from types import MappingProxyType
+from typing import ParamSpec, TypeVar
 
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -55,6 +56,32 @@ class MechidError(ValueError):
 
     def __reduce__(self) -> tuple[type[MechidError], tuple[str, str]]:
         return type(self), (str(self), self._variant)
+
+
+_Given = ParamSpec("_Given")
+_Answer = TypeVar("_Answer")
+
+
+def careful(door: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]:
+    """Return a function that raises `MechidError` where a number or a text does not fit.
+
+    The compiled half takes integers without a sign, and text that has a UTF-8 form; what is outside of
+    them would be an exception of the layer in between.
+    """
+
+    @wraps(door)
+    def call(*given: _Given.args, **named: _Given.kwargs) -> _Answer:
+        try:
+            return door(*given, **named)
+        except OverflowError as error:
+            message = f"a number is negative, or too large for what it counts: {error}"
+            raise MechidError(message, "Settings") from None
+        except UnicodeError as error:
+            raise MechidError(f"a text has no UTF-8 form: {error}", "Settings") from None
+        except RecursionError as error:
+            raise MechidError(f"settings are nested too deep: {error}", "Settings") from None
+
+    return call
 
 
 def _kebab(name: str) -> str:

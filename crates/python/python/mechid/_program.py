@@ -12,4 +12,4 @@ def main() -> int:
     """Run the program with the arguments of this process and return its exit code."""
     # Ctrl-C ends the program as it ends any other: nobody looks at Python's flag meanwhile.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return program(["mechid", *sys.argv[1:]])
+    return program(["mechid", *sys.argv[1:]], sys.executable or None)

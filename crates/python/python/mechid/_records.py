@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import (
@@ -23,6 +23,7 @@ from typing import (
 import numpy as np
 
 from . import _mechid
+from ._errors import careful
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -40,7 +41,12 @@ Names: TypeAlias = str | Sequence[str]
 """Columns, one per degree of freedom: names separated by commas, or a sequence of names."""
 
 _KINDS = ("force", "displacement", "velocity", "acceleration")
-_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id")
+_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id", "memory_gb")
+_NAME_BYTES = 4096
+"""Longest name of a column or record, in bytes."""
+
+_UNEVEN = 1e-3
+"""Largest deviation of a step between instants from their mean, as a part of it."""
 
 
 class Window(TypedDict, total=False):
@@ -63,8 +69,9 @@ class RecordOptions(Window, total=False):
     arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is the
     sampling rate in Hz, which arrays and tables need. Of files: ``time`` names the time column,
     ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
-    channel, ``record_column`` names the column that tells the records of a Parquet file apart, and
-    ``record_id`` the record by its value there.
+    channel, ``record_column`` names the column that tells the records of a Parquet file apart,
+    ``record_id`` the record by its value there, and ``memory_gb`` is the memory in GB that the numbers
+    and the work on them may take.
     """
 
     force: Names | ArrayLike
@@ -77,6 +84,7 @@ class RecordOptions(Window, total=False):
     detrend: Literal["none", "mean"]
     record_column: str | None
     record_id: str | None
+    memory_gb: float | None
 
 
 @final
@@ -93,6 +101,7 @@ class Measurement:
         self._inner = inner
 
     @classmethod
+    @careful
     def open(
         cls,
         path: str | os.PathLike[str],
@@ -107,6 +116,7 @@ class Measurement:
         detrend: Literal["none", "mean"] = "none",
         record_column: str | None = None,
         record_id: str | None = None,
+        memory_gb: float | None = None,
         **window: Unpack[Window],
     ) -> Measurement:
         """Open a record file: text, MATLAB or universal file, packed with gzip or not.
@@ -130,6 +140,9 @@ class Measurement:
             Column whose value names the record of each row, where a Parquet file holds many records.
         record_id : str, optional
             The record of such a file, by its value in that column; its only one, without.
+        memory_gb : float, optional
+            Memory that the numbers and the work on them may take, in GB; 0.27 GB and 512 bytes for each
+            byte of the file, without, and 8.6 GB at most.
         **window
             ``start``, ``period`` and ``periods``, as in `window`.
 
@@ -140,11 +153,12 @@ class Measurement:
         """
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         channels = {kind: _names(kind, given) for kind, given in columns.items()}
-        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id)
+        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
         plan = plan_of(path, channels, reading, window)
         return cls(_mechid.Measurement.open(json.dumps(plan)))
 
     @classmethod
+    @careful
     def from_arrays(
         cls,
         force: ArrayLike | None = None,
@@ -179,6 +193,7 @@ class Measurement:
         columns: list[NDArray[np.float64]] = []
         counts: list[int] = []
         arrays = (force, displacement, velocity, acceleration)
+        _same_labels(zip(_KINDS, arrays, strict=True))
         for kind, given in zip(_KINDS, arrays, strict=True):
             found = [] if given is None else _columns(kind, given)
             counts.append(len(found))
@@ -187,6 +202,7 @@ class Measurement:
         return cls._of(name, fs, list(zip(names, columns, strict=True)), channels, window)
 
     @classmethod
+    @careful
     def from_table(
         cls,
         table: Table | Sequence[Mapping[str, object]],
@@ -224,6 +240,11 @@ class Measurement:
         columns: list[tuple[str, NDArray[np.float64]]] = []
         given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         source = _Sep5(table) if isinstance(table, Sequence) else None
+        used = [name for names in given.values() for name in _names("columns", names) if name != "0"]
+        if source is None:
+            _same_labels((name, _column(table, name)) for name in used)
+        else:
+            source.check_starts(used)
         for kind, names in given.items():
             channels[kind] = []
             for column in _names(kind, names):
@@ -253,10 +274,14 @@ class Measurement:
         rate = _rate(fs)
         if rate is None:
             raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
+        for label in (name, *(column for column, _ in columns)):
+            if len(label.encode(errors="replace")) > _NAME_BYTES:
+                raise ValueError(f"a name is longer than {_NAME_BYTES} bytes: {label[:40]!r}…")
         return cls(
             _mechid.Measurement.from_columns(name, rate, columns, channels, _window_json(window))
         )
 
+    @careful
     def window(self, **window: Unpack[Window]) -> Measurement:
         """Return another window of the same record.
 
@@ -323,12 +348,18 @@ class _Sep5:
     """Channels in the form of the SDyPy enhancement proposal 5."""
 
     def __init__(self, channels: Sequence[Mapping[str, object]]) -> None:
+        for number, channel in enumerate(channels, 1):
+            for field in ("name", "data"):
+                if field not in channel:
+                    raise TypeError(f"channel {number} has no {field!r}, which SEP 5 channels have")
         self._channels = {str(channel["name"]): channel for channel in channels}
+        if len(self._channels) < len(channels):
+            raise ValueError("several channels have the same name")
 
     def __getitem__(self, name: str) -> ArrayLike:
         channel = self._channels.get(name)
         if channel is None:
-            raise _no_column(name, self._channels)
+            raise no_column(name, self._channels)
         values: ArrayLike = channel["data"]  # type: ignore[assignment]
         return values
 
@@ -336,13 +367,78 @@ class _Sep5:
         unit = self._channels.get(name, {}).get("unit_str")
         return f"{name} [{unit}]" if unit else name
 
+    def check_starts(self, names: Sequence[str]) -> None:
+        """Refuse channels that begin at different instants, by any field that says so."""
+        used = {name: self._channels[name] for name in names if name in self._channels}
+        for field in ("start_timestamp", "start_time", "timestamp", "time"):
+            starts = {name: _start(channel.get(field)) for name, channel in used.items()}
+            if len(set(starts.values())) > 1:
+                told = ", ".join(f"{name!r}: {start}" for name, start in starts.items())
+                raise ValueError(
+                    f"the channels begin at different instants ({field}: {told}): cut them to the same one"
+                )
+
     def fs(self, given: Mapping[str, Names]) -> float:
         names = [name for kind, names in given.items() for name in _names(kind, names)]
-        used = (self._channels[name] for name in names if name in self._channels)
-        rates = {float(channel["fs"]) for channel in used}  # type: ignore[arg-type]
-        if len(rates) != 1:
-            raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
-        return rates.pop()
+        rates = {name: self._rate(name) for name in names if name in self._channels}
+        if not rates:
+            raise TypeError("no column of the channels is named")
+        if len(set(rates.values())) != 1:
+            raise ValueError(
+                f"the channels have several sampling rates: {sorted(set(rates.values()))} Hz"
+            )
+        return next(iter(rates.values()))
+
+    def _rate(self, name: str) -> float:
+        channel = self._channels[name]
+        if channel.get("fs") is not None:
+            return _number("fs", channel["fs"])
+        time = channel.get("time")
+        if time is None:
+            raise TypeError(f"channel {name!r} has neither 'fs' nor 'time': give `fs`, in Hz")
+        instants = np.asarray(time, dtype=np.float64)
+        if instants.ndim != 1 or len(instants) < 2:
+            raise ValueError(f"'time' of channel {name!r} has fewer than two instants")
+        steps = np.diff(instants)
+        step = float(np.mean(steps))
+        if not step > 0 or np.abs(steps - step).max() > _UNEVEN * step:
+            raise ValueError(f"'time' of channel {name!r} has no even step: resample it")
+        return 1 / step
+
+
+def _start(value: object) -> str | None:
+    """Return the first of some instants, or the only one, as text; None where it is not known."""
+    if value is None:
+        return None
+    first = np.asarray(value).ravel()[:1]
+    return str(first[0]) if len(first) else None
+
+
+def _same_labels(arrays: Iterable[tuple[str, object]]) -> None:
+    """Refuse columns whose labels differ: their positions say nothing of what belongs together."""
+    known: tuple[str, Any] | None = None
+    for name, values in arrays:
+        labels = _labels(values)
+        if labels is None:
+            continue
+        if known is None:
+            known = name, labels
+        elif len(labels) != len(known[1]) or not labels.equals(known[1]):
+            raise ValueError(
+                f"{known[0]!r} and {name!r} have different indexes: align them first, or give their values "
+                "(`.to_numpy()`) if they go together by position"
+            )
+
+
+def _labels(values: object) -> Any:
+    """Return the labels of the samples: the index of pandas, or that of xarray; None where none are."""
+    index = getattr(values, "index", None)
+    if index is not None and hasattr(index, "equals"):
+        return index
+    indexes, dims = getattr(values, "indexes", None), getattr(values, "dims", None)
+    if isinstance(indexes, Mapping) and isinstance(dims, tuple) and dims:
+        return indexes.get(dims[0])
+    return None
 
 
 def measurements(
@@ -386,6 +482,7 @@ def reading_of(
     detrend: str,
     record_column: str | None,
     record_id: str | None,
+    memory_gb: float | None = None,
 ) -> dict[str, object]:
     """Return how a file is read."""
     return {
@@ -395,6 +492,7 @@ def reading_of(
         "detrend": detrend,
         "record_column": record_column,
         "record_id": record_id,
+        **({} if memory_gb is None else {"memory_gb": _number("memory_gb", memory_gb)}),
     }
 
 
@@ -498,6 +596,7 @@ class ResponseTable:
         )
 
     @classmethod
+    @careful
     def read(cls, path: str | os.PathLike[str]) -> ResponseTable:
         """Read a text or a universal file (dataset 58) of frequency responses.
 
@@ -577,6 +676,8 @@ def _count(name: str, value: object) -> int | None:
 
 
 def _index(name: str, value: object) -> int:
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"`{name}` is a whole number, got {value!r}")
     try:
         return value.__index__()  # type: ignore[attr-defined, no-any-return]
     except AttributeError:
@@ -584,7 +685,16 @@ def _index(name: str, value: object) -> int:
 
 
 def _rate(fs: float | None) -> float | None:
-    return None if fs is None else float(fs)
+    return None if fs is None else _number("fs", fs)
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, (bool, np.bool_, str, bytes)):
+        raise TypeError(f"`{name}` is a number, got {value!r}")
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"`{name}` is a number, got {value!r}") from None
 
 
 def _names(kind: str, given: object) -> list[str]:
@@ -599,10 +709,10 @@ def _column(table: Table | Sequence[Mapping[str, object]], name: str) -> ArrayLi
     try:
         return table[name]  # type: ignore[call-overload]
     except KeyError:
-        raise _no_column(name, table.keys()) from None  # type: ignore[union-attr]
+        raise no_column(name, table.keys()) from None  # type: ignore[union-attr]
 
 
-def _no_column(name: str, known: object) -> Exception:
+def no_column(name: str, known: object) -> Exception:
     from ._errors import MechidError
 
     available = ", ".join(str(column) for column in known)  # type: ignore[attr-defined]

@@ -1248,24 +1248,19 @@ def machine_of(given: Machine | Estimated | str | os.PathLike[str]) -> Machine:
     return Machine.read(given)
 
 
-def description_of(given: object) -> tuple[str, str] | None:
-    """Return name and JSON of the experiment that is meant; None if it is something else."""
+def description_of(given: object) -> tuple[str, str | None] | None:
+    """Return the experiment that is meant: a file, or a name and JSON; None if it is something else.
+
+    A file is not read here: what it names lies in its own folder.
+    """
     if isinstance(given, Mapping) and "system" in given:
-        return "the description", json.dumps(given, default=_listed)
+        return "the description", json.dumps(given, default=listed)
     if isinstance(given, (str, os.PathLike)) and os.fspath(given).lower().endswith(".json"):
-        path = os.fspath(given)
-        try:
-            with open(path, encoding="utf-8") as file:
-                return path, file.read()
-        except OSError as error:
-            quoted = json.dumps(path)
-            raise MechidError(
-                f"cannot read {path}: {error.strerror}", f"Io(Read {{ file: {quoted} }})"
-            ) from None
+        return os.fspath(given), None
     return None
 
 
-def _listed(value: object) -> object:
+def listed(value: object) -> object:
     """Return an array as lists, and a sparse matrix, of SciPy or alike, as its entries."""
     if hasattr(value, "tocoo"):
         entries = value.tocoo()

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
@@ -25,6 +26,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _mechid
+from ._errors import MechidError, careful
+from ._records import no_column
 from ._results import description_of
 
 if TYPE_CHECKING:
@@ -53,7 +56,8 @@ class Summary:
     """What a run over many records did; ``str`` tells it as the program does.
 
     ``other_parts`` counts the parts in the folder that are of other records, of another version of
-    these, or of another analysis; ``elapsed_s`` is in s.
+    these, or of another analysis; ``left_out`` names paths that can be no records (named pipes, sockets,
+    devices); ``elapsed_s`` is in s.
     """
 
     records: int
@@ -63,6 +67,7 @@ class Summary:
     computed_parts: int
     computed_records: int
     other_parts: int
+    left_out: tuple[str, ...]
     elapsed_s: float
     text: str
 
@@ -89,6 +94,7 @@ class Trends:
         return self.page
 
 
+@careful
 def simulate(
     experiment: Mapping[str, Any] | str | os.PathLike[str],
     out: str | os.PathLike[str],
@@ -153,6 +159,7 @@ def simulate(
     return _mechid.fleet_simulate(*described, count, fields, os.fspath(out))[0]
 
 
+@careful
 def trends(
     results: str | os.PathLike[str],
     over: Literal["order", "number"] = "order",
@@ -186,6 +193,7 @@ def trends(
     return Trends(fields=json.loads(fields), text=text, page=page)
 
 
+@careful
 def run(
     records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     analysis: Mapping[str, Any] | str | os.PathLike[str],
@@ -194,6 +202,9 @@ def run(
     *,
     part_records: int = 32,
     progress: Callable[[int, int], object] | None = None,
+    isolate: bool = True,
+    record_memory_gb: float = 8.0,
+    record_seconds: float = 600.0,
 ) -> Summary:
     """Identify many records, into a folder of Parquet files with one row per record.
 
@@ -218,6 +229,14 @@ def run(
         Number of records in a part.
     progress : callable, optional
         Called with the number of records done, and of all.
+    isolate : bool
+        Whether to work on records in processes of their own, which every worker starts with its own
+        interpreter: a record that takes too much memory or time, or ends its process, becomes a row with
+        its error. Without, a worker computes in its own process.
+    record_memory_gb : float
+        Memory that a record may take, in GB, with the 0.1 GB of its process; Linux alone limits it.
+    record_seconds : float
+        Time that a record may take, in s.
 
     Returns
     -------
@@ -234,23 +253,26 @@ def run(
     folder = os.fspath(out)
     given = [records] if isinstance(records, str | os.PathLike) else list(records)
     begun = time.monotonic()
-    parts = _mechid.fleet_begin(given, saved, folder, part_records)
+    parts, left_out = _mechid.fleet_begin(given, saved, folder, part_records)
+    limits = (float(record_memory_gb), float(record_seconds)) if isolate else None
     if executor is None:
         own = ThreadPoolExecutor(os.cpu_count())
     with nullcontext(executor) if executor is not None else own as engine:
-        futures = [engine.submit(_part, part, saved, folder) for part in parts]
+        futures = [engine.submit(_part, part, saved, folder, limits) for part in parts]
         try:
             done = list(_told(futures, sum(map(len, parts)), progress))
         except BaseException:
             for future in futures:
                 future.cancel()
             raise
-    text, summary = _mechid.fleet_summary(done, folder, time.monotonic() - begun)
+    text, summary = _mechid.fleet_summary(done, left_out, folder, time.monotonic() - begun)
     fields: dict[str, Any] = json.loads(summary)
     fields["failures"] = tuple(Failure(**failure) for failure in fields["failures"])
+    fields["left_out"] = tuple(fields["left_out"])
     return Summary(**fields, text=text)
 
 
+@careful
 def identify_batch(
     batch: pyarrow.RecordBatch | pyarrow.Table, analysis: Mapping[str, Any] | str | os.PathLike[str]
 ) -> pyarrow.Table:
@@ -277,9 +299,7 @@ def identify_batch(
     Raises
     ------
     MechidError
-        If the analysis cannot be understood.
-    KeyError
-        If the batch has no ``record_column``.
+        If the analysis cannot be understood, or the batch has no ``record_column``.
 
     Examples
     --------
@@ -297,7 +317,9 @@ def identify_batch(
     import pyarrow.parquet as pq
 
     saved = _saved(analysis)
-    column = json.loads(saved).get("reading", {}).get("record_column")
+    column = _mechid.fleet_record_column(saved)
+    if column is not None and column not in batch.schema.names:
+        raise no_column(column, batch.schema.names)
     names = None if column is None else batch.column(column).to_pylist()
     channels = {field.name: batch.column(field.name) for field in batch.schema if field.name != column}
     lists = {name: cells for name, cells in channels.items() if _is_list(cells.type)}
@@ -324,7 +346,12 @@ def _saved(analysis: Mapping[str, Any] | str | os.PathLike[str]) -> str:
     """Return an analysis as JSON."""
     if isinstance(analysis, Mapping):
         return json.dumps(analysis)
-    return Path(analysis).read_text(encoding="utf-8")
+    try:
+        return Path(analysis).read_text(encoding="utf-8")
+    except OSError as error:
+        name = os.fspath(analysis)
+        variant = f"Io(Read {{ file: {json.dumps(name)} }})"
+        raise MechidError(f"cannot read {name}: {error.strerror}", variant) from None
 
 
 def _is_number(kind: pyarrow.DataType) -> bool:
@@ -355,9 +382,12 @@ def _rows_of(names: list[Any]) -> dict[Any, NDArray[np.intp]]:
     return {name: np.asarray(at, dtype=np.intp) for name, at in rows.items()}
 
 
-def _part(records: list[_mechid._Place], analysis: str, folder: str) -> str:
-    """Compute one part, wherever the engine has put it."""
-    return _mechid.fleet_part(records, analysis, folder)
+def _part(
+    records: list[_mechid._Place], analysis: str, folder: str, limits: tuple[float, float] | None
+) -> str:
+    """Compute one part, wherever the engine has put it: by the interpreter that is there."""
+    isolation = None if limits is None or not sys.executable else (sys.executable, *limits)
+    return _mechid.fleet_part(records, analysis, folder, isolation)
 
 
 def _told(
