@@ -14,6 +14,7 @@
 //!
 //! To add a target: a function in a file of `targets`, and a line in [`targets::all`].
 
+pub mod depth;
 mod mutation;
 pub mod targets;
 
@@ -32,6 +33,10 @@ use rand_chacha::ChaCha8Rng;
 /// The allocator of this package's programs, which counts.
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Powers of two below which the number of changes to an input is drawn.
+const MANY: u32 = 6;
+const FEW: u32 = 3;
 
 /// Message and place of the last panic.
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
@@ -60,6 +65,8 @@ pub struct Target {
 pub enum Input {
     /// Files of its corpus with changes, some of which put in texts such as the words of a format.
     Mutations(&'static [&'static str]),
+    /// The same with few changes, so that most inputs pass the reader.
+    Few(&'static [&'static str]),
     /// Random bytes, from which a target draws arguments.
     Bytes,
 }
@@ -88,6 +95,22 @@ pub struct Summary {
     pub peak: usize,
     /// Longest time that a case took.
     pub longest: Duration,
+    /// Number of cases that came as far as each [`Depth`](depth::Depth) and no farther: refused by the
+    /// reader, read, at work, with a result.
+    pub depths: [u64; 4],
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { cases, peak, longest, depths: [refused, read, reached, fitted] } = self;
+        write!(
+            f,
+            "{cases} cases: {refused} refused by the reader, {read} read, {reached} at work, {fitted} with a result; \
+             {:.1} MB, {:.2} s at most",
+            *peak as f64 / 1e6,
+            longest.as_secs_f64()
+        )
+    }
 }
 
 /// A case that broke a promise.
@@ -154,7 +177,7 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
         }
     });
     let begin = Instant::now();
-    let mut summary = Summary { cases: 0, peak: 0, longest: Duration::ZERO };
+    let mut summary = Summary { cases: 0, peak: 0, longest: Duration::ZERO, depths: [0; 4] };
     let mut one = |case: String, input: Vec<u8>| {
         let failed = |what: String| {
             let input = kept(&target, &input);
@@ -163,7 +186,7 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
         if to_run.send(input.clone()).is_err() {
             return Err(failed("the thread that runs the cases has ended".into()));
         }
-        let (result, peak, time) = match results.recv_timeout(cases.time_limit) {
+        let (result, peak, time, depth) = match results.recv_timeout(cases.time_limit) {
             Ok(measured) => measured,
             Err(RecvTimeoutError::Timeout) => {
                 return Err(failed(format!("it takes longer than {:?}", cases.time_limit)));
@@ -179,6 +202,7 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
             return Err(failed(format!("{peak} bytes of memory for {len}, {allowed} are allowed")));
         }
         summary.cases += 1;
+        summary.depths[depth] += 1;
         summary.peak = summary.peak.max(peak);
         summary.longest = summary.longest.max(time);
         Ok(())
@@ -193,7 +217,8 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
         let mut random = ChaCha8Rng::seed_from_u64(cases.seed);
         random.set_stream(case);
         let input = match target.input {
-            Input::Mutations(words) => mutation::mutated(&inputs, words, &mut random),
+            Input::Mutations(words) => mutation::mutated(&inputs, words, &mut random, MANY),
+            Input::Few(words) => mutation::mutated(&inputs, words, &mut random, FEW),
             Input::Bytes => mutation::bytes(&mut random),
         };
         one(case.to_string(), input)?;
@@ -201,13 +226,14 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
     Ok(summary)
 }
 
-/// Runs a case; returns its result, the memory and the time that it took.
-fn measured(target: &Target, input: &[u8]) -> (Result<(), String>, usize, Duration) {
+/// Runs a case; returns its result, the memory and the time that it took, and its depth.
+fn measured(target: &Target, input: &[u8]) -> (Result<(), String>, usize, Duration, usize) {
+    depth::taken();
     MEMORY.reset_peak_usage();
     let (before, begin) = (MEMORY.current_usage(), Instant::now());
     let result = catch_unwind(AssertUnwindSafe(|| (target.run)(input)))
         .unwrap_or_else(|_| Err(format!("it panics: {}", last_panic())));
-    (result, MEMORY.peak_usage().saturating_sub(before), begin.elapsed())
+    (result, MEMORY.peak_usage().saturating_sub(before), begin.elapsed(), depth::taken())
 }
 
 /// Writes an input where it can be found again.

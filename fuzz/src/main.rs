@@ -18,7 +18,7 @@ fn main() -> ExitCode {
                 targets::all().iter().filter(|t| names.is_empty() || names.contains(&t.name.into()))
             {
                 match run(target, &cases) {
-                    Ok(summary) => println!("{}: {summary:?}", target.name),
+                    Ok(summary) => println!("{}: {summary}", target.name),
                     Err(failure) => {
                         eprintln!("{failure}");
                         failed = true;

@@ -50,11 +50,11 @@ pub fn bytes(random: &mut impl Rng) -> Vec<u8> {
     input
 }
 
-/// An input that follows from others and from random numbers.
-pub fn mutated(corpus: &[Vec<u8>], words: &[&str], random: &mut impl Rng) -> Vec<u8> {
+/// An input that follows from others and from random numbers, with fewer than 2^`most` changes.
+pub fn mutated(corpus: &[Vec<u8>], words: &[&str], random: &mut impl Rng, most: u32) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();
     // Mostly few changes, sometimes many.
-    let changes = 1 << random.random_range(0..6);
+    let changes = 1 << random.random_range(0..most);
     for _ in 0..random.random_range(1..=changes) {
         change(&mut input, corpus, words, random);
         input.truncate(LONGEST);

@@ -4,6 +4,7 @@ mod analysis;
 mod calls;
 mod draw;
 mod estimate;
+mod fits;
 mod force;
 mod integrate;
 mod model;
@@ -14,5 +15,5 @@ use crate::Target;
 
 /// All targets.
 pub fn all() -> Vec<Target> {
-    [&readers::TARGETS[..], &calls::TARGETS].concat()
+    [&readers::TARGETS[..], &fits::TARGETS, &calls::TARGETS].concat()
 }

@@ -1,0 +1,276 @@
+//! From the bytes of a record to a fit: every format, every question that is asked of a record.
+
+use std::fmt::Display;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mechid_analysis::fleet::{Fleet, TrendAxis, Trends};
+use mechid_analysis::identify::{Fit, Method, Nonlinear, SampleFit};
+use mechid_analysis::{
+    AnalysisError, BearingData, Channels, DecaySettings, FrfSettings, Identify, IdentifyBearing,
+    InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading, ResponseQuantity,
+    SavedAnalysis, Window, decay, frf, identify, identify_bearing, inspect, predict,
+};
+use mechid_estimate::frequency_domain::Pooling;
+use mechid_io::{RecordFile, escaped};
+
+use crate::depth::{Depth, reached};
+use crate::{Input, Target};
+
+/// Words that records of several formats have in common.
+const WORDS: &[&str] =
+    &["0", "1e-9", "-", "NaN", "1e308", "\n", ",", "force", "x", "    -1\n", "\0\0\0\0"];
+
+/// Words of nonlinear terms.
+const TERMS: &[&str] = &[
+    "x1",
+    "v1",
+    "^3",
+    "|v1|",
+    "(x1-x2)",
+    "k3: ",
+    ", ",
+    "sign(",
+    "gap(x1, 0.1)",
+    "tanh(v1/0.01)",
+    "sat(v1; b=1)",
+    "²",
+    "*",
+    "1e308",
+    ";",
+];
+
+pub const TARGETS: [Target; 7] = [
+    fit("identify", identified),
+    fit("decay", decayed),
+    fit("bearing", bearings),
+    fit("predict", predicted),
+    fit("modes", modes),
+    Target {
+        name: "terms",
+        corpus: "terms",
+        input: Input::Mutations(TERMS),
+        memory: [64 << 20, 4000],
+        run: terms,
+    },
+    fit("fleet", fleet),
+];
+
+/// A target whose input is a record, of which few bytes are changed: most of them reach the work.
+const fn fit(name: &'static str, run: fn(&[u8]) -> Result<(), String>) -> Target {
+    Target { name, corpus: "records", input: Input::Few(WORDS), memory: [256 << 20, 4000], run }
+}
+
+/// Looks at a result of an analysis.
+fn passed<T>(result: Result<T, AnalysisError>) -> Result<Option<T>, String> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) => {
+            let text = error.to_string();
+            if escaped(&text) != text {
+                return Err(format!("a message is not escaped: {text:?}"));
+            }
+            Ok(None)
+        }
+    }
+}
+
+/// Prints a result, as text and as JSON.
+fn printed<T: Display + serde::Serialize>(result: &T) -> Result<(), String> {
+    reached(Depth::Fitted);
+    if result.to_string().is_empty() {
+        return Err("a result has no text".into());
+    }
+    serde_json::to_string(result).map(drop).map_err(|error| error.to_string())
+}
+
+/// A record in a file, and the settings with which it is read: a number of them follows from the bytes.
+struct Record {
+    folder: tempfile::TempDir,
+    path: PathBuf,
+    columns: Vec<String>,
+    reading: Reading,
+    /// A number that follows from the input.
+    choice: usize,
+}
+
+impl Record {
+    /// Writes the bytes to a file; `None` if the reader refuses it.
+    fn new(bytes: &[u8]) -> Result<Option<Self>, String> {
+        let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+        let path = folder.path().join("a");
+        fs::write(&path, bytes).map_err(|error| error.to_string())?;
+        let Ok(file) = RecordFile::open(&path, &Default::default(), 1 << 12) else {
+            return Ok(None);
+        };
+        reached(Depth::Read);
+        let table = file.head();
+        let good = (0..table.width()).filter(|at| table.values(*at).is_ok());
+        let columns = good.map(|at| (at + 1).to_string()).collect();
+        let has_time = table.has_time_axis() || table.time_column().is_some();
+        let choice = bytes.iter().map(|byte| usize::from(*byte)).sum();
+        let reading = Reading {
+            sample_rate_hz: (!has_time).then_some(128.0),
+            memory_gb: Some(0.25),
+            ..Reading::default()
+        };
+        Ok(Some(Self { folder, path, columns, reading, choice }))
+    }
+
+    /// The last columns as a force, unless none acts, and a response of some kind.
+    fn measurement(&self, forced: bool) -> Result<Option<Measurement>, String> {
+        let [.., force, response] = self.columns.as_slice() else { return Ok(None) };
+        let kind = ResponseQuantity::ALL[self.choice % 3];
+        let channels = match forced {
+            true => Channels::new(force, kind, response),
+            false => Channels::of_responses(kind, response),
+        };
+        let Some(opened) = passed(Measurement::open_with(&self.path, &channels, &self.reading))?
+        else {
+            return Ok(None);
+        };
+        let period = [None, None, Some(64), Some(opened.sampling().len() / 2)][self.choice % 4];
+        let window = Window { period, ..Window::default() };
+        let measurement = passed(opened.window(window))?;
+        if measurement.is_some() {
+            reached(Depth::Reached);
+        }
+        Ok(measurement)
+    }
+
+    fn settings(&self) -> Identify {
+        let fit = match self.choice % 5 {
+            0 => Fit::Samples(SampleFit::default()),
+            1 => spectra(Method::MaximumLikelihood),
+            2 => spectra(Method::Instrumental),
+            _ => return Identify::default(),
+        };
+        Identify { fit, ..Identify::default() }
+    }
+}
+
+fn spectra(method: Method) -> Fit {
+    Fit::Spectra {
+        method: Some(method),
+        noise: Pooling::Automatic,
+        extent: None,
+        force_noise: None,
+    }
+}
+
+fn identified(bytes: &[u8]) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let how = InspectSettings { curves: record.choice.is_multiple_of(2), ..Default::default() };
+    passed(inspect(&record.path, &record.reading, &Window::default(), &how))?;
+    let Some(measurement) = record.measurement(true)? else { return Ok(()) };
+    if let Some(table) = passed(frf(&measurement, &FrfSettings::default()))? {
+        printed(&table)?;
+    }
+    match passed(identify(&[measurement], &record.settings()))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+fn decayed(bytes: &[u8]) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let Some(measurement) = record.measurement(false)? else { return Ok(()) };
+    match passed(decay(&measurement, &DecaySettings::default()))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+fn bearings(bytes: &[u8]) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let columns = &record.columns;
+    let [a, b, c, d] = [0, 1, 2, 3].map(|at| columns.get(at % columns.len().max(1)));
+    let (Some(a), Some(b), Some(c), Some(d)) = (a, b, c, d) else { return Ok(()) };
+    let names = |one: &str, other: &str| format!("{one},{other}");
+    let channels = Channels::new(&names(a, b), ResponseQuantity::Displacement, &names(c, d));
+    let opened = Measurement::open_with(&record.path, &channels, &record.reading);
+    let Some(measurement) = passed(opened)? else { return Ok(()) };
+    reached(Depth::Reached);
+    let how = IdentifyBearing { stator_mass: 1.0, ..IdentifyBearing::default() };
+    let Some(data) = passed(BearingData::of_records(&[measurement], &how))? else { return Ok(()) };
+    match passed(identify_bearing(&data, None, &how))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+fn predicted(bytes: &[u8]) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let Some(measurement) = record.measurement(true)? else { return Ok(()) };
+    let machine = record.folder.path().join("machine.json");
+    let text = r#"{"system": {"mass": 25, "damping": 188.5, "stiffness": 142122}}"#;
+    fs::write(&machine, text).map_err(|error| error.to_string())?;
+    let machine = Machine::read(&machine).map_err(|error| error.to_string())?;
+    let settle = (record.choice % 3 == 0).then_some(record.choice % 50);
+    match passed(predict(&measurement, &machine, &Predict { settle }))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+fn modes(bytes: &[u8]) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let Some(measurement) = record.measurement(true)? else { return Ok(()) };
+    let Some(found) = passed(identify(&[measurement], &record.settings()))? else { return Ok(()) };
+    let Some(machine) = passed(found.machine())? else { return Ok(()) };
+    match passed(ModalSummary::of(&machine))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+/// Nonlinear terms as text, fitted to a record of the example.
+fn terms(bytes: &[u8]) -> Result<(), String> {
+    let Ok(terms) = String::from_utf8_lossy(bytes).parse::<Nonlinear>() else { return Ok(()) };
+    reached(Depth::Read);
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/records/machine.csv");
+    let channels = Channels::new("force", ResponseQuantity::Displacement, "displacement");
+    let opened = Measurement::open(rig, &channels).and_then(|record| record.period(128));
+    let measurement = opened.map_err(|error| error.to_string())?;
+    reached(Depth::Reached);
+    match passed(identify(&[measurement], &Identify::default().nonlinear(terms)))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+/// A fleet of the record and a good one: each has a row, whatever is in it.
+fn fleet(bytes: &[u8]) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let records = folder.path().join("records");
+    let write = |name: &str, content: &[u8]| fs::write(records.join(name), content);
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus/records/machine.csv");
+    fs::create_dir(&records)
+        .and_then(|()| write("a", bytes))
+        .and_then(|()| fs::copy(rig, records.join("b.csv")).map(drop))
+        .map_err(|error| error.to_string())?;
+    let analysis = SavedAnalysis {
+        channels: Channels::new("force", ResponseQuantity::Displacement, "displacement"),
+        window: Window { period: Some(128), ..Window::default() },
+        ..SavedAnalysis::default()
+    };
+    let results = folder.path().join("results");
+    let fleet = Fleet::new(analysis, &[records], &results, 2).map_err(|error| error.to_string())?;
+    let summary = fleet.run(1, &|_| ()).map_err(|error| error.to_string())?;
+    if summary.records != 2 || summary.failed > 1 {
+        return Err(format!("{} rows, {} failed", summary.records, summary.failed));
+    }
+    if summary.failures.iter().any(|failure| failure.code == "internal") {
+        return Err(format!("{summary}"));
+    }
+    let reader = ["io.", "analysis.no-time-axis"];
+    let refused =
+        summary.failures.iter().any(|f| reader.iter().any(|code| f.code.starts_with(code)));
+    reached([Depth::Fitted, Depth::Reached, Depth::Refused][summary.failed + usize::from(refused)]);
+    let trends = Trends::read(&results, TrendAxis::Order).map_err(|error| error.to_string())?;
+    if trends.records == 2 {
+        Ok(())
+    } else {
+        Err(format!("{} records in the trends", trends.records))
+    }
+}
