@@ -73,16 +73,18 @@ fn a_program_that_ends_makes_rows() {
         let isolation = Isolation::new(program, vec!["-c".into(), script.into()]);
         run(analysis(), &[RIG.into()], &home.path().join(script.len().to_string()), &isolation)
     };
-    let ended = by("sh", "echo it is over >&2; exit 3").unwrap();
+    let ended = by("sh", "printf '\\0\\0\\0\\0'; echo it is over >&2; exit 3").unwrap();
     assert_eq!(ended.failures[0].code, "analysis.record-process");
     let message = &ended.failures[0].message;
     assert!(message.contains("exit status: 3: it is over"), "{message}");
-    let killed = by("sh", "kill -SEGV $$").unwrap();
+    let killed = by("sh", "printf '\\0\\0\\0\\0'; kill -SEGV $$").unwrap();
     assert!(killed.failures[0].message.contains("signal: 11"), "{}", killed.failures[0].message);
     // A program that talks of something else sends no row.
-    let chatty = by("sh", "printf '\\4\\0\\0\\0abcd'; cat > /dev/null").unwrap();
+    let chatty = by("sh", "printf '\\0\\0\\0\\0\\4\\0\\0\\0abcd'; cat > /dev/null").unwrap();
     assert_eq!(chatty.failures[0].code, "analysis.record-process");
-    // Without the program there is no fleet; nothing is written.
+    // A program that does not begin is no fault of a record; nor is one that does not exist.
+    let error = by("sh", "echo no such module >&2; exit 1").unwrap_err().to_string();
+    assert!(error.contains("exit status: 1: no such module"), "{error}");
     let missing = Isolation::new("no such program", Vec::new());
     let folder = home.path().join("missing");
     let error = run(analysis(), &[RIG.into()], &folder, &missing).unwrap_err();
@@ -116,7 +118,7 @@ fn records_beyond_the_limits_make_rows() {
     assert_eq!((summary.records, summary.failed), (2, 1));
     assert_eq!(summary.failures[0].code, "analysis.record-memory", "{summary}");
     assert!(summary.failures[0].message.contains("more than 0.3 GB of memory"), "{summary}");
-    let hasty = Isolation { record_seconds: 1e-3, ..isolation() };
+    let hasty = Isolation { record_seconds: 1e-6, ..isolation() };
     let summary = run(analysis, &records, &at("hasty"), &hasty).unwrap();
     assert_eq!((summary.failed, &*summary.failures[0].code), (2, "analysis.record-time"));
 }

@@ -206,7 +206,7 @@ fn predicted(bytes: &[u8]) -> Result<(), String> {
     let text = r#"{"system": {"mass": 25, "damping": 188.5, "stiffness": 142122}}"#;
     fs::write(&machine, text).map_err(|error| error.to_string())?;
     let machine = Machine::read(&machine).map_err(|error| error.to_string())?;
-    let settle = (record.choice % 3 == 0).then_some(record.choice % 50);
+    let settle = record.choice.is_multiple_of(3).then_some(record.choice % 50);
     match passed(predict(&measurement, &machine, &Predict { settle }))? {
         Some(found) => printed(&found),
         None => Ok(()),

@@ -16,6 +16,9 @@ use super::results_as_parquet;
 use super::rows::rows_of;
 use crate::SavedAnalysis;
 
+/// Message of a process that has begun: what ends it from then on is the work on a record.
+pub(super) const READY: &[u8] = b"";
+
 /// First message: what to do with the records that follow.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
@@ -82,6 +85,7 @@ pub fn serve(
         process::exit(0);
     });
     let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(io::Error::other)?;
+    frames::write(&mut output, READY)?;
     pool.install(|| {
         for message in received {
             let order: Order = serde_json::from_slice(&message)?;

@@ -14,7 +14,7 @@ use mechid_io::{Limits, RecordRows, parse_parquet_rows, path_text};
 
 use super::frames;
 use super::results::Cells;
-use super::serve::{Order, Task};
+use super::serve::{Order, READY, Task};
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
 /// Memory that a record may take unless it is said, in GB.
@@ -25,6 +25,9 @@ pub const RECORD_SECONDS: f64 = 600.0;
 
 /// Maximum number of bytes of what a process says on its error stream that are kept.
 const LONGEST_MESSAGE: u64 = 4096;
+
+/// Time that a process has to begin. One that does not is no fault of a record.
+const START: Duration = Duration::from_secs(120);
 
 /// Time that a process has to end after its output, and between two looks at it.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -110,7 +113,7 @@ impl Worker {
     /// row of a record is an error only where the record alone ends the process.
     ///
     /// # Errors
-    /// [`AnalysisError::RecordProcess`] if no process can be started.
+    /// [`AnalysisError::RecordProcess`] or [`AnalysisError::RecordMemory`] if no process can be started.
     pub(super) fn rows(
         &mut self,
         path: &Path,
@@ -214,7 +217,11 @@ impl Worker {
         let memory_bytes = Some((record_memory_gb * 1e9) as u64);
         let task = Task { analysis: self.analysis.clone(), memory_bytes };
         let _ = frames::write(&mut orders, &serde_json::to_vec(&task).unwrap_or_default());
-        Ok(Running { child, orders: Some(orders), rows, said })
+        let running = Running { child, orders: Some(orders), rows, said };
+        match running.rows.recv_timeout(START) {
+            Ok(ready) if ready == READY => Ok(running),
+            _ => Err(running.cause_of_end(*record_memory_gb)),
+        }
     }
 }
 
