@@ -11,15 +11,15 @@ use std::ops::Range;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-use crate::dense::{add_product, gram, transposed_product};
-use crate::limits::NEGLIGIBLE_PROCESS_POWER;
+use crate::dense::transposed_product;
 use crate::lines::{Block, Lines};
 use crate::model::Model;
-use crate::noise::{Noise, modal_gain, noise_window};
+use crate::noise::{Noise, noise_window};
 use crate::normal::{
     NormalEquations, ShapeProducts, block_pairs, parameter_scale, turn, whitened_shapes,
 };
 use crate::projection::{BlockArrays, Projection};
+use crate::scores::{BlockProducts, ProcessEffect, Scores};
 use crate::search::Fit;
 
 type C = Complex<f64>;
@@ -45,27 +45,6 @@ pub(crate) struct Covariance {
     shapes: Vec<f64>,
 }
 
-/// Effect of a mode's unmeasured force on the two unknowns of its shape, for a whitened shape of 1.
-#[derive(Debug, Clone)]
-struct ProcessEffect {
-    /// Covariance of the two unknowns.
-    own: DMatrix<f64>,
-    /// Covariance with the score, before it is turned by the phase of the shape, `2 × parameters`.
-    cross: DMatrix<C>,
-}
-
-/// Products of one block after projection.
-struct BlockProducts {
-    /// C̃ᵀC̃, lower triangle, of the whole problem's parameters.
-    gram: Vec<f64>,
-    /// Rows of modes of A⁺ times its transpose.
-    inverse: Vec<f64>,
-    /// Rows of modes of A⁺ as columns of 2n rows.
-    influence: Vec<f64>,
-    /// Projected derivatives, 2n rows.
-    derivatives: Vec<f64>,
-}
-
 impl Covariance {
     /// Returns the covariance of a fit under `noise`, or `None` if its curvature is singular.
     pub(crate) fn new(fit: &Fit<'_>, noise: &Noise) -> Option<Self> {
@@ -76,28 +55,13 @@ impl Covariance {
         let scale = parameter_scale(&pairs, model);
         let shapes = whitened_shapes(projection, modes);
         let (followed, rows) = followed(lines, model, projection, &pairs);
-        let blocks: Vec<BlockProducts> = lines
-            .blocks
-            .par_iter()
-            .zip(&projection.blocks)
-            .map(|(block, arrays)| {
-                BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows)
-            })
-            .collect();
-        let mut meat = vec![0.0; size * size];
+        let products = |(block, arrays): (&Block, &BlockArrays)| {
+            BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows)
+        };
+        let blocks: Vec<BlockProducts> =
+            lines.blocks.par_iter().zip(&projection.blocks).map(products).collect();
         let outputs = lines.outputs.len();
-        let mut own = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
-        for (block, products) in lines.blocks.iter().zip(&blocks) {
-            let ratios = noise_ratios(fit, noise, block);
-            let weighted: Vec<f64> =
-                shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
-            let turned =
-                turn(&products.gram, &pairs, &ShapeProducts::new(&weighted, modes), &scale);
-            meat.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
-            for (own, ratio) in own.iter_mut().zip(&ratios) {
-                own.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
-            }
-        }
+        let (mut meat, own) = sensor_variance(fit, noise, &blocks, &pairs, &shapes, &scale);
         let scores = Scores { pairs: &pairs, shapes: &shapes, scale: &scale };
         let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut meat);
         let process: Vec<ProcessEffect> = (0..modes).map(add).collect();
@@ -247,42 +211,30 @@ fn followed(
     (sum, rows)
 }
 
-/// Returns the columns of a block out of columns of the whole problem.
-fn local_rows(all: &[f64], columns: usize, places: &[usize]) -> Vec<f64> {
-    let chunks = all.chunks_exact(columns.max(1));
-    chunks.flat_map(|column| places.iter().map(|place| column[*place])).collect()
-}
-
-impl BlockProducts {
-    fn new(
-        lines: &Lines,
-        model: &Model,
-        block: &Block,
-        arrays: &BlockArrays,
-        pairs: &[(usize, Option<usize>)],
-        followed: &[f64],
-        inverse_rows: &[f64],
-    ) -> Self {
-        let (rows, size) = (2 * block.len(), 2 * pairs.len());
-        let columns = followed.len() / size.max(1);
-        let (places, local) = block_pairs(pairs, block);
-        let mut own = vec![0.0; rows * 2 * local.len()];
-        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut own);
-        let mut derivatives = vec![0.0; rows * size];
-        for (place, pair) in places.iter().zip(own.chunks_exact(2 * rows)) {
-            derivatives[2 * place * rows..(2 * place + 2) * rows].copy_from_slice(pair);
+/// Returns the variance of the score, and of the unknowns of each output, from the noise of the sensors.
+fn sensor_variance(
+    fit: &Fit<'_>,
+    noise: &Noise,
+    blocks: &[BlockProducts],
+    pairs: &[(usize, Option<usize>)],
+    shapes: &[f64],
+    scale: &[f64],
+) -> (Vec<f64>, Vec<DMatrix<f64>>) {
+    let (modes, size) = (fit.model.modes(), 2 * pairs.len());
+    let outputs = fit.lines.outputs.len();
+    let mut meat = vec![0.0; size * size];
+    let mut own = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
+    for (block, products) in fit.lines.blocks.iter().zip(blocks) {
+        let ratios = noise_ratios(fit, noise, block);
+        let weighted: Vec<f64> =
+            shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
+        let turned = turn(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
+        meat.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
+        for (own, ratio) in own.iter_mut().zip(&ratios) {
+            own.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
         }
-        let inner = arrays.columns.len();
-        let part = local_rows(followed, columns, &arrays.columns);
-        add_product(&mut derivatives, &arrays.design, &part, rows, inner, -1.0);
-        let mut product = vec![0.0; size * size];
-        gram(&derivatives, rows, &mut product);
-        let own_rows = local_rows(inverse_rows, columns, &arrays.columns);
-        let mut influence = vec![0.0; rows * 2 * model.modes()];
-        add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
-        let inverse = transposed_product(&influence, &influence, rows);
-        Self { gram: product, inverse, influence, derivatives }
     }
+    (meat, own)
 }
 
 /// Returns the variance of each output's sensor noise over that of the fit's weights, averaged over a block.
@@ -293,101 +245,6 @@ fn noise_ratios(fit: &Fit<'_>, noise: &Noise, block: &Block) -> Vec<f64> {
         sum / (block.len() as f64 * level * level)
     };
     noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()
-}
-
-/// What the score of the search is made of.
-struct Scores<'a> {
-    pairs: &'a [(usize, Option<usize>)],
-    shapes: &'a [f64],
-    scale: &'a [f64],
-}
-
-impl Scores<'_> {
-    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its effect on the
-    /// shape of the mode.
-    fn add_process(
-        &self,
-        fit: &Fit<'_>,
-        noise: &Noise,
-        mode: usize,
-        blocks: &[BlockProducts],
-        meat: &mut [f64],
-    ) -> ProcessEffect {
-        let (lines, size) = (fit.lines, 2 * self.pairs.len());
-        let (along, direction) = self.along(mode, lines.outputs.len());
-        let mut effect =
-            ProcessEffect { own: DMatrix::zeros(2, 2), cross: DMatrix::zeros(2, size) };
-        if noise.process[mode] <= 0.0 {
-            return effect;
-        }
-        for (block, products) in lines.blocks.iter().zip(blocks) {
-            let n = block.len();
-            let gain = |line: usize| {
-                let row = block.rows.start + line;
-                let gain = modal_gain(fit.model.poles[mode], lines.omega[row]);
-                gain * (noise.process[mode].sqrt() / fit.weights.shape[row])
-            };
-            let share = |line: &usize| gain(*line).norm_sqr() * direction;
-            let active: Vec<usize> =
-                (0..n).filter(|line| share(line) > NEGLIGIBLE_PROCESS_POWER).collect();
-            let rows = 2 * active.len();
-            if rows == 0 {
-                continue;
-            }
-            let mut scores = vec![0.0; rows * size];
-            for (pair, (p, q)) in along.iter().enumerate() {
-                let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
-                let (first, second) =
-                    scores[2 * pair * rows..(2 * pair + 2) * rows].split_at_mut(rows);
-                for (k, &line) in active.iter().enumerate() {
-                    let u = C::new(own[line], -own[n + line]);
-                    let v = C::new(own[2 * n + line], -own[3 * n + line]);
-                    let a = (u * p + v * q) * gain(line) * self.scale[2 * pair];
-                    let b = (v * p - u * q) * gain(line) * self.scale[2 * pair + 1];
-                    (first[2 * k], first[2 * k + 1]) = (a.re, a.im);
-                    (second[2 * k], second[2 * k + 1]) = (b.re, b.im);
-                }
-            }
-            let part = transposed_product(&scores, &scores, rows);
-            meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
-            let influence = &products.influence[4 * mode * n..(4 * mode + 4) * n];
-            let unknown = |row: usize, line: usize| {
-                let own = &influence[2 * row * n..(2 * row + 2) * n];
-                C::new(own[line], -own[n + line]) * gain(line)
-            };
-            for (k, &line) in active.iter().enumerate() {
-                effect.add_line([unknown(0, line), unknown(1, line)], &scores, rows, k);
-            }
-        }
-        effect
-    }
-
-    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven mode, and Σ |α_i|².
-    fn along(&self, mode: usize, outputs: usize) -> (Vec<(C, C)>, f64) {
-        let column = |row: usize| &self.shapes[row * outputs..(row + 1) * outputs];
-        let product = |a: usize, b: usize| -> f64 {
-            column(a).iter().zip(column(b)).map(|(a, b)| a * b).sum()
-        };
-        let (x, y) = (2 * mode, 2 * mode + 1);
-        let of = |row: usize| C::new(product(row, x), product(row, y));
-        let along = self.pairs.iter().map(|&(s, _)| (of(2 * s), of(2 * s + 1))).collect();
-        (along, product(x, x) + product(y, y))
-    }
-}
-
-impl ProcessEffect {
-    /// Adds one line: the response of the two unknowns and of the scores to a unit force.
-    fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
-        for (a, value) in unknowns.iter().enumerate() {
-            for (b, other) in unknowns.iter().enumerate() {
-                self.own[(a, b)] += (value * other.conj()).re;
-            }
-            for (parameter, score) in scores.chunks_exact(rows).enumerate() {
-                let score = C::new(score[2 * line], -score[2 * line + 1]);
-                self.cross[(a, parameter)] += value * score;
-            }
-        }
-    }
 }
 
 /// Returns the inverse of a symmetric positive definite matrix, scaled to a unit diagonal.

@@ -23,9 +23,11 @@ mod projection;
 mod residues;
 mod results;
 mod rules;
+mod scores;
 mod search;
 pub mod stabilisation;
 mod synthesis;
+mod unmeasured;
 
 pub use mechid_numerics::Uncertain;
 

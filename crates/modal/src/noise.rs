@@ -13,13 +13,12 @@ use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::dense::add_product;
-use crate::limits::{
-    EXPECTATION_STEPS, MIN_NOISE_WINDOW, NEAR_PROCESS_POWER, NEAR_RESONANCE, NOISE_WINDOW_SHARE,
-};
-use crate::lines::Lines;
+use crate::limits::{EXPECTATION_STEPS, MIN_NOISE_WINDOW, NOISE_WINDOW_SHARE};
+use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{Projection, Weights};
 use crate::search::Fit;
+use crate::unmeasured::{ForceSums, Posterior};
 
 type C = Complex<f64>;
 
@@ -50,13 +49,16 @@ impl Noise {
         }
         for _ in 0..EXPECTATION_STEPS {
             let before = noise.process.clone();
-            noise.improve_process(lines, model, &shapes, &residuals);
+            let sums = noise.force_sums(lines, model, &shapes, &residuals);
+            noise.improve_process(&sums);
             let power = noise.sensor_power(lines, model, &shapes, &residuals);
             noise.sensor = residuals.smooth_power(lines, power);
             if settled(&before, &noise.process) {
                 break;
             }
         }
+        let sums = noise.force_sums(lines, model, &shapes, &residuals);
+        noise.drop_insignificant_process(&sums);
         noise
     }
 
@@ -87,34 +89,50 @@ impl Noise {
 
     /// Takes one step of the variances of the unmeasured forces: S_r is multiplied by
     /// √(Σ |b_rᴴV⁻¹e|² / Σ b_rᴴV⁻¹b_r), which never lowers the likelihood.
-    fn improve_process(
-        &mut self,
+    fn improve_process(&mut self, sums: &[ForceSums]) {
+        for (process, sum) in self.process.iter_mut().zip(sums) {
+            if sum.expected > 0.0 {
+                *process *= (sum.seen / sum.expected).sqrt();
+            }
+        }
+    }
+
+    /// Takes out the unmeasured forces that the likelihood gains too little by (Akaike's criterion, one parameter
+    /// each): a variance cannot be negative, so that one that is estimated from noise alone is too large on average.
+    fn drop_insignificant_process(&mut self, sums: &[ForceSums]) {
+        const REQUIRED: f64 = 2.0;
+        for (process, sum) in self.process.iter_mut().zip(sums) {
+            if sum.gain < REQUIRED {
+                *process = 0.0;
+            }
+        }
+    }
+
+    /// Sums over the lines what they say of each unmeasured force.
+    fn force_sums(
+        &self,
         lines: &Lines,
         model: &Model,
         shapes: &[Vec<C>],
         residuals: &Residuals,
-    ) {
-        let modes = model.modes();
-        let parts: Vec<Vec<(f64, f64)>> = lines
-            .blocks
-            .par_iter()
-            .map(|block| {
-                let mut sums = vec![(0.0, 0.0); modes];
-                for line in block.rows.clone() {
-                    if let Some(local) = self.posterior(lines, model, shapes, residuals, line) {
-                        local.add_powers(&mut sums);
-                    }
+    ) -> Vec<ForceSums> {
+        let of_block = |block: &Block| {
+            let mut sums = vec![ForceSums::default(); model.modes()];
+            for line in block.rows.clone() {
+                if let Some(near) = Posterior::new(self, lines, model, shapes, residuals, line) {
+                    near.add_powers(&mut sums);
                 }
-                sums
-            })
-            .collect();
-        for (mode, process) in self.process.iter_mut().enumerate() {
-            let seen: f64 = parts.iter().map(|part| part[mode].0).sum();
-            let expected: f64 = parts.iter().map(|part| part[mode].1).sum();
-            if expected > 0.0 {
-                *process *= (seen / expected).sqrt();
             }
+            sums
+        };
+        let parts: Vec<Vec<ForceSums>> = lines.blocks.par_iter().map(of_block).collect();
+        let mut all = vec![ForceSums::default(); model.modes()];
+        for (mode, part) in parts.iter().flat_map(|part| part.iter().enumerate()) {
+            all[mode].seen += part.seen;
+            all[mode].expected += part.expected;
+            all[mode].gain += part.gain;
         }
+        all
     }
 
     /// Returns first variances of the unmeasured forces: the power of the residuals along each shape near its
@@ -156,138 +174,24 @@ impl Noise {
     ) -> Vec<Vec<f64>> {
         let outputs = self.sensor.len();
         let of_line = |line: usize| -> Vec<f64> {
-            let Some(local) = self.posterior(lines, model, shapes, residuals, line) else {
+            let Some(near) = Posterior::new(self, lines, model, shapes, residuals, line) else {
                 return (0..outputs).map(|output| residuals.power[output][line]).collect();
             };
             let mut parts = Vec::new();
             let value = |output: usize| {
                 let error = residuals.error[output][line];
-                local.remaining_power(shapes, output, error, &mut parts)
+                near.remaining_power(shapes, output, error, &mut parts)
             };
             (0..outputs).map(value).collect()
         };
         let rows: Vec<Vec<f64>> = (0..lines.len()).into_par_iter().map(of_line).collect();
         (0..outputs).map(|output| rows.iter().map(|row| row[output]).collect()).collect()
     }
-
-    /// Returns what the residuals of a line say of the unmeasured forces of the modes near it.
-    fn posterior(
-        &self,
-        lines: &Lines,
-        model: &Model,
-        shapes: &[Vec<C>],
-        residuals: &Residuals,
-        line: usize,
-    ) -> Option<Posterior> {
-        let omega = lines.omega[line];
-        let is_near = |mode: &usize| {
-            let gain = modal_gain(model.poles[*mode], omega).norm_sqr();
-            let process = self.process[*mode];
-            gain * model.poles[*mode].re.powi(2) > NEAR_RESONANCE
-                || process > 0.0
-                    && process * gain * self.direction(&shapes[*mode], line) > NEAR_PROCESS_POWER
-        };
-        let active: Vec<usize> = (0..model.modes()).filter(is_near).collect();
-        if active.is_empty() {
-            return None;
-        }
-        let size = active.len();
-        let gains: Vec<C> =
-            active.iter().map(|mode| modal_gain(model.poles[*mode], omega)).collect();
-        let mut information = vec![C::default(); size * size];
-        let mut seen = vec![C::default(); size];
-        for (output, sensor) in self.sensor.iter().enumerate() {
-            let precision = 1.0 / sensor[line];
-            let error = residuals.error[output][line];
-            for (a, mode) in active.iter().enumerate() {
-                let from = shapes[*mode][output].conj() * precision;
-                seen[a] += from * error;
-                for (b, other) in active[..=a].iter().enumerate() {
-                    information[a * size + b] += from * shapes[*other][output];
-                }
-            }
-        }
-        for a in 0..size {
-            seen[a] *= gains[a].conj();
-            for b in 0..=a {
-                let value = information[a * size + b] * gains[a].conj() * gains[b];
-                information[a * size + b] = value;
-                information[b * size + a] = value.conj();
-            }
-        }
-        let process = active.iter().map(|mode| self.process[*mode]).collect();
-        let mut posterior = Posterior { active, gains, process, information, seen };
-        posterior.add_forces();
-        Some(posterior)
-    }
-}
-
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line.
-struct Posterior {
-    active: Vec<usize>,
-    gains: Vec<C>,
-    process: Vec<f64>,
-    /// `[a · size + b]`.
-    information: Vec<C>,
-    seen: Vec<C>,
-}
-
-impl Posterior {
-    /// Goes from V = D to V = D + Σ S_r b_r b_rᴴ, one force after the other (Sherman & Morrison).
-    fn add_forces(&mut self) {
-        let size = self.active.len();
-        let mut row = vec![C::default(); size];
-        for (r, process) in self.process.iter().enumerate().filter(|(_, process)| **process > 0.0) {
-            row.copy_from_slice(&self.information[r * size..(r + 1) * size]);
-            let factor = process / (1.0 + process * row[r].re);
-            let seen = self.seen[r];
-            for a in 0..size {
-                let along = row[a].conj() * factor;
-                self.seen[a] -= along * seen;
-                let to = &mut self.information[a * size..(a + 1) * size];
-                to.iter_mut().zip(&row).for_each(|(to, value)| *to -= along * value);
-            }
-        }
-    }
-
-    /// Adds |b_rᴴV⁻¹e|² and b_rᴴV⁻¹b_r.
-    fn add_powers(&self, sums: &mut [(f64, f64)]) {
-        let size = self.active.len();
-        for (a, mode) in self.active.iter().enumerate() {
-            sums[*mode].0 += self.seen[a].norm_sqr();
-            sums[*mode].1 += self.information[a * size + a].re;
-        }
-    }
-
-    /// Returns the expected power of what remains of an error when the unmeasured forces are taken off.
-    fn remaining_power(
-        &self,
-        shapes: &[Vec<C>],
-        output: usize,
-        error: C,
-        parts: &mut Vec<C>,
-    ) -> f64 {
-        let size = self.active.len();
-        parts.clear();
-        let forces = self.active.iter().zip(&self.gains).zip(&self.process);
-        parts.extend(forces.map(|((mode, gain), process)| shapes[*mode][output] * gain * *process));
-        let explained: C = parts.iter().zip(&self.seen).map(|(part, seen)| part * seen).sum();
-        let mut variance = 0.0;
-        for (a, part) in parts.iter().enumerate() {
-            if self.process[a] > 0.0 {
-                variance += part.norm_sqr() / self.process[a];
-                let row = &self.information[a * size..(a + 1) * size];
-                let sum: C = row.iter().zip(parts.iter()).map(|(i, b)| i * b.conj()).sum();
-                variance -= (part * sum).re;
-            }
-        }
-        (error - explained).norm_sqr() + variance.max(0.0)
-    }
 }
 
 /// Residuals in the units of the outputs, corrected for what the fit has absorbed of the noise.
-struct Residuals {
-    error: Vec<Vec<C>>,
+pub(crate) struct Residuals {
+    pub(crate) error: Vec<Vec<C>>,
     power: Vec<Vec<f64>>,
 }
 

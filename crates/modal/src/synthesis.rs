@@ -32,7 +32,7 @@ fn add_transient(
     load: usize,
     predicted: &mut DMatrix<C>,
 ) {
-    let (outputs, reference) = (lines.outputs.len(), lines.band().1);
+    let outputs = lines.outputs.len();
     let mut rows: Vec<(usize, Vec<(C, C)>)> = Vec::new();
     for block in lines.blocks.iter().filter(|block| block.active.contains(&load)) {
         let growths: Vec<C> = modes.iter().map(|mode| growth(mode.pole, block)).collect();
@@ -45,51 +45,75 @@ fn add_transient(
             rows.push((row, modes.iter().zip(&growths).map(kernel).collect()));
         }
     }
-    let residual = |row: usize, power: i32| {
-        Complex::i().powi(power) * (lines.omega[row] / reference).powi(power)
-    };
-    // The residual terms of an output are projected out of its rows; the loads are common to all outputs.
-    let width = 2 * modes.len();
-    let mut normal = Accumulator::new(width);
-    let mut parts = Vec::with_capacity(outputs);
+    let record = Record { rows, modes, powers, reference: lines.band().1 };
+    let mut normal = Accumulator::new(2 * modes.len());
+    let mut triangles = Vec::with_capacity(outputs);
     for output in 0..outputs {
-        let count = powers.len() + width + 1;
-        let height = 2 * rows.len();
-        let mut columns = vec![0.0; height * count];
-        for (k, (row, kernels)) in rows.iter().enumerate() {
-            let mut put = |column: usize, value: C| {
-                columns[column * height + 2 * k] = value.re;
-                columns[column * height + 2 * k + 1] = value.im;
-            };
-            for (place, power) in powers.iter().enumerate() {
-                put(place, residual(*row, *power));
-            }
-            for (mode, (value, mirror)) in kernels.iter().enumerate() {
-                let shape = modes[mode].shape[output];
-                let (a, b) = (shape * value, shape.conj() * mirror);
-                put(powers.len() + 2 * mode, a + b);
-                put(powers.len() + 2 * mode + 1, C::i() * (a - b));
-            }
-            put(count - 1, lines.outputs[output][*row] - predicted[(*row, output)]);
-        }
-        triangularise(&mut columns, height);
+        let rest = |row: usize| lines.outputs[output][row] - predicted[(row, output)];
+        let (columns, height) = record.reduced(lines, output, rest);
         normal.add(&columns, height, powers.len());
-        parts.push(Triangle::new(&columns, height, count));
+        triangles.push(Triangle::new(&columns, height, powers.len() + 2 * modes.len() + 1));
     }
     let loads = normal.solve();
-    for (output, triangle) in parts.iter().enumerate() {
+    for (output, triangle) in triangles.iter().enumerate() {
         let terms = residual_terms(triangle, powers.len(), &loads);
-        for (row, kernels) in &rows {
+        for (row, kernels) in &record.rows {
             let mut sum = C::default();
             for (mode, (value, mirror)) in kernels.iter().enumerate() {
                 let part = modes[mode].shape[output] * C::new(loads[2 * mode], loads[2 * mode + 1]);
                 sum += part * value + part.conj() * mirror;
             }
             for (power, value) in powers.iter().zip(&terms) {
-                sum += residual(*row, *power) * *value;
+                sum += record.residual(lines.omega[*row], *power) * *value;
             }
             predicted[(*row, output)] += sum;
         }
+    }
+}
+
+/// Rows of one record with the transient kernels of all modes.
+struct Record<'a> {
+    rows: Vec<(usize, Vec<(C, C)>)>,
+    modes: &'a [&'a IdentifiedMode],
+    powers: &'a [i32],
+    reference: f64,
+}
+
+impl Record<'_> {
+    /// Returns (jω)ⁿ, scaled.
+    fn residual(&self, omega: f64, power: i32) -> C {
+        C::i().powi(power) * (omega / self.reference).powi(power)
+    }
+
+    /// Returns the triangular factor of an output's columns, residual terms first so that they can be projected
+    /// out of the loads that all outputs share, and the number of rows.
+    fn reduced(
+        &self,
+        lines: &Lines,
+        output: usize,
+        rest: impl Fn(usize) -> C,
+    ) -> (Vec<f64>, usize) {
+        let (first, height) = (self.powers.len(), 2 * self.rows.len());
+        let count = first + 2 * self.modes.len() + 1;
+        let mut columns = vec![0.0; height * count];
+        for (k, (row, kernels)) in self.rows.iter().enumerate() {
+            let mut put = |column: usize, value: C| {
+                columns[column * height + 2 * k] = value.re;
+                columns[column * height + 2 * k + 1] = value.im;
+            };
+            for (place, power) in self.powers.iter().enumerate() {
+                put(place, self.residual(lines.omega[*row], *power));
+            }
+            for (mode, (value, mirror)) in kernels.iter().enumerate() {
+                let shape = self.modes[mode].shape[output];
+                let (a, b) = (shape * value, shape.conj() * mirror);
+                put(first + 2 * mode, a + b);
+                put(first + 2 * mode + 1, C::i() * (a - b));
+            }
+            put(count - 1, rest(*row));
+        }
+        triangularise(&mut columns, height);
+        (columns, height)
     }
 }
 

@@ -1,0 +1,168 @@
+//! Scores of the search: projected derivatives block by block, and what an unmeasured force does to them.
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::dense::{add_product, gram, transposed_product};
+use crate::limits::NEGLIGIBLE_PROCESS_POWER;
+use crate::lines::{Block, Lines};
+use crate::model::Model;
+use crate::noise::{Noise, modal_gain};
+use crate::normal::block_pairs;
+use crate::projection::BlockArrays;
+use crate::search::Fit;
+
+type C = Complex<f64>;
+
+/// Products of one block after projection.
+pub(crate) struct BlockProducts {
+    /// C̃ᵀC̃, lower triangle, of the whole problem's parameters.
+    pub(crate) gram: Vec<f64>,
+    /// Rows of modes of A⁺ times its transpose.
+    pub(crate) inverse: Vec<f64>,
+    /// Rows of modes of A⁺ as columns of 2n rows.
+    influence: Vec<f64>,
+    /// Projected derivatives, 2n rows.
+    derivatives: Vec<f64>,
+}
+
+/// Effect of a mode's unmeasured force on the two unknowns of its shape, for a whitened shape of 1.
+#[derive(Debug, Clone)]
+pub(crate) struct ProcessEffect {
+    /// Covariance of the two unknowns.
+    pub(crate) own: DMatrix<f64>,
+    /// Covariance with the score, before it is turned by the phase of the shape, `2 × parameters`.
+    pub(crate) cross: DMatrix<C>,
+}
+
+/// Returns the columns of a block out of columns of the whole problem.
+fn local_rows(all: &[f64], columns: usize, places: &[usize]) -> Vec<f64> {
+    let chunks = all.chunks_exact(columns.max(1));
+    chunks.flat_map(|column| places.iter().map(|place| column[*place])).collect()
+}
+
+impl BlockProducts {
+    pub(crate) fn new(
+        lines: &Lines,
+        model: &Model,
+        block: &Block,
+        arrays: &BlockArrays,
+        pairs: &[(usize, Option<usize>)],
+        followed: &[f64],
+        inverse_rows: &[f64],
+    ) -> Self {
+        let (rows, size) = (2 * block.len(), 2 * pairs.len());
+        let columns = followed.len() / size.max(1);
+        let (places, local) = block_pairs(pairs, block);
+        let mut own = vec![0.0; rows * 2 * local.len()];
+        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut own);
+        let mut derivatives = vec![0.0; rows * size];
+        for (place, pair) in places.iter().zip(own.chunks_exact(2 * rows)) {
+            derivatives[2 * place * rows..(2 * place + 2) * rows].copy_from_slice(pair);
+        }
+        let inner = arrays.columns.len();
+        let part = local_rows(followed, columns, &arrays.columns);
+        add_product(&mut derivatives, &arrays.design, &part, rows, inner, -1.0);
+        let mut product = vec![0.0; size * size];
+        gram(&derivatives, rows, &mut product);
+        let own_rows = local_rows(inverse_rows, columns, &arrays.columns);
+        let mut influence = vec![0.0; rows * 2 * model.modes()];
+        add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
+        let inverse = transposed_product(&influence, &influence, rows);
+        Self { gram: product, inverse, influence, derivatives }
+    }
+}
+
+/// What the score of the search is made of.
+pub(crate) struct Scores<'a> {
+    pub(crate) pairs: &'a [(usize, Option<usize>)],
+    pub(crate) shapes: &'a [f64],
+    pub(crate) scale: &'a [f64],
+}
+
+impl Scores<'_> {
+    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its effect on the
+    /// shape of the mode.
+    pub(crate) fn add_process(
+        &self,
+        fit: &Fit<'_>,
+        noise: &Noise,
+        mode: usize,
+        blocks: &[BlockProducts],
+        meat: &mut [f64],
+    ) -> ProcessEffect {
+        let (lines, size) = (fit.lines, 2 * self.pairs.len());
+        let (along, direction) = self.along(mode, lines.outputs.len());
+        let mut effect =
+            ProcessEffect { own: DMatrix::zeros(2, 2), cross: DMatrix::zeros(2, size) };
+        if noise.process[mode] <= 0.0 {
+            return effect;
+        }
+        for (block, products) in lines.blocks.iter().zip(blocks) {
+            let n = block.len();
+            let gain = |line: usize| {
+                let row = block.rows.start + line;
+                let gain = modal_gain(fit.model.poles[mode], lines.omega[row]);
+                gain * (noise.process[mode].sqrt() / fit.weights.shape[row])
+            };
+            let share = |line: &usize| gain(*line).norm_sqr() * direction;
+            let active: Vec<usize> =
+                (0..n).filter(|line| share(line) > NEGLIGIBLE_PROCESS_POWER).collect();
+            let rows = 2 * active.len();
+            if rows == 0 {
+                continue;
+            }
+            let mut scores = vec![0.0; rows * size];
+            for (pair, (p, q)) in along.iter().enumerate() {
+                let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
+                let (first, second) =
+                    scores[2 * pair * rows..(2 * pair + 2) * rows].split_at_mut(rows);
+                for (k, &line) in active.iter().enumerate() {
+                    let u = C::new(own[line], -own[n + line]);
+                    let v = C::new(own[2 * n + line], -own[3 * n + line]);
+                    let a = (u * p + v * q) * gain(line) * self.scale[2 * pair];
+                    let b = (v * p - u * q) * gain(line) * self.scale[2 * pair + 1];
+                    (first[2 * k], first[2 * k + 1]) = (a.re, a.im);
+                    (second[2 * k], second[2 * k + 1]) = (b.re, b.im);
+                }
+            }
+            let part = transposed_product(&scores, &scores, rows);
+            meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
+            let influence = &products.influence[4 * mode * n..(4 * mode + 4) * n];
+            let unknown = |row: usize, line: usize| {
+                let own = &influence[2 * row * n..(2 * row + 2) * n];
+                C::new(own[line], -own[n + line]) * gain(line)
+            };
+            for (k, &line) in active.iter().enumerate() {
+                effect.add_line([unknown(0, line), unknown(1, line)], &scores, rows, k);
+            }
+        }
+        effect
+    }
+
+    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven mode, and Σ |α_i|².
+    fn along(&self, mode: usize, outputs: usize) -> (Vec<(C, C)>, f64) {
+        let column = |row: usize| &self.shapes[row * outputs..(row + 1) * outputs];
+        let product = |a: usize, b: usize| -> f64 {
+            column(a).iter().zip(column(b)).map(|(a, b)| a * b).sum()
+        };
+        let (x, y) = (2 * mode, 2 * mode + 1);
+        let of = |row: usize| C::new(product(row, x), product(row, y));
+        let along = self.pairs.iter().map(|&(s, _)| (of(2 * s), of(2 * s + 1))).collect();
+        (along, product(x, x) + product(y, y))
+    }
+}
+
+impl ProcessEffect {
+    /// Adds one line: the response of the two unknowns and of the scores to a unit force.
+    fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
+        for (a, value) in unknowns.iter().enumerate() {
+            for (b, other) in unknowns.iter().enumerate() {
+                self.own[(a, b)] += (value * other.conj()).re;
+            }
+            for (parameter, score) in scores.chunks_exact(rows).enumerate() {
+                let score = C::new(score[2 * line], -score[2 * line + 1]);
+                self.cross[(a, parameter)] += value * score;
+            }
+        }
+    }
+}
