@@ -4,11 +4,8 @@
 //! `cargo run --release -p mechid-estimate --example machine_study -- 300 200 200` for 300 seeds of the chain of
 //! five, 200 of the chain of three with everything unknown, 200 of the rotor.
 
-#![allow(
-    dead_code,
-    clippy::print_stdout,
-    reason = "a study prints; its modules are those of the tests"
-)]
+#![allow(dead_code, unused_imports, reason = "the modules are those of the tests")]
+#![allow(clippy::print_stdout, reason = "a study prints")]
 
 #[path = "../tests/suite/machine/chain.rs"]
 mod chain;

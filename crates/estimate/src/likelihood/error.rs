@@ -78,10 +78,7 @@ pub enum LikelihoodError {
         most: usize,
     },
     /// No search ended at a minimum.
-    #[error(
-        "none of {} ended at a minimum in {steps} steps",
-        message::count(*searches, "search").replace("searchs", "searches")
-    )]
+    #[error("no search ended at a minimum: {searches} made, {steps} steps each at most")]
     NotConverged {
         /// Number of searches.
         searches: usize,

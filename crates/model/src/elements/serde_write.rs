@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_told_by_name() {
+    fn errors_name_the_element() {
         let refused = |change: &dyn Fn(&mut Value)| {
             let mut value = described();
             change(&mut value);

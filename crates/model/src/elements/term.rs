@@ -29,16 +29,14 @@ impl Power {
         }
     }
 
-    /// Returns the derivative of the factor with respect to s, at the eigenvalue `s` (rad/s), and the factor
-    /// itself: a term of D(s).
-    pub fn at_eigenvalue(self, s: Complex<f64>, speed: f64) -> [Complex<f64>; 2] {
-        let one = Complex::new(1.0, 0.0);
+    /// Returns the factor at an eigenvalue `s` and the rotor's speed `speed`, both in rad/s.
+    pub fn at_eigenvalue(self, s: Complex<f64>, speed: f64) -> Complex<f64> {
         match self {
-            Self::Stiffness => [one, Complex::default()],
-            Self::Hysteresis => [Complex::new(0.0, s.im.signum()), Complex::default()],
-            Self::Damping => [s, one],
-            Self::Gyroscopic => [s * speed, one * speed],
-            Self::Mass => [s * s, s * 2.0],
+            Self::Stiffness => Complex::new(1.0, 0.0),
+            Self::Hysteresis => Complex::new(0.0, s.im.signum()),
+            Self::Damping => s,
+            Self::Gyroscopic => s * speed,
+            Self::Mass => s * s,
         }
     }
 }

@@ -6,6 +6,8 @@ mod identify;
 mod model;
 mod modes;
 mod nominal;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::{Complex, DMatrix};
 

@@ -109,7 +109,7 @@ fn slopes(
         if term.is_known() {
             continue;
         }
-        let [factor, _] = term.power.at_eigenvalue(lambda, speed);
+        let factor = term.power.at_eigenvalue(lambda, speed);
         let mut work = Complex::default();
         term.for_each_entry(n, |row, column, value| {
             if column < n {

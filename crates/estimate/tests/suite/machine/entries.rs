@@ -75,7 +75,7 @@ fn entries_are_found_where_the_unmeasured_mass_is_known() {
 
 /// The displacement of a mass that no sensor reads may count in any unit.
 #[test]
-fn the_scale_of_an_unmeasured_motion_is_told_as_undetermined() {
+fn the_scale_of_an_unmeasured_motion_is_undetermined() {
     let estimate = identified(&chain(), 1);
     assert_eq!(estimate.combinations.len(), 1);
     assert_eq!(estimate.combinations[0].parameters, ["k12", "m22", "k22", "k23"]);

@@ -134,7 +134,7 @@ fn profile_intervals_of_weak_parameters_hold() {
 }
 
 #[test]
-fn a_prior_that_is_wrong_is_told_and_a_right_one_shares() {
+fn a_wrong_prior_is_reported_and_a_right_one_shares() {
     let machine = |mean: f64| {
         let stiffness = free(1.8e4).with_prior(mean, 100.0);
         Machine::new(["x"])

@@ -1,0 +1,182 @@
+//! The coupled response and its derivative beside the dense elimination of all degrees of freedom.
+
+use mechid_model::ResponseQuantity;
+use mechid_model::elements::{
+    Assembly, Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine,
+    MatrixElement, Sensor, Speed,
+};
+use nalgebra::{Complex, DMatrix, DVector, dmatrix};
+
+use super::MachineModel;
+use crate::likelihood::{LineResponse, ResponseModel};
+
+const OMEGA: [f64; 4] = [20.0, 61.0, 97.0, 160.0];
+
+fn free(start: f64) -> Coefficient {
+    FreeCoefficient::from_start(start).into()
+}
+
+/// Every kind of element, every kind of damping, every kind of input.
+fn assembly(factors: bool) -> Assembly {
+    let shaft = MatrixElement {
+        dofs: ["x2", "y2", "x3", "y3"].map(str::to_owned).to_vec(),
+        mass: Some((DMatrix::from_diagonal(&vec![3.0, 3.5, 2.0, 2.5].into()), 1.0.into())),
+        damping: Some((DMatrix::identity(4, 4) * 4.0, 1.0.into())),
+        stiffness: Some((
+            dmatrix![
+                3e4, 1e3, -1e4, 0.0;
+                1e3, 4e4, 0.0, -2e4;
+                -1e4, 0.0, 2e4, 5e2;
+                0.0, -2e4, 5e2, 3e4
+            ],
+            if factors { free(1.1) } else { 1.0.into() },
+        )),
+        gyroscopic: Some((
+            dmatrix![0.0, 0.3, 0.0, 0.0; -0.3, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0],
+            if factors { free(0.9) } else { 1.0.into() },
+        )),
+    };
+    let mut machine = Machine::new(["x1", "y1", "x2", "y2", "x3", "y3"])
+        .with("m1", Element::mass("x1", free(2.0)))
+        .with("m2", Element::mass("y1", Coefficient::Shared("m".into())))
+        .with("m3", Element::mass("x3", Coefficient::Shared("m".into())))
+        .with("shaft", Element::Matrices(Box::new(shaft)))
+        .with(
+            "film",
+            Element::Bearing(Box::new(Bearing {
+                at: ["x2", "y2"].map(str::to_owned),
+                to: Some(["x1", "y1"].map(str::to_owned)),
+                stiffness: [1.5e4, 4e3, -3e3, 2e4].map(free),
+                damping: [20.0, 3.0, -2.0, 30.0].map(free),
+                mass: [0.5, 0.0, 0.0, 0.4].map(free),
+            })),
+        )
+        .with(
+            "foot",
+            Element::Link {
+                between: ["x1", "support"].map(str::to_owned),
+                stiffness: free(3e4),
+                damping: free(12.0),
+                loss_factor: free(0.02),
+            },
+        )
+        .with("side", Element::spring_damper(["y1", "support"], free(4e4), 5.0))
+        .with(
+            "rest",
+            Element::Unbalance {
+                at: ["x2", "y2"].map(str::to_owned),
+                real: free(1e-3),
+                imaginary: free(-2e-3),
+            },
+        )
+        .with_parameter("m", FreeCoefficient::from_start(1.5));
+    if factors {
+        machine.damping.alpha = free(0.3);
+        machine.damping.beta = free(1e-4);
+        machine.damping.loss_factor = free(0.01);
+    }
+    let instruments = Instruments {
+        sensors: vec![
+            Sensor::new("x3", ResponseQuantity::Displacement).relative_to_support(),
+            Sensor { gain: 0.7, ..Sensor::new("y2", ResponseQuantity::Acceleration) },
+            Sensor::new("x1", ResponseQuantity::Velocity).relative_to("x2"),
+        ],
+        inputs: vec![
+            Input::force("x3"),
+            Input::Support { name: "table".into(), quantity: ResponseQuantity::Acceleration },
+            Input::Unbalance { name: "trial".into(), at: ["x3", "y3"].map(str::to_owned) },
+        ],
+        speed: Speed::Synchronous,
+    };
+    machine.assembly(&instruments).unwrap()
+}
+
+/// Readings under inputs and own loads, by elimination of all degrees of freedom.
+fn naive(
+    assembly: &Assembly,
+    parameters: &[f64],
+    omega: f64,
+    input: &DVector<Complex<f64>>,
+) -> DVector<Complex<f64>> {
+    let n = assembly.dof();
+    let all = assembly.dynamic_stiffness(parameters, omega, |_| true);
+    let (mut force, mut ground) = (DVector::zeros(n), Complex::default());
+    for (column, amplitude) in assembly.inputs().iter().zip(input.iter()) {
+        for (at, value) in column.load(n, omega, assembly.speed()) {
+            if at < n { force[at] += value * amplitude } else { ground += value * amplitude }
+        }
+    }
+    for (parameter, load) in assembly.own_loads(omega) {
+        let amplitude = parameter.map_or(1.0, |at| parameters[at]);
+        load.iter().for_each(|(at, value)| force[*at] += value * amplitude);
+    }
+    force -= all.column(n) * ground;
+    let motion = all.columns(0, n).into_owned().lu().solve(&force).unwrap();
+    DVector::from_iterator(
+        assembly.sensors().len(),
+        assembly.sensors().iter().map(|sensor| {
+            let read = |(at, weight): &(usize, f64)| {
+                (if *at < n { motion[*at] } else { ground }) * *weight
+            };
+            let sum: Complex<f64> = sensor.entries.iter().map(read).sum();
+            sum * sensor.quantity.per_displacement(omega)
+        }),
+    )
+}
+
+fn input() -> DVector<Complex<f64>> {
+    DVector::from_vec(vec![
+        Complex::new(3.0, -1.0),
+        Complex::new(0.5, 0.8),
+        Complex::new(2e-3, 1e-3),
+    ])
+}
+
+/// Values away from the first ones, at which the nominal machine is prepared.
+fn moved(assembly: &Assembly) -> Vec<f64> {
+    let start = assembly.start();
+    start.iter().enumerate().map(|(at, value)| value * (1.0 + 0.2 * (at as f64).sin())).collect()
+}
+
+#[test]
+fn the_coupled_response_is_that_of_the_whole_machine() {
+    for (factors, open) in [(false, false), (false, true), (true, false)] {
+        let assembly = assembly(factors);
+        let model = MachineModel::new(&assembly, &OMEGA, None, open).unwrap();
+        let parameters = moved(&assembly);
+        for (row, omega) in OMEGA.into_iter().enumerate() {
+            let line = model.at(&parameters, row).unwrap();
+            let response = line.receptance() * input() + line.own_response().unwrap();
+            let expected = naive(&assembly, &parameters, omega, &input());
+            let gap = (response - &expected).norm() / expected.norm();
+            assert!(gap < 1e-12, "{factors} {open} {omega}: {gap:e}");
+        }
+    }
+}
+
+#[test]
+fn the_sensitivity_is_the_derivative_of_the_response() {
+    for factors in [false, true] {
+        let assembly = assembly(factors);
+        let model = MachineModel::new(&assembly, &OMEGA, None, false).unwrap();
+        let parameters = moved(&assembly);
+        let mut sensitivity = DMatrix::zeros(3, parameters.len());
+        for (row, omega) in OMEGA.into_iter().enumerate() {
+            let line = model.at(&parameters, row).unwrap();
+            line.sensitivity(&parameters, &input(), &DVector::zeros(0), &mut sensitivity);
+            for (at, column) in sensitivity.column_iter().enumerate() {
+                let step = 1e-5 * parameters[at].abs().max(1e-3);
+                let at_distance = |by: f64| {
+                    let mut parameters = parameters.clone();
+                    parameters[at] += by;
+                    naive(&assembly, &parameters, omega, &input())
+                };
+                let difference =
+                    (at_distance(step) - at_distance(-step)) / Complex::from(2.0 * step);
+                let gap = (&difference - column).norm() / difference.norm();
+                let name = &assembly.parameters()[at].name;
+                assert!(gap < 1e-6, "{name} at {omega}: {gap:e}");
+            }
+        }
+    }
+}
