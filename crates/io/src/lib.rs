@@ -50,9 +50,8 @@ pub use experiment::{
     Level, LoadBeyond, MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice,
     StudyField, StudyRuns, SubStepLoad,
 };
-pub use folder::{FileStamp, create_folder, files_of};
-pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
 pub use folder::{FileStamp, create_folder, files_of, special_kind};
+pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;

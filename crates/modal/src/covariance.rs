@@ -83,7 +83,6 @@ impl Covariance {
             pairs,
             shapes,
         })
-        Some(Self { parameters, degrees_of_freedom, followed, own, scale, pairs, shapes })
     }
 
     /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.

@@ -204,7 +204,6 @@ impl<'a> Identification<'a> {
             let kept = self.protected();
             let mut order: Vec<usize> =
                 (0..losses.len()).filter(|mode| losses[*mode] < required && !kept[*mode]).collect();
-                (0..losses.len()).filter(|mode| losses[*mode] < required).collect();
             order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
             let poles = &self.fit.model.poles;
             let mut reasons: Vec<Option<DropReason>> = vec![None; losses.len()];

@@ -42,7 +42,6 @@ pub use self::serve::serve;
 pub use self::summary::FleetSummary;
 pub use self::table::results_as_parquet;
 pub use self::trends::{OUTLIER, TrendAxis, TrendChange, TrendPoint, TrendSeries, Trends};
-pub use self::trends::{OUTLIER, TrendAxis, TrendPoint, TrendSeries, Trends};
 pub use self::worker::{Isolation, RECORD_MEMORY_GB, RECORD_SECONDS, Worker};
 use crate::{AnalysisError, SavedAnalysis};
 

@@ -5,8 +5,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use mechid_checks::Verdict;
-use mechid_io::{Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
-use mechid_estimate::checks::Verdict;
 use mechid_io::{FileStamp, Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
 
 use crate::batch::{FindingRow, ModeCell, ParameterCell, RowError};
