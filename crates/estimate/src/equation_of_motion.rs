@@ -4,11 +4,9 @@ use mechid_model::{Matrix, Parameter};
 use mechid_numerics::least_squares::{Solution, solve_compressed};
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_numerics::{NumericsError, check_finite, check_size};
-use mechid_signal::message;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::covariance::{Covariance, Product};
-use crate::error::NAMED_PARAMETERS;
 use crate::estimate::EstimateParts;
 use crate::related_equations::RelatedEquations;
 use crate::unknowns::only_ratios;

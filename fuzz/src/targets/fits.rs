@@ -11,8 +11,8 @@ use mechid_analysis::{
     InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading, ResponseQuantity,
     SavedAnalysis, Window, decay, frf, identify, identify_bearing, inspect, predict,
 };
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::{RecordFile, escaped};
+use mechid_spectra::Pooling;
 
 use crate::depth::{Depth, reached};
 use crate::{Input, Target};

@@ -8,12 +8,13 @@ use mechid_nonlinear::{
     StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error,
     output_error, select_terms,
 };
-use mechid_signal::{Extent, Record, driven_lines, lines, message};
+use mechid_signal::{Extent, Record};
 use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
 use super::left_out::{LineRule, all_lines};
+use super::lines::LineChoice;
 use super::options::{Method, Nonlinear};
 use super::prediction::{Model, Prediction};
 use super::remarks::one_motion_of;
@@ -22,7 +23,7 @@ use super::selection::SelectionSummary;
 use super::spectra::periods;
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
-use crate::text::{significant, text_table};
+use crate::text::significant;
 
 /// Records or windows, at least, of which each is left out once to judge a candidate.
 const HELD_OUT_RECORDS: usize = 3;

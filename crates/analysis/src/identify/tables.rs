@@ -10,9 +10,9 @@ use mechid_checks::{
 use mechid_estimate::frequency_domain::{equation_error, output_error_pooling};
 use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
 use mechid_io::{FrequencyResponses, ParameterCovariance, SystemMatrices};
-use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_model::SecondOrderSystem;
 use mechid_spectra::{FrequencyData, NoiseModel, Pooling};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::added_decay;
 use super::checks::{CheckRow, When};
@@ -25,7 +25,7 @@ use super::rows::{
 };
 use super::summary::{FitRow, verdict};
 use super::tabulated::{Noise, Tabulated};
-use super::{Band, FittedLine, KnownMass, Method, Structure, Unscaled};
+use super::{FittedLine, Method, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::Channels;

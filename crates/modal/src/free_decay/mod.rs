@@ -17,8 +17,8 @@ use nalgebra::DMatrix;
 pub use self::error::FreeDecayError;
 pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
 use self::fit::Data;
+use self::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
 use self::select::Search;
-use super::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
 
 /// Settings of [`free_decay`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,7 +105,7 @@ pub fn free_decay(
         constant: settings.offset,
     };
     let most = asked.min(samples / SAMPLES_PER_MODE);
-    let failed = FreeDecayError::NotConverged { searches: 1, steps: fit::MAX_STEPS };
+    let failed = FreeDecayError::NotConverged { searches: 1, steps: MAX_STEPS };
     let search = Search::new(&data);
     let best = match settings.modes {
         Some(modes) => search.exactly(modes).ok_or(failed.clone())?,
@@ -123,7 +123,7 @@ pub fn free_decay(
         }
     };
     let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
-    let fit = data.refined(&best.fit.poles, &best.fit.noise, fit::FINE).ok_or(failed.clone())?;
+    let fit = data.refined(&best.fit.poles, &best.fit.noise, FINE).ok_or(failed.clone())?;
     let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
     for mode in found.modes() {
         let growth = &mode.mode.growth_rate;

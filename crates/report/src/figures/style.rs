@@ -5,8 +5,6 @@ use mechid_plot::Axis;
 use mechid_plot::charts::Quantity;
 use nalgebra::Complex;
 
-use super::trace::Trace;
-
 /// Look of the frequency responses in a figure.
 ///
 /// ```

@@ -88,10 +88,7 @@ pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, S
     .map_err(|error| error.to_string())?;
     let unknowns =
         Unknowns::known_mass(machine.system().mass()).map_err(|error| error.to_string())?;
-    let found = equation_error(&data, &unknowns).map_err(|error| error.to_string())?;
-    Ok(percent(&machine.listed(&found.stiffness(), &found.damping()), machine)).map_err(words)?;
-    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
-    let estimate = equation_error(&data, &unknowns).map_err(words)?;
+    let estimate = equation_error(&data, &unknowns).map_err(|error| error.to_string())?;
     Ok(percent(&machine.listed(&estimate.stiffness(), &estimate.damping()), machine))
 }
 
