@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn numbers_are_told_shortly() {
-        let told = [2.34e-8, 9.96e-6, 0.5, 12.3].map(told);
-        assert_eq!(told, ["23 ns", "10 µs", "500 ms", "12 s"]);
+        let texts = [2.34e-8, 9.96e-6, 0.5, 12.3].map(with_unit);
+        assert_eq!(texts, ["23 ns", "10 µs", "500 ms", "12 s"]);
         let grouped = [2.0, 100.0, 1000.0, 22_500.0, 3e6].map(grouped);
         assert_eq!(grouped, ["2", "100", "1,000", "22,500", "3,000,000"]);
     }
