@@ -41,14 +41,17 @@ pub enum AnalysisError {
     },
     /// The record has no time column, and no sampling rate is given.
     #[error(
-        "{file} has no column called time, time_s or t: name the time column with `time`, or give \
-         `sample_rate` in Hz; its columns are {available}"
+        "{file} has no column called time, time_s or t{}: name the time column with `time`, or give \
+         `sample_rate` in Hz; its columns are {available}",
+        unclear_time(unclear.as_ref())
     )]
     NoTimeAxis {
         /// The record.
         file: String,
         /// Numbers and names of its columns.
         available: String,
+        /// A time column whose unit is not understood, and the text for that unit.
+        unclear: Option<(String, String)>,
     },
     /// A file of many records does not hold the one asked for, or none is asked for.
     #[error("{file} holds {} ({available}){}", message::count(*records, "record"), other(id.as_deref()))]
@@ -143,7 +146,7 @@ pub enum AnalysisError {
         /// Number and name of the column.
         column: String,
         /// Unit that its name or the line of units says.
-        unit: &'static str,
+        unit: String,
         /// Quantity of that unit.
         measures: mechid_io::Quantity,
         /// Setting that names the column.
@@ -544,4 +547,14 @@ fn kebab(name: &str) -> String {
         text.push(letter.to_ascii_lowercase());
     }
     text
+}
+
+/// The words about a time column whose unit is not understood.
+fn unclear_time(unclear: Option<&(String, String)>) -> String {
+    unclear.map_or_else(String::new, |(column, text)| {
+        format!(
+            " in a unit of time (\"{text}\" of column {column} is not understood: state it as `unit`, or name the column \
+             to take it as seconds)"
+        )
+    })
 }

@@ -249,6 +249,7 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
             // Once a record.
             if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
                 part.held.unit_remarks.clear();
+                part.held.unit_findings.clear();
             }
             all.hits.push(part);
         }

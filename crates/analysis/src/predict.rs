@@ -117,7 +117,7 @@ pub fn predict(
             errors.push(PredictionError::of((name, kind, dof), x, p, steady));
         }
     }
-    let mut remarks = block.unit_remarks.clone();
+    let mut remarks = block.unit_notes();
     if !in_motion.is_empty() {
         remarks.push(format!(
             "the error of {} is largest at the beginning and dies away: the machine was in motion before the first \

@@ -4,6 +4,8 @@ use std::fmt;
 
 use crate::IoError;
 use crate::limits::{Limit, Limits};
+use crate::limits::Limit;
+use crate::{IoError, Quantity, Unit};
 
 /// Position in a file, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,6 +87,23 @@ pub(crate) struct Column {
     pub axis: Axis,
     /// Description in the file besides its name.
     pub about: String,
+    /// Text for its unit in a line of units, a label or an attribute; empty if there is none.
+    pub unit: String,
+    /// Quantity that the file states by a code; `None` if it does not.
+    pub kind: Option<Quantity>,
+    /// Whether its numbers are instants of dates or clocks, in s.
+    pub has_instants: bool,
+    /// Unit or factor that the user states.
+    pub overriding: Option<Override>,
+}
+
+/// Unit or factor that a user states for a column, whatever its name says.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Override {
+    /// Unit of the numbers.
+    Unit(Unit),
+    /// SI units per unit of the numbers.
+    Scale(f64),
 }
 
 /// The time axis that a file gives a column.
@@ -148,13 +167,28 @@ impl Column {
             None => Ok(values),
             Some(k) => Err(Unusable::NotFinite { at: Place::Sample(k + 1), value: values[k] }),
         };
-        Self { name, filled: true, values, axis: Axis::Unknown, about: String::new() }
+        Self { filled: true, values, ..Self::named(name) }
+    }
+
+    /// A column without numbers.
+    pub fn named(name: String) -> Self {
+        Self {
+            name,
+            filled: false,
+            values: Ok(Vec::new()),
+            axis: Axis::Unknown,
+            about: String::new(),
+            unit: String::new(),
+            kind: None,
+            has_instants: false,
+            overriding: None,
+        }
     }
 
     /// A column that holds no real numbers in time, but `what`.
     pub fn unusable(name: String, what: impl Into<String>) -> Self {
         let values = Err(Unusable::Kind(what.into()));
-        Self { name, filled: true, values, axis: Axis::Unknown, about: String::new() }
+        Self { filled: true, values, ..Self::named(name) }
     }
 }
 

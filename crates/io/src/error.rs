@@ -44,15 +44,16 @@ pub enum IoError {
         /// Cause.
         source: std::io::Error,
     },
-    /// The file is of a format that MATLAB writes, but not by default.
-    #[error("{}", Message(format_args!("{file} is a MATLAB file of version 7.3 (HDF5): save it with -v7")))]
+    /// The file is HDF5, which the feature `hdf5` reads.
+    #[error("{}", Message(format_args!("{file} is HDF5, as a MATLAB file of version 7.3 is, and this program was compiled without: save it \
+        with -v7")))]
     Hdf5 {
         /// The file.
         file: String,
     },
     /// The file is binary, but of no format known.
-    #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7), \
-         universal file with datasets 58, Parquet, or gzip around a record")))]
+    #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7) or 7.3, \
+         HDF5, universal file with datasets 58, Parquet, or gzip around a record")))]
     UnknownFormat {
         /// The file.
         file: String,
@@ -246,11 +247,25 @@ pub enum IoError {
         /// Number and name of the column.
         column: String,
         /// Unit of the column.
-        unit: &'static str,
+        unit: String,
         /// Quantity of the unit.
         quantity: Quantity,
         /// Quantity needed.
         wanted: Quantity,
+    },
+    /// A text that should be a unit is none.
+    #[error("{}", Message(format_args!("\"{text}\" is no unit of a force, a response or a time that is known: examples are kN, lbf, \
+        mm, in, m/s^2, g, ms")))]
+    NoUnit {
+        /// The text.
+        text: String,
+    },
+    /// A factor of a column is not usable.
+    #[error("{}", Message(format_args!("the scale of a column must be a finite number other than 0, got {factor}",
+        factor = message::number(*factor))))]
+    NoScale {
+        /// The factor given.
+        factor: f64,
     },
     /// A sample is NaN or infinite.
     #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = message::number(*value))))]

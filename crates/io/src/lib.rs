@@ -24,6 +24,8 @@ mod escape;
 mod experiment;
 mod folder;
 mod geometry;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 mod json;
 mod limits;
 mod line_spec;
@@ -33,12 +35,14 @@ mod number_text;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod response_columns;
 mod responses;
 mod standard;
 mod stated_rates;
 mod system;
 mod table;
 mod uff;
+mod units;
 
 pub use contents::{DecimalSign, Place};
 pub use covariance::{ParameterCovariance, read_covariance};
@@ -73,4 +77,5 @@ pub use system::{
     NonlinearDescription, SystemMatrices, parse_sparse_system, read_nonlinear, read_sparse_system,
     read_system,
 };
-pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};
+pub use table::{Inventory, RecordFile, Survey, Table, Tally, TimeAxis};
+pub use units::{Evidence, Quantity, StatedUnit, Unit, name_without_unit, stated_unit};

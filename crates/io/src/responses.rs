@@ -8,16 +8,17 @@ use nalgebra::Complex;
 
 use crate::limits::ReadOptions;
 use crate::table::source::{Kind, Source};
-use crate::{IoError, Table, uff};
+use crate::{IoError, Quantity, StatedUnit, Table, response_columns, uff};
 
 /// Frequency responses of a file, at common frequencies and in SI units.
 ///
-/// A text has one row per frequency and a column `frequency_hz` (or `frequency`, `freq`, `f`; otherwise
-/// the first column). The response of point i to a force at point j is `h_i_j_real` with
+/// A text has one row per frequency and a column `frequency_hz` (or `frequency`, `freq`, `f`, or `omega`, `w` in
+/// rad/s; otherwise the first column), with its unit (`[kHz]`, `rad/s`, `rpm`) in its name or in a line of units. The response of point i to a force at point j is `h_i_j_real` with
 /// `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`; beside it may
 /// stand `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to all forces) or
 /// `coherence_i_j`. A text with one response may leave `h_i_j_` and `_i` out. This is what
-/// `mechid frf --output` writes. Further columns have one number in all rows: `time_derivative` says what was
+/// `mechid frf --output` writes. Magnitudes may be in dB, units may stand in brackets (`real [g/N]`), and a name or a unit
+/// of an apparent mass, an impedance or a dynamic stiffness makes the response its inverse. Further columns have one number in all rows: `time_derivative` says what was
 /// measured (0 displacement, 1 velocity, 2 acceleration), `added_decay` what an exponential window adds to the decay
 /// of every mode, in 1/s, and `segment_samples`, `segment_hop`, `segments`, `segment_window` (0 whole periods,
 /// 1 Hann, 2 Hamming, 3 Blackman, 4 rectangular) and `sample_rate_hz` what the responses are averages over.
@@ -52,6 +53,8 @@ pub struct FrequencyResponses {
     pub segments: Option<AveragedSegments>,
     /// Remarks on what was left out or converted.
     pub remarks: Vec<String>,
+    /// Columns whose headers hold a text that may be a unit: number and name, the text, and the quantity needed.
+    pub doubts: Vec<(String, StatedUnit, Quantity)>,
 }
 
 /// Segments of a record that frequency responses are averages over.
@@ -164,13 +167,12 @@ impl FrequencyResponses {
 
     fn of_table(table: &Table) -> Result<Self, IoError> {
         let mut responses = Self { file: table.file().into(), ..Self::default() };
-        let frequency = FREQUENCY.iter().find(|name| table.find(name).is_ok()).unwrap_or(&"1");
-        responses.frequency_hz = table.column(frequency)?.to_vec();
+        responses.frequency_hz = response_columns::frequencies(table, &mut responses.doubts)?;
+        response_columns::add_functions(table, &mut responses)?;
         for name in table.names() {
             let name = name.trim();
-            if let Some(prefix) = ["real", "magnitude"].iter().find_map(|end| before(name, end)) {
-                responses.functions.push(Self::function(table, name, prefix)?);
-            } else if let Some(points) = name.strip_prefix("coherence") {
+            let is_coherence = name.to_lowercase().starts_with("coherence");
+            if let Some(points) = name.get("coherence".len()..).filter(|_| is_coherence) {
                 let mut points = points.split('_').skip(1).map(str::to_owned);
                 let response = points.next().unwrap_or_else(|| ALONE.into());
                 let (reference, values) = (points.next(), table.column(name)?.to_vec());
@@ -181,11 +183,14 @@ impl FrequencyResponses {
             let (file, available) = (responses.file, table.available());
             return Err(IoError::Responses { file, available });
         }
+        response_columns::sort(&mut responses)?;
         let quantity = constant(table, DERIVATIVE)?.and_then(|order| {
             let of = |quantity: &ResponseQuantity| derivative(*quantity) == order;
             ResponseQuantity::ALL.into_iter().find(of)
         });
-        responses.functions.iter_mut().for_each(|function| function.quantity = quantity);
+        if quantity.is_some() {
+            responses.functions.iter_mut().for_each(|function| function.quantity = quantity);
+        }
         responses.added_decay = constant(table, ADDED_DECAY)?.filter(|rate| *rate > 0.0);
         let mut numbers = [f64::NAN; 5];
         for (number, name) in numbers.iter_mut().zip(AveragedSegments::COLUMNS) {
@@ -201,32 +206,6 @@ impl FrequencyResponses {
             ));
         }
         Ok(responses)
-    }
-
-    /// Returns the response whose first column is called `name`, and the others `prefix` and a word.
-    fn function(table: &Table, name: &str, prefix: &str) -> Result<ResponseFunction, IoError> {
-        let column = |word: &str| table.column(&format!("{prefix}{word}"));
-        let has = |word: &str| table.find(&format!("{prefix}{word}")).is_ok();
-        let first = table.column(name)?;
-        let values = if name.ends_with("real") {
-            let second = column(if has("imag") { "imag" } else { "imaginary" })?;
-            first.iter().zip(second).map(|(re, im)| Complex::new(*re, *im)).collect()
-        } else {
-            let (second, unit) = match has("phase_rad") {
-                true => (column("phase_rad")?, 1.0),
-                false => (column("phase_deg")?, 1_f64.to_radians()),
-            };
-            let polar = |(r, phase): (&f64, &f64)| Complex::from_polar(*r, phase * unit);
-            first.iter().zip(second).map(polar).collect()
-        };
-        let standard_error = match has("standard_error") {
-            true => Some(column("standard_error")?.to_vec()),
-            false => None,
-        };
-        let mut points = prefix.split('_').skip(1).filter(|point| !point.is_empty());
-        let mut point = || points.next().unwrap_or(ALONE).to_owned();
-        let (response, reference) = (point(), point());
-        Ok(ResponseFunction { response, reference, quantity: None, values, standard_error })
     }
 
     /// Returns the text of a universal file: datasets 151 and 164, and a dataset 58 for each response
@@ -247,9 +226,6 @@ impl FrequencyResponses {
         uff::write_responses(self).map_err(|point| IoError::Point { point })
     }
 }
-
-/// Names of the column with the frequencies.
-const FREQUENCY: [&str; 4] = ["frequency_hz", "frequency", "freq", "f"];
 
 /// Name of the column that says what was measured, as the order of a time derivative of the displacement.
 pub const DERIVATIVE: &str = "time_derivative";
@@ -277,8 +253,3 @@ fn constant(table: &Table, name: &str) -> Result<Option<f64>, IoError> {
 
 /// Point of a table with a single response.
 const ALONE: &str = "1";
-
-/// Returns the part before a word at the end of a name: empty, or ending with `_`.
-fn before<'a>(name: &'a str, word: &str) -> Option<&'a str> {
-    name.strip_suffix(word).filter(|prefix| prefix.is_empty() || prefix.ends_with('_'))
-}

@@ -1,9 +1,10 @@
 //! Sample rates that a file states in a number beside its vectors, such as `Fs` or `dt`.
 
 use crate::contents::{Axis, Contents};
+use crate::table::is_time;
 
 /// Names of a sample rate in Hz, in lower case and without `_`.
-const RATES: [&str; 12] = [
+const RATES: [&str; 14] = [
     "fs",
     "fshz",
     "fsamp",
@@ -16,10 +17,12 @@ const RATES: [&str; 12] = [
     "samplingfrequency",
     "sampfreq",
     "ratehz",
+    "samplespersecond",
+    "samplefreq",
 ];
 
 /// Names of a time step in s, likewise.
-const STEPS: [&str; 10] = [
+const STEPS: [&str; 13] = [
     "dt",
     "dts",
     "ts",
@@ -30,6 +33,9 @@ const STEPS: [&str; 10] = [
     "sampleinterval",
     "samplinginterval",
     "samplingperiod",
+    "wfincrement",
+    "xincrement",
+    "deltax",
 ];
 
 /// Steps are the same if they differ by this part at most.
@@ -61,14 +67,44 @@ pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     contents
 }
 
+/// Gives the columns of a struct or a group, and those beside all of them, the instants of the column of time that stands
+/// among them, if there is such a struct.
+pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
+    let place = |at: usize| enclosing(&contents.columns[at].name);
+    let times: Vec<usize> = (0..contents.columns.len())
+        .filter(|at| {
+            let name = &contents.columns[*at].name;
+            is_time(name.rsplit_once(['.', '/']).map_or(name.as_str(), |(_, name)| name))
+        })
+        .collect();
+    if times.iter().all(|at| place(*at).is_empty()) {
+        return contents;
+    }
+    let len = |at: usize| contents.columns[at].values.as_ref().map_or(0, Vec::len);
+    let own = (0..contents.columns.len()).map(|at| {
+        let is_own = |time: &&usize| place(**time) == place(at) && len(**time) == len(at);
+        times.iter().find(is_own).copied()
+    });
+    let own: Vec<Option<usize>> = own.collect();
+    for (column, time) in contents.columns.iter_mut().zip(own) {
+        // What a number beside the struct states counts less.
+        if let (Axis::Unknown | Axis::Stated { .. } | Axis::Contradiction { .. }, Some(time)) =
+            (column.axis, time)
+        {
+            column.axis = Axis::Column(time);
+        }
+    }
+    contents
+}
+
 /// Name of the struct that holds a variable, empty for one that stands alone.
 fn enclosing(name: &str) -> &str {
-    name.rsplit_once('.').map_or("", |(place, _)| place)
+    name.rsplit_once(['.', '/']).map_or("", |(place, _)| place)
 }
 
 /// The time step, in s, that a number states.
-fn step(name: &str, value: f64) -> Option<f64> {
-    let key = name.rsplit_once('.').map_or(name, |(_, key)| key);
+pub(crate) fn step(name: &str, value: f64) -> Option<f64> {
+    let key = name.rsplit_once(['.', '/']).map_or(name, |(_, key)| key);
     let key = key.to_lowercase().replace('_', "");
     let step = match key.as_str() {
         rate if RATES.contains(&rate) => 1.0 / value,

@@ -47,8 +47,10 @@ pub struct ResultRow {
     pub condition_number: Option<f64>,
     /// Every check, before the fit and after it.
     pub findings: Vec<FindingRow>,
-    /// Sentences to read before using the numbers: the findings that are not good, then remarks.
+    /// Sentences of the findings that are not good.
     pub warnings: Vec<String>,
+    /// Remarks to read before using the numbers.
+    pub notes: Vec<String>,
     /// Hash of the analysis, in hexadecimal digits.
     pub analysis_hash: String,
     /// Version of this crate.
@@ -146,6 +148,7 @@ impl ResultRow {
             condition_number: None,
             findings: Vec::new(),
             warnings: Vec::new(),
+            notes: Vec::new(),
             analysis_hash: analysis.hash(),
             version: env!("CARGO_PKG_VERSION").into(),
         };
@@ -172,7 +175,6 @@ impl ResultRow {
             .map(|p| ParameterCell::new(&p.name, p.unit, p.estimate));
         let terms = of_terms.map(|p| ParameterCell::new(&p.name, &p.unit, p.estimate));
         let conspicuous = identification.checks.iter().filter(|check| check.is_conspicuous());
-        let remarks = identification.remarks.iter().cloned();
         Self {
             estimator: Some(identification.estimator.into()),
             sample_rate_hz: Some(sample_rate_hz),
@@ -186,7 +188,8 @@ impl ResultRow {
             misfit_ratio,
             condition_number: Some(condition_number),
             findings: identification.checks.iter().map(FindingRow::of).collect(),
-            warnings: conspicuous.map(CheckRow::sentence).chain(remarks).collect(),
+            warnings: conspicuous.map(CheckRow::sentence).collect(),
+            notes: identification.remarks.clone(),
             ..self
         }
     }

@@ -192,7 +192,7 @@ impl BearingData {
                 }
             }
         };
-        let mut remarks = held.unit_remarks.clone();
+        let mut remarks = held.unit_notes();
         if noise.is_none() {
             remarks.push(format!(
                 "{}: the periods show no noise ({count} of them); it was taken from the residual, on the \

@@ -125,7 +125,7 @@ impl DecaySummary {
             confidence: CONFIDENCE,
             modes: modes.collect::<Result<_, AnalysisError>>()?,
             channels: channel_rows(columns, estimate.channels()),
-            remarks: whole.unit_remarks.clone(),
+            remarks: whole.unit_notes(),
             analysis: *how,
         };
         summary.remarks.extend(summary.of_channels());

@@ -130,6 +130,7 @@ impl Cells {
             condition_number: self.number("condition_number"),
             findings,
             warnings: self.texts("warning"),
+            notes: self.texts("note"),
             analysis_hash: self.text("analysis_hash").unwrap_or_default(),
             version: self.text("version").unwrap_or_default(),
         }

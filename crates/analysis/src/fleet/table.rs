@@ -83,6 +83,7 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ("finding_verdict", findings(&|finding| finding.verdict.to_string())),
         ("finding_value", ParquetValues::Numbers(rows.iter().map(finding_values).collect())),
         ("warning", ParquetValues::Texts(rows.iter().map(|row| row.warnings.clone()).collect())),
+        ("note", ParquetValues::Texts(rows.iter().map(|row| row.notes.clone()).collect())),
         ("analysis_hash", text(&|row| Some(row.analysis_hash.clone()))),
         ("version", text(&|row| Some(row.version.clone()))),
     ];

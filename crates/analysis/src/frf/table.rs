@@ -212,8 +212,7 @@ impl FrfTable {
             last_sample: recorded.held.last_sample(),
             segments: *segments,
         };
-        let remarks =
-            records.iter().flat_map(|recorded| recorded.held.unit_remarks.iter().cloned());
+        let remarks = records.iter().flat_map(|recorded| recorded.held.unit_notes());
         let dofs = 0..measured.force.channels();
         let names: Vec<&Channels> = records.iter().map(|recorded| &*recorded.held.names).collect();
         let names = Channels::together(&names);
@@ -381,6 +380,7 @@ impl FrfTable {
             functions: functions.collect(),
             coherence: coherence.collect(),
             remarks: Vec::new(),
+            doubts: Vec::new(),
         })
     }
 

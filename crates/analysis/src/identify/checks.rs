@@ -71,6 +71,7 @@ pub(crate) fn rows(
     add(When::Before, None, &fitted.before_all);
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
         add(When::Before, Some(at), checks);
+        add(When::Before, Some(at), &record.unit_findings);
         let mut channels = of_channels(record)?;
         channels.retain(|finding| !(hits && finding.subject() == Subject::Power));
         add(When::Before, Some(at), &channels);

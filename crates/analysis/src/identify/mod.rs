@@ -367,8 +367,9 @@ impl Identified {
     /// force acts there to which the response is not known.
     pub fn add_validation(&mut self, other: &Measurement) -> Result<(), AnalysisError> {
         let (validation, held) = self.predict(other)?;
-        let of_other = held.unit_remarks.iter().filter(|_| held.file != self.summary.file);
-        self.summary.remarks.extend(of_other.cloned());
+        if held.file != self.summary.file {
+            self.summary.remarks.extend(held.unit_notes());
+        }
         self.summary.validation = Some(validation);
         self.validated = Some(held);
         Ok(())

@@ -29,6 +29,7 @@ use super::{FittedLine, Method, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::Channels;
+use crate::measurement::units::doubt;
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant};
 
@@ -71,6 +72,12 @@ pub fn identify_responses(
     let ((fit, of_machine, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
         before.into_iter().map(|finding| (When::Before, None, finding)).collect();
+    for table in tables {
+        let name = (tables.len() > 1).then(|| table.file.clone());
+        let doubts = table.doubts.iter();
+        let doubts = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
+        findings.extend(doubts.map(|finding| (When::Before, name.clone(), finding)));
+    }
     if let Some(of_segments) = &fit.averaged {
         let mut responses = of_segments.responses.iter().cloned();
         measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;

@@ -57,6 +57,7 @@ impl Tabulated {
         how: &IdentifyResponses,
     ) -> Result<Self, AnalysisError> {
         let measured = quantity(table, how)?;
+        let table: &FrequencyResponses = &with_positive_directions(table, &how.points);
         let table = &match table.added_decay {
             Some(rate) => Cow::Owned(added_decay::as_derivatives(table, measured, rate)),
             None => Cow::Borrowed(table),
@@ -178,6 +179,45 @@ impl Tabulated {
         }
         Ok(findings)
     }
+}
+
+/// Returns the responses with points in positive directions: a force or a response in −Z is one in +Z of the other sign.
+/// Points that are asked for in negative directions stay as they are.
+fn with_positive_directions<'a>(
+    table: &'a FrequencyResponses,
+    points: &[String],
+) -> Cow<'a, FrequencyResponses> {
+    let is_negative = |point: &String| {
+        let direction =
+            point.rsplit_once('-').map(|(node, direction)| (node.parse::<u64>(), direction));
+        direction.is_some_and(|(node, direction)| {
+            node.is_ok() && ["X", "Y", "Z", "RX", "RY", "RZ"].contains(&direction)
+        })
+    };
+    let mut all = table.functions.iter().flat_map(|f| [&f.response, &f.reference]);
+    if !all.any(is_negative) || points.iter().any(is_negative) {
+        return Cow::Borrowed(table);
+    }
+    let mut positive = table.clone();
+    let turn = |point: &mut String| {
+        let is_turned = is_negative(point);
+        if is_turned {
+            *point = point.replacen('-', "+", 1);
+        }
+        is_turned
+    };
+    for function in &mut positive.functions {
+        if turn(&mut function.response) != turn(&mut function.reference) {
+            function.values.iter_mut().for_each(|value| *value = -*value);
+        }
+    }
+    for coherence in &mut positive.coherence {
+        turn(&mut coherence.response);
+        if let Some(reference) = &mut coherence.reference {
+            turn(reference);
+        }
+    }
+    Cow::Owned(positive)
 }
 
 /// Returns the responses of a table as the estimators take them, and in words where their noise is

@@ -139,7 +139,8 @@ impl Inspection<'_> {
             RecordSummary::begin(table, samples, window, sampling, left_out, self.how);
         summary.remarks.extend(of_file);
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
-            doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
+            let sampling = signal::Sampling::new(dt, samples).ok()?;
+            doubtful_time(table, &time, sampling).map(|finding| finding.to_string())
         }));
         summary.remarks.extend(contradicted_rate(table, self.reading));
         let mut drawn = Vec::new();

@@ -59,6 +59,18 @@ impl Channels {
         self
     }
 
+    /// Returns the same channels with a force for each response, where fewer are measured: the others do not act.
+    /// Frequency responses need no place of a force, and take forces and responses as two lists.
+    #[must_use]
+    pub fn with_a_force_each(mut self) -> Self {
+        let responses = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
+        let count = responses.unwrap_or(0).max(self.force.len());
+        if !self.force.is_empty() {
+            self.force.resize(count, ABSENT.into());
+        }
+        self
+    }
+
     /// Returns the columns of one kind of response.
     pub fn response(&self, kind: ResponseQuantity) -> &[String] {
         match kind {

@@ -69,6 +69,9 @@ pub(crate) fn open_all(
         let reading = Reading { record_id: Some(record.id.clone()), ..reading.clone() };
         let record = RecordFile::of_table(table).with_memory(file.memory());
         Measurement::of_file(record, Some(path), channels, &reading)
+        let mut file = RecordFile::of_table(table);
+        reading.state_units(&mut file)?;
+        Measurement::of_file(file, Some(path), channels, &reading)
     });
     Ok(opened.collect())
 }

@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use mechid_io::{Limits, RecordFile, Unit};
+use mechid_estimate::checks::Finding;
+use mechid_io::{RecordFile, name_without_unit, stated_unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -108,6 +110,8 @@ pub struct Block {
     pub driven: Vec<usize>,
     /// Columns that were in other than SI units, and a time axis that may be.
     pub unit_remarks: Vec<String>,
+    /// Texts in headers that may be units.
+    pub unit_findings: Vec<Finding>,
     /// Names of the channels for results, without units.
     pub names: Arc<Channels>,
 }
@@ -150,13 +154,17 @@ impl Measurement {
         let time = reading.time_axis(file.head()).ok_or_else(|| AnalysisError::NoTimeAxis {
             file: file.head().file().into(),
             available: file.head().available(),
+            unclear: file.head().unclear_time().map(|(at, text)| (file.head().label(at), text)),
         })?;
         let survey = file.survey(&time, &channels.used())?;
-        let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
-        let doubt = doubt.or(units::contradicted_rate(file.head(), reading));
-        let doubt = doubt.or(units::coarse_time(file.head(), &time, survey.sampling));
+        let doubtful_time = units::doubtful_time(file.head(), &time, survey.sampling);
+        let doubt = units::contradicted_rate(file.head(), reading);
+        let doubt = doubt
+            .or_else(|| units::coarse_time(file.head(), &time, survey.sampling))
+            .filter(|_| doubtful_time.is_none());
         file.forget_head();
         let mut units = units;
+        units.findings.extend(doubtful_time);
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let name = |column: &String| {
             let place = file.head().find(column);
@@ -225,7 +233,12 @@ impl Measurement {
     ) -> Result<Self, AnalysisError> {
         let roles = channels.roles();
         let find = |wanted: &String| {
-            let column = columns.iter().find(|(name, _)| *name == wanted);
+            let alone = |is_named: &dyn Fn(&str) -> bool| {
+                let mut named = columns.iter().filter(|(name, _)| is_named(name));
+                named.next().filter(|_| named.next().is_none())
+            };
+            let column = alone(&|name| name == wanted)
+                .or_else(|| alone(&|name| name_without_unit(name) == *wanted));
             let available = || columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
             column.ok_or_else(|| AnalysisError::NoColumn {
                 column: wanted.clone(),
@@ -241,7 +254,7 @@ impl Measurement {
                 return Err(AnalysisError::ArrayShape { name: (*name).into(), got, expected });
             }
             into.copy_from_slice(values);
-            labels.push((format!("\"{name}\""), Unit::of(name, "")));
+            labels.push((format!("\"{name}\""), stated_unit(name, "", Some(role.quantity))));
         }
         // Finite, or an error that says where not.
         let record = Record::new(sampling, data)?;
@@ -249,7 +262,7 @@ impl Measurement {
         let data = record.into_data();
         let source = Source {
             name: "the record".into(),
-            names: Arc::new(channels.renamed(|name| Unit::without(name).to_owned())),
+            names: Arc::new(channels.renamed(|name| name_without_unit(name))),
             path: None,
             channels: channels.clone(),
             reading: Reading::default(),
@@ -478,6 +491,7 @@ impl Source {
             periods: 1,
             driven: Vec::new(),
             unit_remarks: self.units.remarks.clone(),
+            unit_findings: self.units.findings.clone(),
             names: Arc::clone(&self.names),
             force,
         })
@@ -500,6 +514,12 @@ impl Block {
         ];
         let measured = candidates.into_iter();
         measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()
+    }
+
+    /// Returns what is to be said about units: the findings, and the remarks.
+    pub fn unit_notes(&self) -> Vec<String> {
+        let findings = self.unit_findings.iter().map(Finding::to_string);
+        findings.chain(self.unit_remarks.iter().cloned()).collect()
     }
 
     /// Returns the last sample of the window, counted from 1.

@@ -1,5 +1,6 @@
 //! Settings for reading a record file.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mechid_io::{Limits, ReadOptions, RecordFile, Table, TimeAxis};
@@ -28,6 +29,13 @@ pub struct Reading {
     pub record_column: Option<String>,
     /// Record to read of such a file, by its value in that column; `None`: the only one.
     pub record_id: Option<String>,
+    /// Units of columns, by their names or numbers, whatever their headers say: `g`, `lbf`, `ms`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub units: BTreeMap<String, String>,
+    /// Factors that take columns to SI units, by their names or numbers, whatever their headers say; in SI units per
+    /// unit of the column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub scales: BTreeMap<String, f64>,
     /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
     /// `None`: 1.
     pub limits_factor: Option<usize>,
@@ -55,6 +63,23 @@ impl Reading {
     /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
     /// for, or several and none is asked for.
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
+        let mut file = self.open_as_written(path, rows)?;
+        self.state_units(&mut file)?;
+        Ok(file)
+    }
+
+    /// Gives the columns of a file the units and factors that are stated.
+    pub(super) fn state_units(&self, file: &mut RecordFile) -> Result<(), AnalysisError> {
+        for (column, unit) in &self.units {
+            file.set_unit(column, unit)?;
+        }
+        for (column, factor) in &self.scales {
+            file.set_scale(column, *factor)?;
+        }
+        Ok(())
+    }
+
+    fn open_as_written(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
         #[cfg(feature = "parquet")]
         if let Some(column) = &self.record_column {
             return many::open_one(self, path, column);

@@ -1,6 +1,7 @@
 //! Conversion of columns to SI units, and time axes in a doubtful unit.
 
-use mechid_io::{Quantity, Table, TimeAxis, Unit, escaped};
+use mechid_estimate::checks::Finding;
+use mechid_io::{Evidence, Quantity, StatedUnit, Table, TimeAxis, escaped};
 use mechid_signal::{Sampling, message, quantisation_step};
 
 use super::Reading;
@@ -25,42 +26,43 @@ pub struct ToSi {
     pub factors: Vec<f64>,
     /// Columns in other units, and a time axis that may be.
     pub remarks: Vec<String>,
+    /// Texts in headers that may be units.
+    pub findings: Vec<Finding>,
 }
 
 impl ToSi {
-    /// Returns the factors for columns with these labels and units; `None` stands for SI.
+    /// Returns the factors for columns with these labels and what their headers state about units.
     ///
     /// # Errors
     /// [`AnalysisError::Unit`] if a unit is one of another quantity.
     pub fn new(
         file: &str,
-        columns: impl Iterator<Item = (String, Option<Unit>)>,
+        columns: impl Iterator<Item = (String, Option<StatedUnit>)>,
         roles: &[Role<'_>],
     ) -> Result<Self, AnalysisError> {
-        let (mut factors, mut converted) = (Vec::new(), Vec::new());
-        for ((label, unit), role) in columns.zip(roles) {
-            let Some(unit) = unit else {
-                factors.push(1.0);
-                continue;
-            };
-            if unit.quantity != role.quantity {
+        let (mut all, mut converted) = (Self::default(), Vec::new());
+        for ((label, stated), role) in columns.zip(roles) {
+            let used = stated.as_ref().and_then(StatedUnit::used);
+            if let Some(unit) = used.filter(|unit| unit.quantity != role.quantity) {
                 return Err(AnalysisError::Unit {
                     file: file.into(),
                     column: label,
-                    unit: unit.name,
+                    unit: unit.name.clone(),
                     measures: unit.quantity,
                     setting: role.setting,
                     wanted: role.quantity,
                 });
             }
-            if unit.in_si != 1.0 {
-                converted.push(format!("{label} in {}", unit.name));
+            all.factors.push(used.map_or(1.0, |unit| unit.in_si));
+            if let Some(unit) = used.filter(|unit| unit.in_si != 1.0) {
+                converted.push(format!("{label} in {}", escaped(&unit.name)));
             }
-            factors.push(unit.in_si);
+            all.findings.extend(stated.and_then(|stated| doubt(&label, &stated, role.quantity)));
         }
-        let remark = (!converted.is_empty())
-            .then(|| format!("{file}: converted to SI units: {}", converted.join(", ")));
-        Ok(Self { factors, remarks: remark.into_iter().collect() })
+        if !converted.is_empty() {
+            all.remarks.push(format!("{file}: converted to SI units: {}", converted.join(", ")));
+        }
+        Ok(all)
     }
 
     /// Returns the factors by the units that the columns of `table` say.
@@ -68,27 +70,30 @@ impl ToSi {
     /// # Errors
     /// As [`ToSi::new`], and if there is no such column.
     pub fn of_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
-        let places = roles.iter().map(|role| table.find(role.column));
-        let places: Vec<usize> = places.collect::<Result<_, _>>()?;
-        let columns = places.iter().map(|at| (table.label(*at), table.unit(*at)));
-        let mut all = Self::new(table.file(), columns, roles)?;
-        all.remarks.extend(places.iter().zip(roles).filter_map(|(at, role)| {
-            let unit = table.unknown_unit(*at)?;
-            Some(format!(
-                "{}: the unit {} of {} is not known: its numbers are taken as {}",
-                table.file(),
-                escaped(unit),
-                table.label(*at),
-                role.quantity.si()
-            ))
-        }));
-        Ok(all)
+        let places = roles.iter().map(|role| Ok((table.find(role.column)?, role.quantity)));
+        let places: Vec<_> = places.collect::<Result<_, AnalysisError>>()?;
+        let columns = places
+            .iter()
+            .map(|(at, quantity)| (table.label(*at), table.stated_unit(*at, Some(*quantity))));
+        Self::new(table.file(), columns, roles)
     }
 
     /// Returns the factor of a column; 1 where there is no such column.
     pub fn factor(&self, column: usize) -> f64 {
         self.factors.get(column).copied().unwrap_or(1.0)
     }
+}
+
+/// Returns the finding about a text that may be a unit, if there is a doubt.
+pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Option<Finding> {
+    let unit = stated.unit.as_ref().filter(|unit| unit.quantity == wanted);
+    (stated.evidence != Evidence::Stated).then(|| Finding::Unit {
+        column: column.into(),
+        text: escaped(&stated.text).to_string(),
+        factor: unit.map(|unit| unit.in_si),
+        used: stated.evidence == Evidence::Likely,
+        si: wanted.si(),
+    })
 }
 
 /// Relative difference of two sampling rates that are one: a time column is printed with some digits.
@@ -126,33 +131,38 @@ const RATHER_SLOW_HZ: f64 = 20.0;
 /// Duration, in s, from which [`RATHER_SLOW_HZ`] holds.
 const LONG_S: f64 = 1000.0;
 
-/// Returns a remark if a time column without a unit gives a record so slow and long that it may be in
-/// milliseconds.
+/// Sampling rate, in Hz, above which a time column without a unit is doubtful: no channel of a force or a response is
+/// sampled so fast, but day numbers look so.
+const FAST_HZ: f64 = 1e7;
+
+/// Sampling rate, in Hz, above which instants behind [`DAY_NUMBERS`] are doubtful: that of day numbers at 1 Hz.
+const RATHER_FAST_HZ: f64 = 86_400.0;
+
+/// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.
+const DAY_NUMBERS: f64 = 20_000.0;
+
+/// Size of a day, in s.
+const DAY_S: f64 = 86_400.0;
+
+/// Returns a finding if a time column without a unit gives a record so slow and long that it may be in
+/// milliseconds, or so fast that it may be in days.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
     sampling: Sampling,
-) -> Option<String> {
+) -> Option<Finding> {
     let TimeAxis::Column(name) = time else { return None };
     let column = table.find(name).ok()?;
-    let (rate_hz, long_s) = (1.0 / sampling.dt(), sampling.len() as f64 * sampling.dt());
-    let doubtful = rate_hz <= SLOW_HZ || (rate_hz <= RATHER_SLOW_HZ && long_s >= LONG_S);
-    if !doubtful || table.says_unit_of_time(column) {
+    let (rate_hz, duration_s) = (1.0 / sampling.dt(), sampling.len() as f64 * sampling.dt());
+    let first = table.values(column).ok().and_then(|times| times.first().copied()).unwrap_or(0.0);
+    let is_slow = rate_hz <= SLOW_HZ || (rate_hz <= RATHER_SLOW_HZ && duration_s >= LONG_S);
+    let is_fast = rate_hz >= FAST_HZ || (rate_hz >= RATHER_FAST_HZ && first >= DAY_NUMBERS);
+    if !(is_slow || is_fast) || table.says_unit_of_time(column) {
         return None;
     }
-    let name = match table.names()[column].trim() {
-        "" => "time",
-        name => name,
-    };
-    Some(format!(
-        "{}: the time in column {} has no unit and is taken as seconds: {} Hz, {} s long; if it is in \
-         ms, call it {name}_ms in the file or give `sample_rate` {}; if in s, {name}_s",
-        table.file(),
-        table.label(column),
-        compact(rate_hz, 6),
-        compact(long_s, 6),
-        compact(1000.0 * rate_hz, 8),
-    ))
+    let (unit, factor) = if is_slow { ("ms", 1e-3) } else { ("days", DAY_S) };
+    let column = table.label(column);
+    Some(Finding::TimeUnit { column, rate_hz, duration_s, unit, factor })
 }
 
 /// Error of a sampling rate by the digits of its time column, relative to the rate, from which frequencies may be known

@@ -158,6 +158,7 @@ impl Windowed {
             file: held.file.clone(),
             driven: held.driven.clone(),
             unit_remarks: held.unit_remarks.clone(),
+            unit_findings: held.unit_findings.clone(),
             names: Arc::clone(&held.names),
         };
         let start = self.window.start;

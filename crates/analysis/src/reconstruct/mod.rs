@@ -236,7 +236,7 @@ impl Task {
         tally: &Tally<'_>,
     ) -> ForceSummary {
         let Self { recorded, request } = self;
-        let mut remarks = recorded.unit_remarks().to_vec();
+        let mut remarks = recorded.unit_notes();
         remarks.extend(tally.remark());
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();

@@ -88,9 +88,10 @@ impl Recorded {
             .collect()
     }
 
-    /// Returns the remarks on units and time.
-    pub fn unit_remarks(&self) -> &[String] {
-        &self.source.units.remarks
+    /// Returns what is to be said about units and time.
+    pub fn unit_notes(&self) -> Vec<String> {
+        let findings = self.source.units.findings.iter().map(ToString::to_string);
+        findings.chain(self.source.units.remarks.iter().cloned()).collect()
     }
 
     /// Returns all of the window, or its mean period.

@@ -78,6 +78,7 @@ fn mean(
         periods: 1,
         driven: held.driven.clone(),
         unit_remarks: held.unit_remarks.clone(),
+        unit_findings: held.unit_findings.clone(),
         names: Arc::clone(&held.names),
     }))
 }

@@ -150,7 +150,7 @@ pub fn sweep_record(
     let (file, samples) = (measured.file.clone(), measured.period);
     let mut summary =
         how.summary(file, samples, &swept, reference, (natural_frequency_hz, &rate_hz))?;
-    summary.remarks.extend(measured.unit_remarks.clone());
+    summary.remarks.extend(measured.unit_notes());
     if how.estimator.is_of_spectra() && measured.held_to().is_none() {
         let motion = measured.response().0;
         let seam = periodicity(motion);

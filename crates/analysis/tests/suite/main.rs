@@ -15,6 +15,7 @@ mod headlines;
 mod modal;
 mod nonlinear;
 mod random;
+mod reading;
 mod rig;
 mod tables;
 mod unscaled;

@@ -62,6 +62,11 @@ impl HitArgs {
         Ok(of_records)
     }
 
+    /// Returns whether the hammer struck another point in each record.
+    pub fn is_struck(&self) -> bool {
+        !self.struck.is_empty()
+    }
+
     /// Returns the rule by which hits are found, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
         self.rule.rule()

@@ -104,12 +104,13 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
 #[allow(rustdoc::broken_intra_doc_links, reason = "brackets of a help text")]
 #[derive(Debug, Clone, Args)]
 pub struct RecordArgs {
-    /// The record: text with one row per sample, MATLAB .mat (up to -v7), universal file (dataset 58),
-    /// or Parquet; also in gzip; - is standard input
+    /// The record: text with one row per sample, MATLAB .mat, HDF5, universal file (dataset 58), or
+    /// Parquet; also in gzip; - is standard input
     ///
     /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
-    /// found too; lines starting with # are left out. MATLAB: a vector is a column, of a matrix
-    /// those called name[1], name[2] …, of a struct name.field. Universal file: a function of time
+    /// found too, the header also in a comment (#, %, !) or of LabVIEW (.lvm). MATLAB: a vector is a
+    /// column, of a matrix those called name[1], name[2] …, of a struct name.field. HDF5: a data set
+    /// is a column called by its path, such as run/force. Universal file: a function of time
     /// is a column called after its node and direction, such as 12+Z, and brings its time axis. Parquet:
     /// instants are read as seconds from the first one on; units and sample_rate_hz may stand among the
     /// keys of the file.
@@ -146,6 +147,14 @@ pub struct RecordArgs {
         help_heading = "Time and window"
     )]
     pub sample_rate: Option<f64>,
+    /// Unit of a column, whatever its header says: acc=g, Force=lbf, time=ms; may be repeated
+    #[arg(long = "unit", value_name = "COLUMN=UNIT", value_parser = column_and_text, help_heading = "Units")]
+    pub units: Vec<(String, String)>,
+    /// Factor that takes a column to SI units, such as that of a sensor: Force=0.0893 for 11.2 mV/N and numbers
+    /// in mV; may be repeated
+    #[arg(long = "scale", value_name = "COLUMN=FACTOR", value_parser = column_and_factor,
+          help_heading = "Units")]
+    pub scales: Vec<(String, f64)>,
     /// First sample of the window, counted from 1
     #[arg(long, value_name = "SAMPLE", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Time and window")]
@@ -160,6 +169,26 @@ pub struct RecordArgs {
     /// Constant to subtract from every channel: the mean of the whole record, not only of the window
     #[arg(long, value_name = "WHAT", value_enum, help_heading = "Time and window")]
     pub detrend: Option<DetrendChoice>,
+}
+
+/// Parses a column and a text behind the last equals sign.
+fn column_and_text(text: &str) -> Result<(String, String), String> {
+    match text.rsplit_once('=') {
+        Some((column, value)) if !column.is_empty() && !value.is_empty() => {
+            Ok((column.trim().into(), value.trim().into()))
+        }
+        _ => Err("a column and a value with = between them are needed".into()),
+    }
+}
+
+/// Parses a column and a factor.
+fn column_and_factor(text: &str) -> Result<(String, f64), String> {
+    let (column, factor) = column_and_text(text)?;
+    let factor = factor.parse::<f64>().map_err(|e| format!("a number is needed: {e}"))?;
+    if !factor.is_normal() {
+        return Err(format!("a finite factor other than 0 is needed, got {factor}"));
+    }
+    Ok((column, factor))
 }
 
 /// Parses a positive, finite number.
@@ -190,6 +219,8 @@ impl RecordArgs {
             detrend: self.detrend.map_or(Detrend::None, Detrend::from),
             record_column: self.record_column.clone(),
             record_id: self.record_id.clone(),
+            units: self.units.iter().cloned().collect(),
+            scales: self.scales.iter().cloned().collect(),
             limits_factor: self.raise_limits,
             memory_gb: self.memory_gb,
         }

@@ -19,7 +19,7 @@ use crate::worker::worker_program;
 
 /// Identify many records by one saved analysis, into a folder of Parquet files
 ///
-/// Every record becomes one row: parameters, standard errors, covariance, modes, findings, warnings,
+/// Every record becomes one row: parameters, standard errors, covariance, modes, findings, warnings, notes,
 /// or the error of a record that cannot be identified. The records are divided into parts of so many
 /// records, by rising path; a part is one file of the folder, complete or not there. Run again, the
 /// command computes what is missing: the parts that were not finished, and those in which a record,

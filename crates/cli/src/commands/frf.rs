@@ -84,7 +84,11 @@ impl FrfArgs {
 
     /// Reads, averages, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
+        let mut channels = self.channels.channels();
+        if !self.hits.is_struck() {
+            channels = channels.with_a_force_each();
+        }
+        let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
         let how = FrfSettings {
             estimator: self.estimator.into(),
             lines: self.lines.choice(),

@@ -21,6 +21,8 @@ use crate::IoError;
 use crate::contents::{Column, Contents, Fault, Place};
 use crate::limits::{Budget, Limit};
 use crate::stated_rates::with_stated_rates;
+use crate::limits::{Budget, Limit, Limits};
+use crate::stated_rates::{with_own_times, with_stated_rates};
 
 /// Number of bytes before the first variable.
 const HEADER: usize = 128;
@@ -35,7 +37,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents,
         let at = Place::Byte(fault.at + 1);
         fault.error(file, at)
     })?;
-    let contents = with_stated_rates(contents);
+    let contents = with_own_times(with_stated_rates(contents));
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
     }

@@ -194,7 +194,11 @@ impl<R: ChunkReader + 'static> Columns<R> {
                 }
             };
             for (contents, column) in contents.iter_mut().zip(columns) {
-                contents.columns.push(Column { about: about.clone(), ..column });
+                contents.columns.push(Column {
+                    about: about.clone(),
+                    unit: about.clone(),
+                    ..column
+                });
             }
         }
         Ok(contents)

@@ -6,6 +6,7 @@ use super::blocks::Block;
 use super::delimiter::{Delimiter, words};
 use super::dialect::{Number, number};
 use super::fields::{Fields, Layout, Row, RowIter};
+use super::instant::Instant;
 use crate::contents::{DecimalSign, Lines, Place, Unusable};
 
 /// Largest number of characters of a field that a message repeats.
@@ -21,6 +22,9 @@ pub(super) struct Plan {
     pub filled: usize,
     /// Indices of the columns to read, rising.
     pub wanted: Vec<usize>,
+    /// Day from which the instants of a wanted column count, counted from 1970-01-01; `None` of numbers. Empty if no
+    /// column has instants.
+    pub origins: Vec<Option<i64>>,
     /// Decimal sign of all numbers, as far as it is known.
     pub decimal: Option<DecimalSign>,
     pub row_bytes: usize,
@@ -129,6 +133,9 @@ impl Batch {
             let column = wanted.next_if(|(_, field)| *field == fields).map(|(column, _)| column);
             fields += 1;
             let number = column.and_then(|column| {
+                if plan.origin(column).is_some() {
+                    return None;
+                }
                 let (value, len) = plain_number(rest)?;
                 let is_whole = rest.get(len).is_none_or(|next| *next == delimiter);
                 (is_whole && self.accept(column, value, &rest[..len])).then_some(len)
@@ -166,7 +173,8 @@ impl Batch {
             let column = wanted.next_if(|(_, field)| *field == fields);
             fields += 1;
             if let Some((column, _)) = column {
-                let number = plain_number(word).filter(|(_, len)| *len == word.len());
+                let number = plain_number(word)
+                    .filter(|(_, len)| *len == word.len() && plan.origin(column).is_none());
                 if !number.is_some_and(|(value, _)| self.accept(column, value, word)) {
                     self.field(plan, row.line, column, word);
                 }
@@ -203,6 +211,14 @@ impl Batch {
         if self.unusable[column].is_some() {
             return;
         }
+        if let Some(origin) = plan.origin(column) {
+            match Instant::parse(field) {
+                Some(instant) => self.columns[column].push(instant.since(origin)),
+                None if field.is_empty() => self.faults.push((column, Unusable::Empty { line })),
+                None => self.faults.push((column, Unusable::Text { line, text: shown(field) })),
+            }
+            return;
+        }
         match number(field, plan.layout.delimiter, &mut self.with_point) {
             Some(Number { value, .. }) if !value.is_finite() => {
                 let at = Place::Line(line);
@@ -229,6 +245,11 @@ impl Batch {
 }
 
 impl Plan {
+    /// Returns the day from which the instants of a wanted column count; `None` of numbers.
+    fn origin(&self, column: usize) -> Option<i64> {
+        self.origins.get(column).copied().flatten()
+    }
+
     /// Checks the number of fields of a row. Fields beyond either end are forgiven where they are
     /// empty: rigs end some lines with a delimiter and others not.
     pub fn check(&self, line: u64, fields: usize, filled: usize) -> Result<(), BadRow> {

@@ -7,6 +7,7 @@ use memchr::{memchr, memchr_iter};
 
 use super::dialect::is_sample;
 use super::fields::{Layout, RowIter};
+use super::lvm::{self, LvmHeader};
 use super::source::{BYTE_ORDER_MARK, Source, failed};
 use crate::IoError;
 use crate::contents::Place;
@@ -56,6 +57,8 @@ pub(super) struct Blocks<'a> {
     /// Bytes read behind the last block.
     rest: Vec<u8>,
     end: Option<TextEnd>,
+    /// Header of a LabVIEW measurement file, which is left out.
+    lvm: Option<LvmHeader>,
 }
 
 impl<'a> Blocks<'a> {
@@ -82,6 +85,7 @@ impl<'a> Blocks<'a> {
             row_bytes: options.limits.row_bytes,
             rest: Vec::new(),
             end: None,
+            lvm: None,
         };
         while blocks.end.is_none() && !is_sample(&blocks.rest, terminator) {
             blocks.fill(blocks.rest.len().max(BLOCK_BYTES))?;
@@ -92,7 +96,43 @@ impl<'a> Blocks<'a> {
         if blocks.rest.starts_with(BYTE_ORDER_MARK) {
             blocks.rest.drain(..BYTE_ORDER_MARK.len());
         }
+        if options.skip_lines == 0 && lvm::is_lvm(&blocks.rest) {
+            blocks.leave_out_header()?;
+        }
         Ok(blocks)
+    }
+
+    /// Leaves out the header of a LabVIEW measurement file.
+    fn leave_out_header(&mut self) -> Result<(), IoError> {
+        while self.end.is_none()
+            && !lvm::is_complete(&self.rest)
+            && self.rest.len() < lvm::MAX_BYTES
+        {
+            self.fill(BLOCK_BYTES)?;
+        }
+        self.lvm = LvmHeader::parse(&self.rest, self.terminator);
+        if let Some(header) = &self.lvm {
+            self.line += header.lines;
+            self.rest.drain(..header.bytes);
+        }
+        // The dialect shows in the rows of the table.
+        while self.end.is_none() && !is_sample(&self.rest, self.terminator) {
+            self.fill(self.rest.len().max(BLOCK_BYTES))?;
+            if self.rest.len() >= SAMPLE_BYTES {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the header of a LabVIEW measurement file.
+    pub fn take_lvm(&mut self) -> Option<LvmHeader> {
+        self.lvm.take()
+    }
+
+    /// Number of the line of the file with which the text begins.
+    pub fn first_line(&self) -> u64 {
+        self.line
     }
 
     /// Name of the file in messages.

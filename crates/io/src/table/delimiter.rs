@@ -26,8 +26,8 @@ impl Delimiter {
     }
 }
 
-/// First byte of a comment line.
-pub(crate) const COMMENT: u8 = b'#';
+/// First bytes of comment lines; a semicolon only where it separates no fields.
+pub(crate) const COMMENTS: &[u8] = b"#%!;";
 
 /// Returns whether a line is a comment.
 pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
@@ -35,7 +35,7 @@ pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
         Delimiter::Byte(_) => line.first(),
         Delimiter::Blanks => words(line).next().and_then(<[u8]>::first),
     };
-    first == Some(&COMMENT)
+    first.is_some_and(|first| COMMENTS.contains(first) && delimiter != Delimiter::Byte(*first))
 }
 
 /// The fields of a line that stand between blanks.

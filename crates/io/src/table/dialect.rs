@@ -2,8 +2,9 @@
 
 use memchr::memchr_iter;
 
-use super::delimiter::{COMMENT, Delimiter};
+use super::delimiter::{COMMENTS, Delimiter};
 use super::fields::Fields;
+use super::instant::Instant;
 use crate::contents::DecimalSign;
 
 /// Number of lines from which the delimiter and the decimal sign are found.
@@ -17,8 +18,11 @@ pub(crate) fn is_sample(start: &[u8], terminator: u8) -> bool {
 
 /// Lines that are neither empty nor comments.
 fn sample(text: &[u8], terminator: u8) -> impl Iterator<Item = &[u8]> {
-    text.split(move |b| *b == terminator)
-        .filter(|line| line.trim_ascii().first().is_some_and(|first| *first != COMMENT))
+    text.split(move |b| *b == terminator).filter(|line| {
+        // A semicolon may be a delimiter behind an empty field.
+        let first = line.trim_ascii().first();
+        first.is_some_and(|first| *first == b';' || !COMMENTS.contains(first))
+    })
 }
 
 /// The delimiter of a text: the first of semicolon, tab and comma that stands outside quotes on
@@ -102,6 +106,11 @@ pub(crate) fn number(
     with_point.extend([whole, ".", places]);
     let value = with_point.parse().ok()?;
     Some(Number { value, sign: Some(DecimalSign::Comma) })
+}
+
+/// Returns whether a field is data: a number, or an instant of a date or a clock.
+pub(crate) fn is_data(field: &[u8], delimiter: Delimiter) -> bool {
+    is_number(field, delimiter) || Instant::parse(field).is_some()
 }
 
 /// Returns whether a field is a number.

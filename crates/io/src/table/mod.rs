@@ -5,7 +5,10 @@ mod blocks;
 mod delimiter;
 mod dialect;
 mod fields;
+mod heading;
+mod instant;
 mod inventory;
+mod lvm;
 mod preamble;
 mod printed;
 mod record_file;
@@ -14,12 +17,13 @@ pub(crate) mod source;
 mod text;
 mod time_axis;
 mod time_unit;
-mod unit;
+
+pub(crate) use self::time_unit::is_time;
 
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use mechid_signal::{Record, Sampling, SignalError};
+use mechid_signal::{Record, Sampling, SignalError, message};
 use nalgebra::DMatrix;
 
 pub use self::inventory::{Inventory, Tally};
@@ -27,10 +31,11 @@ pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source, Stored};
 use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
-use self::unit::without_unit;
-pub use self::unit::{Quantity, Unit};
-use crate::contents::{Axis, Column, Contents, DecimalSign, Place};
+use crate::contents::{Axis, Column, Contents, DecimalSign, Override, Place};
 use crate::limits::ReadOptions;
+use crate::units::{
+    Evidence, Quantity, StatedUnit, Unit, names_without_unit, stated, without_unit,
+};
 use crate::{IoError, escaped, mat, uff};
 
 /// Number of columns that a message lists.
@@ -42,6 +47,7 @@ const MOST_LISTED: usize = 50;
 /// |---|---|---|
 /// | delimited text | none of the others | fields of a row |
 /// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, columns of matrices, fields of structs |
+/// | MATLAB 7.3, HDF5 | its first bytes | data sets by their paths, columns of matrices, fields of structs |
 /// | universal file, datasets 58 and 58b | `    -1` in its first line | functions of time, by node and direction |
 /// | gzip around any of them | its first two bytes | |
 ///
@@ -147,7 +153,7 @@ impl Table {
                 text.finish(end.unwrap_or_default())?
             }
             Kind::Json => return Err(IoError::JsonRecord { file }),
-            Kind::Mat5 | Kind::Uff | Kind::Parquet if options.skip_lines > 0 => {
+            Kind::Mat5 | Kind::Uff | Kind::Parquet | Kind::Hdf5 if options.skip_lines > 0 => {
                 return Err(IoError::NothingToSkip { file });
             }
             Kind::Mat5 => {
@@ -165,6 +171,11 @@ impl Table {
             }
             #[cfg(not(feature = "parquet"))]
             Kind::Parquet => return Err(IoError::UnknownFormat { file }),
+            #[cfg(feature = "hdf5")]
+            Kind::Hdf5 => {
+                crate::hdf5::read(&file, source.bytes(&options.limits)?, &options.limits)?
+            }
+            #[cfg(not(feature = "hdf5"))]
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
@@ -234,23 +245,66 @@ impl Table {
         &self.contents.columns[column].about
     }
 
-    /// The unit of a force or a response that a column states, by its index counted from 0:
-    /// at the end of its name in brackets (`Force [kN]`, `x (µm)`) or after a stroke (`F / kN`), or
-    /// in the line of units. [`Table::to_si`] has the factor.
+    /// Text for the unit of a column in a line of units, a label or an attribute, by its index; empty if there is none.
+    pub(crate) fn unit_text(&self, column: usize) -> &str {
+        &self.contents.columns[column].unit
+    }
+
+    /// The unit in which the numbers of a column are taken, by its index counted from 0: in its name in brackets
+    /// (`Force [kN]`, `[mm] x`), after a stroke (`F / kN`) or as a word (`force_lbf`), or in the line of units.
+    /// [`Table::to_si`] has the factor.
     ///
     /// # Panics
     /// If there is no such column.
     pub fn unit(&self, column: usize) -> Option<Unit> {
-        Unit::of(&self.names[column], self.about(column))
+        self.stated_unit(column, None)?.used().cloned()
     }
 
-    /// The text of a unit that a column, by its index counted from 0, states in square brackets or in the line of
-    /// units, if it is none that is known, such as `V`: then its numbers are taken as they are.
+    /// What a column states about its unit, by its index counted from 0, where it should hold a quantity: the unit, or a
+    /// text that may be one and is not understood.
     ///
     /// # Panics
     /// If there is no such column.
-    pub fn unknown_unit(&self, column: usize) -> Option<&str> {
-        Unit::unknown(&self.names[column], self.about(column))
+    pub fn stated_unit(&self, column: usize, wanted: Option<Quantity>) -> Option<StatedUnit> {
+        let column = &self.contents.columns[column];
+        let evidence = Evidence::Stated;
+        match &column.overriding {
+            Some(Override::Unit(unit)) => {
+                let text = unit.name.clone();
+                Some(StatedUnit { text, unit: Some(unit.clone()), evidence })
+            }
+            Some(Override::Scale(factor)) => {
+                let name = format!("units of {}", message::number(*factor));
+                let unit = wanted.map(|quantity| Unit { name, quantity, in_si: *factor });
+                unit.map(|unit| StatedUnit { text: unit.name.clone(), unit: Some(unit), evidence })
+            }
+            None => stated(&column.name, &column.unit, wanted),
+        }
+    }
+
+    /// States the unit of a column, whatever its name says; the column is chosen as in [`Table::find`].
+    ///
+    /// # Errors
+    /// [`IoError::NoUnit`] if the text is no unit of a force, a response or a time, and those of [`Table::find`].
+    pub fn set_unit(&mut self, column: &str, unit: &str) -> Result<(), IoError> {
+        let at = self.find(column)?;
+        let unit = Unit::parse(unit).ok_or_else(|| IoError::NoUnit { text: unit.into() })?;
+        self.contents.columns[at].overriding = Some(Override::Unit(unit));
+        Ok(())
+    }
+
+    /// States the factor that takes a column to SI units, in SI units per unit of the column; the column is chosen as in
+    /// [`Table::find`].
+    ///
+    /// # Errors
+    /// [`IoError::NoScale`] unless the factor is finite and not 0, and those of [`Table::find`].
+    pub fn set_scale(&mut self, column: &str, factor: f64) -> Result<(), IoError> {
+        let at = self.find(column)?;
+        if !factor.is_normal() {
+            return Err(IoError::NoScale { factor });
+        }
+        self.contents.columns[at].overriding = Some(Override::Scale(factor));
+        Ok(())
     }
 
     /// Factor that takes a column, by its index counted from 0, to the SI unit of `wanted` (N, m, m/s,
@@ -262,13 +316,13 @@ impl Table {
     /// # Panics
     /// If there is no such column.
     pub fn to_si(&self, column: usize, wanted: Quantity) -> Result<f64, IoError> {
-        match self.unit(column) {
+        match self.stated_unit(column, Some(wanted)).as_ref().and_then(StatedUnit::used) {
             None => Ok(1.0),
             Some(unit) if unit.quantity == wanted => Ok(unit.in_si),
             Some(unit) => Err(IoError::OtherQuantity {
                 file: self.file.clone(),
                 column: self.label(column),
-                unit: unit.name,
+                unit: unit.name.clone(),
                 quantity: unit.quantity,
                 wanted,
             }),
@@ -309,7 +363,12 @@ impl Table {
 
     /// The first column named `time` or `t`, in any case, with a unit (`time_ms`, `Time [s]`) or without.
     pub fn time_column(&self) -> Option<&str> {
-        self.names.iter().map(String::as_str).find(|name| time_unit::is_time(name))
+        let is_time = |at: &usize| {
+            let column = &self.contents.columns[*at];
+            let stated = column.overriding.is_some() && time_unit::is_called_time(&column.name);
+            stated || time_unit::is_time(&column.name)
+        };
+        (0..self.width()).find(is_time).map(|at| self.names[at].as_str())
     }
 
     /// Returns whether a time column, by its index counted from 0, states its unit, in its name or in
@@ -319,7 +378,17 @@ impl Table {
     /// # Panics
     /// If there is no such column.
     pub fn says_unit_of_time(&self, column: usize) -> bool {
-        time_unit::stated(&self.contents.columns[column]).is_some()
+        let column = &self.contents.columns[column];
+        column.has_instants || time_unit::unit_of(column).is_some()
+    }
+
+    /// Returns the first column that is called time and states a unit that is not one of time, with that text.
+    pub fn unclear_time(&self) -> Option<(usize, String)> {
+        (0..self.width()).find_map(|at| {
+            let column = &self.contents.columns[at];
+            let is_time = time_unit::is_called_time(&column.name);
+            time_unit::unclear(column).filter(|_| is_time).map(|text| (at, text))
+        })
     }
 
     /// Indices, counted from 0, of the columns that have a name or a first value; a trailing delimiter
@@ -351,7 +420,8 @@ impl Table {
     }
 
     /// Index, counted from 0, of the column with this name; failing that, of the one with this name
-    /// before its unit (`Fx` for `Fx [N]`); failing that, of the one with this number, counted from 1.
+    /// without its unit (`Fx` for `Fx [N]`), in this case or in another; failing that, of the one with this
+    /// number, counted from 1.
     ///
     /// # Errors
     /// [`IoError::MissingColumn`], [`IoError::AmbiguousColumn`].
@@ -379,10 +449,17 @@ impl Table {
                 }),
             }
         };
-        let named = match only(&|name| name == wanted)? {
-            None => only(&|name| without_unit(name) == wanted)?,
-            found => found,
-        };
+        let mut named = only(&|name| name.trim() == wanted)?;
+        if named.is_none() {
+            named = only(&|name| names_without_unit(name).iter().any(|bare| bare == wanted))?;
+        }
+        if named.is_none() {
+            let lower = wanted.to_lowercase();
+            let is_alike = |name: &str| name.to_lowercase() == lower;
+            named = only(&|name| {
+                is_alike(name.trim()) || names_without_unit(name).iter().any(|bare| is_alike(bare))
+            })?;
+        }
         named.or_else(number).ok_or_else(missing)
     }
 
@@ -509,7 +586,7 @@ impl Table {
     /// # Panics
     /// If there is no such column.
     pub fn short_name(&self, column: usize) -> String {
-        match Unit::without(&self.names[column]) {
+        match without_unit(&self.names[column]).as_str() {
             "" => format!("column {}", column + 1),
             name => escaped(name).to_string(),
         }

@@ -1,14 +1,14 @@
 //! The line on which a table begins below other text.
 
 use super::delimiter::is_comment;
-use super::dialect::{detect, is_number};
+use super::dialect::{detect, is_data};
 use super::fields::{Fields, Layout, Row, RowIter};
 
 /// Number of rows looked at: a header, units, and numbers.
 const ROWS: usize = 4;
 
-/// Number of lines that may stand above a table.
-const MOST_LINES: usize = 200;
+/// Maximum number of lines above a table; one further down is not found.
+const MOST_LINES: usize = 5000;
 
 /// Beginning of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ fn begins(text: &[u8], terminator: u8) -> Option<usize> {
     let rows = first_rows(text, Layout { delimiter, terminator });
     let width = rows.first().map(Fields::filled).filter(|width| *width > 1)?;
     let numbers = |row: &Fields| {
-        let count = row.iter().filter(|field| is_number(field, delimiter)).count();
+        let count = row.iter().filter(|field| is_data(field, delimiter)).count();
         2 * count >= row.filled()
     };
     let words = rows.iter().take_while(|row| !numbers(row)).count();

@@ -129,6 +129,22 @@ impl RecordFile {
         &self.head
     }
 
+    /// States the unit of a column, as [`Table::set_unit`] does.
+    ///
+    /// # Errors
+    /// As [`Table::set_unit`].
+    pub fn set_unit(&mut self, column: &str, unit: &str) -> Result<(), IoError> {
+        self.head.set_unit(column, unit)
+    }
+
+    /// States the factor of a column, in SI units per unit of the column, as [`Table::set_scale`] does.
+    ///
+    /// # Errors
+    /// As [`Table::set_scale`].
+    pub fn set_scale(&mut self, column: &str, factor: f64) -> Result<(), IoError> {
+        self.head.set_scale(column, factor)
+    }
+
     /// Returns whether [`RecordFile::head`] has all samples.
     pub fn is_whole(&self) -> bool {
         self.whole
@@ -187,8 +203,8 @@ impl RecordFile {
             (false, Some(column)) => self.sampling_of(column, steps, lengths[count])?,
             (false, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
-                // A text has none, which is the error.
-                _ => self.head.sampling(time, wanted)?,
+                // The header of the file states it, or it is missing, which is the error.
+                _ => self.head.signal(self.head.sampling(time, wanted)?.with_len(len))?,
             },
         };
         // The time column first, as in a table held whole.

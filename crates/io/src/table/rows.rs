@@ -1,10 +1,15 @@
 //! Rows of fields into columns of numbers, none of which is held as text.
 
+use std::collections::BTreeMap;
+
 use super::batch::{BadRow, Batch, Plan};
 use super::blocks::Block;
-use super::dialect::is_number;
+use super::dialect::{is_data, is_number};
 use super::fields::{Fields, Layout, RowIter};
 use super::source::Stored;
+use super::heading::{self, Heading};
+use super::instant::Instant;
+use super::lvm::{self, LvmHeader};
 use crate::IoError;
 use crate::contents::{Axis, Column, Contents, DecimalSign, Lines, Place, Unusable};
 use crate::limits::{Budget, Limit, Limits};
@@ -29,6 +34,10 @@ pub(super) struct Rows {
     has_samples: bool,
     samples: usize,
     lines: Lines,
+    /// Header of a LabVIEW measurement file.
+    lvm: Option<LvmHeader>,
+    /// Days from which the instants of columns count, by column.
+    origins: BTreeMap<usize, i64>,
     /// Rows of empty fields not yet followed by another one: line and number of fields. At the end
     /// of the file they do not count.
     empty: Vec<(u64, usize)>,
@@ -67,8 +76,16 @@ impl Rows {
             has_samples: false,
             samples: 0,
             lines: Lines::default(),
+            lvm: None,
+            origins: BTreeMap::new(),
             empty: Vec::new(),
         }
+    }
+
+    /// Takes units and time axes from the header of a LabVIEW measurement file.
+    #[must_use]
+    pub fn with_lvm(self, lvm: Option<LvmHeader>) -> Self {
+        Self { lvm, ..self }
     }
 
     /// Line of the first row, if there was one.
@@ -123,6 +140,11 @@ impl Rows {
         if self.has_samples {
             return Ok(0);
         }
+        if self.first.is_none()
+            && let Some(at) = self.take_heading(block)?
+        {
+            return Ok(at);
+        }
         let mut fields = Fields::default();
         for row in RowIter::new(&block.text, self.layout) {
             let line = block.line + row.line;
@@ -148,34 +170,86 @@ impl Rows {
                     }
                 }
             }
-            for &column in self.wanted.iter().flatten() {
-                self.columns[column].filled |= !fields.get(column).is_empty();
-            }
-            self.has_samples = true;
+            self.begin_samples(&fields);
             return Ok(row.at);
         }
         Ok(block.text.len())
     }
 
+    /// Takes names and units that stand in several rows or in comments above the first row of numbers; returns the
+    /// offset of that row in the block, or `None` if there are none of these.
+    fn take_heading(&mut self, block: &Block) -> Result<Option<usize>, IoError> {
+        let rows = heading::first_rows(&block.text, self.layout);
+        if rows.iter().any(|row| row.row.text.len() > self.limits.row_bytes) {
+            return Ok(None);
+        }
+        let Some(heading) = Heading::find(&block.text, &rows, self.layout) else { return Ok(None) };
+        let begin = &rows[heading.begin];
+        let line = block.line + rows[heading.names_row.unwrap_or(heading.begin)].row.line;
+        let width = begin.fields.len().max(heading.names.len());
+        self.make_columns(line, width, heading.filled)?;
+        self.has_header = true;
+        self.has_units = !heading.units.is_empty();
+        for (column, name) in self.columns.iter_mut().zip(heading.names) {
+            column.filled = !name.is_empty();
+            column.name = name;
+        }
+        for (column, unit) in self.columns.iter_mut().zip(heading.units) {
+            column.about.clone_from(&unit);
+            column.unit = unit;
+        }
+        self.begin_samples(&begin.fields);
+        Ok(Some(begin.row.at))
+    }
+
+    /// Takes what the first row of numbers says about the columns.
+    fn begin_samples(&mut self, fields: &Fields) {
+        for &column in self.wanted.iter().flatten() {
+            self.columns[column].filled |= !fields.get(column).is_empty();
+            let field = fields.get(column);
+            let is_number = is_number(field, self.layout.delimiter);
+            if let Some(instant) = Instant::parse(field).filter(|_| !is_number) {
+                self.columns[column].has_instants = true;
+                self.origins.insert(column, instant.day.unwrap_or(0));
+            }
+        }
+        self.apply_lvm();
+        self.has_samples = true;
+    }
+
+    /// Gives the columns the units and the time axes of a LabVIEW header.
+    fn apply_lvm(&mut self) {
+        let Some(lvm) = self.lvm.take() else { return };
+        for (channel, unit) in lvm.units.iter().enumerate() {
+            if let Some(column) = self.columns.get_mut(lvm.column(channel)) {
+                column.unit.clone_from(unit);
+                column.about.clone_from(unit);
+            }
+        }
+        for channel in 0..self.columns.len() {
+            let at = lvm.column(channel);
+            let axis = match (lvm.instants, lvm.axes.get(channel)) {
+                (lvm::Instants::No, Some((start, step))) if *step > 0.0 && start.is_finite() => {
+                    Axis::Even { start: *start, step: *step }
+                }
+                (lvm::Instants::Each, _) => Axis::Column(at - 1),
+                _ => continue,
+            };
+            let Some(column) = self.columns.get_mut(at) else { break };
+            column.axis = axis;
+        }
+        // Columns of instants have one name: the second is called so.
+        let instants = self.columns.iter_mut().filter(|column| column.name == lvm::X);
+        for (number, column) in instants.enumerate().skip(1) {
+            column.name = format!("{} {}", lvm::X, number + 1);
+        }
+    }
+
     /// Takes the number of columns from the first row and, if any of its fields is no number, their
     /// names.
     fn take_first(&mut self, line: u64, fields: &Fields) -> Result<(), IoError> {
-        let width = fields.len();
-        if width > self.limits.columns {
-            let (at, limit) = (Place::Line(line), Limit::Columns(self.limits.columns));
-            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
-        }
-        self.first = Some(FirstRow { line, width, filled: fields.filled() });
-        let empty = || Column {
-            name: String::new(),
-            filled: false,
-            values: Ok(Vec::new()),
-            axis: Axis::Unknown,
-            about: String::new(),
-        };
-        self.columns = std::iter::repeat_with(empty).take(width).collect();
-        self.wanted.get_or_insert_with(|| (0..width).collect());
-        let is_name = |field: &[u8]| !field.is_empty() && !is_number(field, self.layout.delimiter);
+        self.make_columns(line, fields.len(), fields.filled())?;
+        let is_name = |field: &[u8]| !field.is_empty() && !is_data(field, self.layout.delimiter);
         self.has_header = fields.iter().any(is_name);
         if self.has_header {
             for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
@@ -186,13 +260,27 @@ impl Rows {
         Ok(())
     }
 
+    /// Makes columns without names, for rows of `width` fields.
+    fn make_columns(&mut self, line: u64, width: usize, filled: usize) -> Result<(), IoError> {
+        if width > self.limits.columns {
+            let (at, limit) = (Place::Line(line), Limit::Columns(self.limits.columns));
+            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
+        }
+        self.first = Some(FirstRow { line, width, filled });
+        let empty = || Column::named(String::new());
+        self.columns = std::iter::repeat_with(empty).take(width).collect();
+        self.wanted.get_or_insert_with(|| (0..width).collect());
+        Ok(())
+    }
+
     /// Takes the units of the columns, if the row below the names has no number at all.
     fn take_units(&mut self, fields: &Fields) -> bool {
         self.has_units =
-            self.has_header && !fields.iter().any(|field| is_number(field, self.layout.delimiter));
+            self.has_header && !fields.iter().any(|field| is_data(field, self.layout.delimiter));
         if self.has_units {
             for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
                 column.about = text_of(field);
+                column.unit.clone_from(&column.about);
             }
         }
         self.has_units
@@ -201,7 +289,14 @@ impl Rows {
     /// Layout and decimal sign known before the next rows are read.
     pub fn plan(&self) -> Plan {
         let (width, filled) = self.first.map_or((0, 0), |first| (first.width, first.filled));
+        let origins = match (self.origins.is_empty(), &self.wanted) {
+            (false, Some(wanted)) => {
+                wanted.iter().map(|column| self.origins.get(column).copied()).collect()
+            }
+            _ => Vec::new(),
+        };
         Plan {
+            origins,
             layout: self.layout,
             width,
             filled,
@@ -306,7 +401,7 @@ impl Rows {
 }
 
 /// Text of a field: UTF-8, or otherwise Latin-1, in which spreadsheets of Windows write `µm` and `m/s²`.
-fn text_of(field: &[u8]) -> String {
+pub(super) fn text_of(field: &[u8]) -> String {
     match std::str::from_utf8(field) {
         Ok(text) => text.to_owned(),
         Err(_) => field.iter().map(|byte| char::from(*byte)).collect(),

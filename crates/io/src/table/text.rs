@@ -51,15 +51,18 @@ impl<'a> TextReader<'a> {
     ) -> Result<Self, IoError> {
         let stored = source.stored.clone();
         let blocks = Blocks::open(source, options)?;
+        let mut blocks = Blocks::open(source, options)?;
+        let lvm = blocks.take_lvm();
         let (start, terminator) = (blocks.start(), blocks.terminator());
         let delimiter = dialect::detect(start, terminator);
         let layout = Layout { delimiter, terminator };
         let decimal =
             wanted.decimal.or_else(|| dialect::decimal_sign(start, terminator, delimiter));
         let table = preamble::table(start, terminator)
-            .map(|t| Beginning { line: options.skip_lines + t.line, ..t });
+            .map(|t| Beginning { line: blocks.first_line() - 1 + t.line, ..t });
         let file = blocks.file().to_owned();
         let rows = Rows::new(file, layout, (options.limits, stored), decimal, wanted.columns);
+        let rows = Rows::new(file, layout, options.limits, decimal, wanted.columns).with_lvm(lvm);
         Ok(Self { layout, table, blocks, rows })
     }
 

@@ -138,8 +138,10 @@ fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoErro
             });
         }
         Axis::Column(times) => {
+            let unit = time_unit::unit(&table.contents.columns[times]);
             let times = table.values(times)?;
-            Some(Instants { start: times[0], step: uniform_step(table, times, 1.0)? })
+            let start = times.first().map_or(0.0, |first| first * unit);
+            Some(Instants { start, step: uniform_step(table, times, unit)? })
         }
     })
 }

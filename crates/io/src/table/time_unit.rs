@@ -1,59 +1,63 @@
 //! Time columns and their units, by their names.
 
-use crate::contents::Column;
+use crate::contents::{Column, Override};
+use crate::units::{Evidence, Quantity, stated, without_unit};
 
 /// Names of a time column, without its unit and in lower case.
-const NAMES: [&str; 2] = ["time", "t"];
-
-/// Units of time, in s.
-const UNITS: [(&str, f64); 8] = [
-    ("s", 1.0),
-    ("sec", 1.0),
-    ("seconds", 1.0),
-    ("ms", 1e-3),
-    ("us", 1e-6),
-    ("µs", 1e-6),
-    ("μs", 1e-6),
-    ("min", 60.0),
-];
+const NAMES: [&str; 8] =
+    ["time", "t", "zeit", "timestamp", "time stamp", "time_stamp", "elapsed time", "x_value"];
 
 /// The unit of a time column, in s: that of its name or else of the line of units; seconds if
-/// neither states one.
+/// neither states one, and for instants of dates and clocks, which are read in seconds.
 pub(super) fn unit(column: &Column) -> f64 {
-    stated(column).unwrap_or(1.0)
+    if column.has_instants {
+        return 1.0;
+    }
+    unit_of(column).unwrap_or(1.0)
 }
 
-/// The same; `None` if neither states one.
-pub(super) fn stated(column: &Column) -> Option<f64> {
-    let (_, named) = split(&column.name);
-    named.or_else(|| known(&column.about))
-}
-
-/// Returns whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.
-pub(super) fn is_time(name: &str) -> bool {
-    let (bare, unit) = split(name);
-    NAMES.contains(&bare.to_lowercase().as_str()) && (unit.is_some() || bare == name.trim())
-}
-
-/// A name without the unit of time at its end.
-pub(super) fn without_unit(name: &str) -> &str {
-    split(name).0
-}
-
-/// A name without the unit at its end, and that unit, in s.
-fn split(name: &str) -> (&str, Option<f64>) {
-    let name = name.trim();
-    let Some(at) = name.rfind(['_', ' ', '[', '(', '/']) else { return (name, None) };
-    match known(&name[at..]) {
-        Some(unit) => (name[..at].trim_end_matches([' ', '_', '/']), Some(unit)),
-        None => (name, None),
+/// Returns the unit of a time column, in s; `None` if none is stated.
+pub(super) fn unit_of(column: &Column) -> Option<f64> {
+    match &column.overriding {
+        Some(Override::Unit(unit)) => Some(unit.in_si),
+        Some(Override::Scale(factor)) => Some(*factor),
+        None => {
+            let stated = stated(&column.name, &column.unit, Some(Quantity::Time))?;
+            stated.used().filter(|unit| unit.quantity == Quantity::Time).map(|unit| unit.in_si)
+        }
     }
 }
 
-/// A unit of time, in brackets or not.
-fn known(text: &str) -> Option<f64> {
-    let bare = text.trim_matches(|c: char| "_ []()/".contains(c));
-    UNITS.iter().find(|(name, _)| *name == bare).map(|(_, unit)| *unit)
+/// Returns whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `TIME(S)`.
+pub(crate) fn is_time(name: &str) -> bool {
+    is_called_time(name)
+        && stated(name, "", Some(Quantity::Time)).is_none_or(|stated| {
+            let is_unit = stated.used().is_some_and(|unit| unit.quantity == Quantity::Time);
+            is_unit || is_clock(&stated.text)
+        })
+}
+
+/// Returns whether a column is called time, in whatever unit.
+pub(super) fn is_called_time(name: &str) -> bool {
+    let bare = without_unit(name).to_lowercase();
+    // The last part of a path in an HDF5 file or a struct.
+    let last = bare.rsplit(['/', '.']).next().unwrap_or(&bare);
+    NAMES.contains(&bare.as_str()) || NAMES.contains(&last.trim())
+}
+
+/// Returns the text of a unit that a time column states and that is not one of time.
+pub(super) fn unclear(column: &Column) -> Option<String> {
+    let stated = stated(&column.name, &column.unit, Some(Quantity::Time))?;
+    let unclear = stated.evidence == Evidence::Unused && !is_clock(&stated.text);
+    let other = stated.used().is_some_and(|unit| unit.quantity != Quantity::Time);
+    (column.overriding.is_none() && (unclear || other)).then_some(stated.text)
+}
+
+/// Returns whether a text is the pattern of a clock or a date, such as `hh:mm:ss.fff`, or a time zone.
+fn is_clock(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let pattern = lower.contains(':') && lower.chars().all(|c| "hmsf0yd:./- t'".contains(c));
+    pattern || ["utc", "gmt", "local", "iso", "iso 8601", "iso8601"].contains(&lower.as_str())
 }
 
 #[cfg(test)]
@@ -71,12 +75,24 @@ mod tests {
             ("time/ms", 1e-3),
             ("Time / s", 1.0),
             ("Time_min", 60.0),
+            ("Time (msec)", 1e-3),
+            ("TIME(S)", 1.0),
+            ("Zeit [s]", 1.0),
+            ("time_usec", 1e-6),
+            ("time [h]", 3600.0),
+            ("Time (days)", 86_400.0),
+            ("Time [hh:mm:ss]", 1.0),
+            ("X_Value", 1.0),
         ] {
             assert!(is_time(name), "{name}");
             assert_eq!(unit(&Column::of_numbers(name.into(), vec![0.0])), seconds, "{name}");
         }
-        for name in ["", "force", "times", "time_of_flight", "t_ref", "ms", "time [mm]"] {
+        for name in
+            ["", "force", "times", "time_of_flight", "t_ref", "ms", "time [mm]", "time [samples]"]
+        {
             assert!(!is_time(name), "{name}");
         }
+        let samples = Column::of_numbers("time [samples]".into(), vec![0.0]);
+        assert_eq!(unclear(&samples).as_deref(), Some("samples"));
     }
 }

@@ -3,6 +3,7 @@
 use super::header::Header;
 use super::lines::{Line, Lines};
 use super::values::{Binary, printed};
+use crate::Quantity;
 use crate::contents::{Axis, Column, Fault};
 use crate::limits::Budget;
 
@@ -54,6 +55,14 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
         .filter(|part| !part.is_empty())
         .collect();
     let about = about.join(", ");
+    let kind = match header.ordinate[0] {
+        8 => Some(Quantity::DISPLACEMENT),
+        11 => Some(Quantity::VELOCITY),
+        12 => Some(Quantity::ACCELERATION),
+        9 | 13 => Some(Quantity::Force),
+        _ => None,
+    };
+    let unit = header.units[0].clone();
     let in_time = header.function <= 1 && !NOT_TIME.contains(&header.abscissa);
     if !in_time || header.is_complex {
         let what = if in_time { "complex numbers".into() } else { header.kind() };
@@ -62,7 +71,7 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
     }
     if header.is_even {
         let axis = Axis::Even { start: header.start, step: header.step };
-        columns.push(Column { about, axis, ..Column::of_numbers(name, values) });
+        columns.push(Column { about, axis, unit, kind, ..Column::of_numbers(name, values) });
         return;
     }
     let (pairs, _) = values.as_chunks::<2>();
@@ -70,5 +79,5 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
     // The instants are their own time axis, too.
     let axis = Axis::Column(columns.len());
     columns.push(Column { axis, ..Column::of_numbers(format!("{name} time"), times) });
-    columns.push(Column { about, axis, ..Column::of_numbers(name, values) });
+    columns.push(Column { about, axis, unit, kind, ..Column::of_numbers(name, values) });
 }

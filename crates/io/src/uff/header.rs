@@ -38,6 +38,8 @@ pub(crate) struct Header {
     pub abscissa: u32,
     /// Quantity, for people; empty if the file does not state it.
     pub quantity: String,
+    /// Labels of the units of the ordinate and of what it is divided by; empty without one.
+    pub units: [String; 2],
     /// Data types of the ordinate and of what it is divided by: 8, 11 and 12 are a response, 13 a force.
     pub ordinate: [u32; 2],
     /// The line with the numbers, for messages.
@@ -87,6 +89,7 @@ impl Header {
             step: if is_even { real(&form, 43)? } else { 0.0 },
             abscissa: whole(&abscissa, 0, 10)?,
             quantity: quantity(&ordinate)?,
+            units: [&ordinate, &denominator].map(|line| label(field(line, 47, 20))),
             ordinate: [whole(&ordinate, 0, 10)?, whole(&denominator, 0, 10)?],
             form_at: form.at,
         })

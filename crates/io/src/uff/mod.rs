@@ -19,6 +19,10 @@ use self::lines::{Line, Lines, is_mark, number};
 use crate::IoError;
 use crate::contents::{Contents, Fault, Place};
 use crate::limits::Budget;
+use crate::contents::{Column, Contents, Fault, Override, Place};
+use crate::limits::{Budget, Limits};
+use crate::units::ResponseUnit;
+use crate::{IoError, Quantity, Unit};
 
 pub(crate) use self::geometry::read_geometry;
 pub(crate) use self::responses::read as read_responses;
@@ -43,6 +47,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents,
 fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault> {
     let mut contents = Contents { format: "universal file".into(), ..Contents::default() };
     let mut skipped: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut stated = None;
     while let Some(mark) = lines.next() {
         if mark.text.trim_ascii().is_empty() {
             continue;
@@ -54,10 +59,14 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
         let dataset = dataset_number(&id)?;
         match dataset {
             58 => function::read(lines, &id, &mut contents.columns, &mut budget)?,
-            164 => contents.remarks.push(units(lines)?.remark()),
+            164 => stated = Some(units(lines)?),
             _ => *skipped.entry(dataset).or_default() += 1,
         }
         skip_to_end(lines)?;
+    }
+    if let Some(units) = stated {
+        contents.remarks.push(units.remark());
+        units.apply(&mut contents.columns);
     }
     if !skipped.is_empty() {
         let counts: Vec<String> =
@@ -111,6 +120,43 @@ fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
 }
 
 impl Units {
+    /// States the unit of columns whose quantity is known and whose label is no unit.
+    fn apply(&self, columns: &mut [Column]) {
+        for column in columns {
+            let Some(quantity) = column.kind else { continue };
+            let per_si = if quantity == Quantity::Force { self.force } else { self.length };
+            let in_si = 1.0 / per_si;
+            // A label in SI units is often left as it was.
+            let is_stated = Unit::parse(&column.unit).is_some_and(|unit| unit.in_si != 1.0);
+            if !is_stated && in_si.is_normal() && in_si > 0.0 && in_si != 1.0 {
+                let name = format!("the unit of dataset 164 (code {} {})", self.code, self.name);
+                column.overriding = Some(Override::Unit(Unit { name, quantity, in_si }));
+            }
+        }
+    }
+
+    /// Factor that takes a frequency response to SI units, by its labels or, without them, by the factors of the file;
+    /// with the labels that are used.
+    fn factor(stated: Option<&Self>, labels: &[String; 2]) -> (f64, Vec<String>) {
+        let [motion, force] = labels;
+        let of_label = |label: &String, is_force: bool| {
+            let unit = Unit::parse(label).filter(|unit| unit.in_si != 1.0)?;
+            ((unit.quantity == Quantity::Force) == is_force).then_some(unit.in_si)
+        };
+        if let Some(whole) =
+            ResponseUnit::parse(motion).filter(|unit| !unit.is_inverse && unit.in_si != 1.0)
+        {
+            return (whole.in_si, vec![motion.clone()]);
+        }
+        let used = [(motion, false), (force, true)].into_iter();
+        let used = used.filter(|(label, is_force)| of_label(label, *is_force).is_some());
+        let used = used.map(|(label, _)| label.clone()).collect();
+        let length =
+            of_label(motion, false).or(stated.map(|units| 1.0 / units.length)).unwrap_or(1.0);
+        let force = of_label(force, true).or(stated.map(|units| 1.0 / units.force)).unwrap_or(1.0);
+        (length / force, used)
+    }
+
     fn remark(&self) -> String {
         let Self { code, name, length, force } = self;
         format!(

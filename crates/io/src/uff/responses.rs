@@ -1,5 +1,7 @@
 //! Frequency responses and coherences in datasets 58 and 58b.
 
+use std::collections::BTreeMap;
+
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
 
@@ -7,16 +9,20 @@ use super::function::dataset;
 use super::header::Header;
 use super::lines::{Line, Lines, is_mark};
 use super::{Units, dataset_number, skip_to_end, units};
-use crate::IoError;
 use crate::contents::{Fault, Place};
 use crate::limits::Budget;
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use crate::units::ResponseUnit;
+use crate::{IoError, Quantity, Unit};
 
 /// Abscissa type of a frequency.
 const FREQUENCY: u32 = 18;
 
 /// Data type of an excitation force.
 const EXCITATION_FORCE: u32 = 13;
+
+/// Data type of any quantity, which the label or the user states.
+const GENERAL: u32 = 1;
 
 /// Relative difference of two frequencies, in printed single precision.
 const SAME_FREQUENCY: f64 = 2e-5;
@@ -47,7 +53,7 @@ fn functions(
     mut budget: Budget,
 ) -> Result<FrequencyResponses, Fault> {
     let mut responses = FrequencyResponses { file: file.into(), ..FrequencyResponses::default() };
-    let (mut stated, mut others) = (None, 0_usize);
+    let (mut stated, mut others, mut labels) = (None, 0_usize, Vec::new());
     while let Some(mark) = lines.next() {
         if mark.text.trim_ascii().is_empty() {
             continue;
@@ -60,7 +66,12 @@ fn functions(
             58 => {
                 let (header, values) = dataset(lines, &id, &mut budget)?;
                 match header.function {
-                    4 | 6 => add(&mut responses, &id, &header, &values)?,
+                    4 | 6 => {
+                        add(&mut responses, &id, &header, &values)?;
+                        if labels.len() < responses.functions.len() {
+                            labels.push(header.units);
+                        }
+                    }
                     _ => others += 1,
                 }
             }
@@ -74,9 +85,7 @@ fn functions(
             "left out: datasets 58 that are neither a frequency response nor a coherence ({others})"
         ));
     }
-    if let Some(units) = stated {
-        to_si(&mut responses, &units);
-    }
+    to_si(&mut responses, &labels, stated.as_ref());
     Ok(responses)
 }
 
@@ -126,7 +135,7 @@ fn add(
         return Err(id.fault("a frequency response function without a reference"));
     };
     let [ordinate, denominator] = header.ordinate;
-    if ![0, EXCITATION_FORCE].contains(&denominator) {
+    if ![0, GENERAL, EXCITATION_FORCE].contains(&denominator) {
         return Err(id.fault(format!(
             "a response per quantity of type {denominator}, not per excitation force (13)"
         )));
@@ -135,7 +144,7 @@ fn add(
         8 => Some(ResponseQuantity::Displacement),
         11 => Some(ResponseQuantity::Velocity),
         12 => Some(ResponseQuantity::Acceleration),
-        _ => None,
+        _ => quantity_of_label(&header.units[0]),
     };
     let (values, standard_error) = (numbers, None);
     responses.functions.push(ResponseFunction {
@@ -146,6 +155,17 @@ fn add(
         standard_error,
     });
     Ok(())
+}
+
+/// Quantity that the label of a function without a specific type states.
+fn quantity_of_label(label: &str) -> Option<ResponseQuantity> {
+    if let Some(unit) = ResponseUnit::parse(label).filter(|unit| !unit.is_inverse) {
+        return Some(unit.quantity);
+    }
+    match Unit::parse(label)?.quantity {
+        Quantity::Response(quantity) => Some(quantity),
+        _ => None,
+    }
 }
 
 /// Takes the frequencies of the first function, and asks the others for the same.
@@ -171,18 +191,30 @@ fn same_frequencies(
     }
 }
 
-/// Divides lengths and multiplies forces by the factors of the file.
-fn to_si(responses: &mut FrequencyResponses, units: &Units) {
-    let factor = units.force / units.length;
-    if !(factor.is_finite() && factor > 0.0) || factor == 1.0 {
-        return;
-    }
-    for function in &mut responses.functions {
+/// Takes the responses to SI units, by their labels and the factors of the file.
+fn to_si(responses: &mut FrequencyResponses, labels: &[[String; 2]], stated: Option<&Units>) {
+    let (mut by_label, mut of_file) = (BTreeMap::new(), None);
+    for (function, labels) in responses.functions.iter_mut().zip(labels) {
+        let (factor, used) = Units::factor(stated, labels);
+        if !(factor.is_finite() && factor > 0.0) || factor == 1.0 {
+            continue;
+        }
         function.values.iter_mut().for_each(|z| *z *= factor);
+        if used.is_empty() {
+            of_file = Some(factor);
+        } else {
+            by_label.insert(used.join(" per "), factor);
+        }
     }
-    let Units { code, name, .. } = units;
-    responses.remarks.push(format!(
-        "the file states its units (code {code} {name}): responses were multiplied by {factor} to \
-         get SI units"
-    ));
+    if let Some((Units { code, name, .. }, factor)) = stated.zip(of_file) {
+        responses.remarks.push(format!(
+            "the file states its units (code {code} {name}): responses were multiplied by {factor} to \
+             get SI units"
+        ));
+    }
+    for (label, factor) in by_label {
+        responses.remarks.push(format!(
+            "the labels of the file state the unit {label}: responses were multiplied by {factor} to get SI units"
+        ));
+    }
 }

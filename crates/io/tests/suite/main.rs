@@ -6,3 +6,4 @@ mod limits;
 mod output;
 mod responses;
 mod table;
+mod units;

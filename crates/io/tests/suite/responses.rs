@@ -58,6 +58,7 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
             sample_rate_hz: 1000.0 / 3.0,
         }),
         remarks: Vec::new(),
+        doubts: Vec::new(),
     }
 }
 
@@ -139,7 +140,7 @@ fn tables_in_every_form() {
 fn broken_tables_are_refused() {
     for (text, message) in [
         ("frequency_hz,x\n1,2\n", "a.csv has no frequency response: name columns h_1_1_real and"),
-        ("frequency_hz,real\n1,2\n", "a.csv has no column \"imaginary\""),
+        ("frequency_hz,real\n1,2\n", "a.csv: column 2 \"real\" has no imaginary part beside it"),
         ("frequency_hz,real,imag\n1,2,\n", "a.csv, line 2, column 3 \"imag\": the field is empty"),
         ("    -1\n   164\n         1\n    -1\n", "a.csv, line 4: the units"),
     ] {
@@ -192,4 +193,149 @@ fn impossible_segments_are_told() {
         assert_eq!(read.segments, None, "{wrong:?}");
         assert!(read.remarks[0].contains("segment_samples"), "{:?}", read.remarks);
     }
+}
+
+/// An accelerance of 5 kg at 18 Hz, and the frequencies, in Hz.
+fn accelerance() -> (Vec<f64>, Vec<Complex<f64>>) {
+    let hz: Vec<f64> = (1..=40).map(f64::from).collect();
+    let value = |hz: &f64| {
+        let (w, w0) = (std::f64::consts::TAU * hz, std::f64::consts::TAU * 18.0);
+        Complex::from(-w * w) / (5.0 * Complex::new(w0 * w0 - w * w, 2.0 * 0.03 * w0 * w))
+    };
+    let values = hz.iter().map(value).collect();
+    (hz, values)
+}
+
+fn written(header: &str, rows: impl Fn(f64, Complex<f64>) -> Vec<f64>) -> String {
+    let (hz, values) = accelerance();
+    let row = |(hz, value): (&f64, &Complex<f64>)| {
+        let fields = rows(*hz, *value).iter().map(|x| format!("{x:e}")).collect::<Vec<_>>();
+        fields.join(",") + "\n"
+    };
+    format!("{header}\n{}", hz.iter().zip(&values).map(row).collect::<String>())
+}
+
+/// Judge: the closed form of one degree of freedom, written in the unit that the header states.
+#[test]
+fn units_of_axes_and_responses_are_read() {
+    use std::f64::consts::TAU;
+    const G: f64 = 9.80665;
+    let (hz, values) = accelerance();
+    let acceleration = Some(ResponseQuantity::Acceleration);
+    let cases: [(&str, Box<dyn Fn(f64, Complex<f64>) -> Vec<f64>>, Option<ResponseQuantity>); 14] = [
+        ("frequency (rad/s),real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),
+        ("omega_rad_s,real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),
+        ("w,real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),
+        ("freq [kHz],Re,Im", Box::new(|f, z| vec![f / 1e3, z.re, z.im]), None),
+        ("speed [rpm],real,imag", Box::new(|f, z| vec![60.0 * f, z.re, z.im]), None),
+        (
+            "frequency_hz,real,imaginary\nHz,g/N,g/N",
+            Box::new(|f, z| vec![f, z.re / G, z.im / G]),
+            acceleration,
+        ),
+        (
+            "Frequency [Hz],real [g/N],imaginary [g/N]",
+            Box::new(|f, z| vec![f, z.re / G, z.im / G]),
+            acceleration,
+        ),
+        (
+            "f,accelerance real,accelerance imaginary",
+            Box::new(|f, z| vec![f, z.re, z.im]),
+            acceleration,
+        ),
+        (
+            "f,magnitude [dB re 1 (m/s^2)/N],phase [deg]",
+            Box::new(|f, z| vec![f, 20.0 * z.norm().log10(), z.arg().to_degrees()]),
+            acceleration,
+        ),
+        (
+            "f,magnitude (dB),phase (rad)",
+            Box::new(|f, z| vec![f, 20.0 * z.norm().log10(), z.arg()]),
+            None,
+        ),
+        (
+            "f,mag_db,phase",
+            Box::new(|f, z| vec![f, 20.0 * z.norm().log10(), z.arg().to_degrees()]),
+            None,
+        ),
+        ("f,H11 mag,H11 phase", Box::new(|f, z| vec![f, z.norm(), z.arg().to_degrees()]), None),
+        (
+            "f,apparent mass magnitude [kg],apparent mass phase [deg]",
+            Box::new(|f, z| vec![f, 1.0 / z.norm(), -z.arg().to_degrees()]),
+            acceleration,
+        ),
+        (
+            "f,real [N/(m/s²)],imag [N/(m/s²)]",
+            Box::new(|f, z| vec![f, z.inv().re, z.inv().im]),
+            acceleration,
+        ),
+    ];
+    for (header, row, quantity) in cases {
+        let found = parse(&written(header, row)).unwrap_or_else(|e| panic!("{header}: {e}"));
+        let function = &found.functions[0];
+        assert_eq!((found.functions.len(), function.quantity), (1, quantity), "{header}");
+        for at in 0..hz.len() {
+            assert!((found.frequency_hz[at] / hz[at] - 1.0).abs() < 1e-12, "{header}");
+            let error = (function.values[at] - values[at]).norm() / values[at].norm();
+            assert!(error < 1e-12, "{header}: {error}");
+        }
+        // Nobody said what `w` is.
+        assert_eq!(
+            found.doubts.len(),
+            usize::from(header.starts_with("w,")),
+            "{header}: {:?}",
+            found.doubts
+        );
+    }
+}
+
+#[test]
+fn what_is_not_understood_in_a_table_of_responses_is_reported_or_refused() {
+    let row = |f: f64, z: Complex<f64>| vec![f, z.re, z.im];
+    let doubted = parse(&written("x,real [V],imaginary [V]", row)).unwrap();
+    assert_eq!(doubted.doubts.len(), 3, "{:?}", doubted.doubts);
+    for (header, told) in [
+        ("orders,real,imaginary", "speed of rotation"),
+        ("f,real,other", "imaginary part"),
+        ("f,magnitude,other", "phase"),
+        ("f [mm],real,imaginary", "frequency is needed"),
+    ] {
+        let error = parse(&written(header, row)).unwrap_err().to_string();
+        assert!(error.contains(told), "{header}: {error}");
+    }
+}
+
+/// Judge: the one-sided table in rising order.
+#[test]
+fn mirrored_and_unsorted_tables_are_the_one_sided_ones() {
+    let n = 16_i32;
+    let value = |k: i32| {
+        Complex::new(
+            1.0 / f64::from(1 + k * k),
+            if k == n / 2 || k == 0 { 0.0 } else { -0.1 * f64::from(k) },
+        )
+    };
+    let of = |k: i32| if k <= n / 2 { value(k) } else { value(n - k).conj() };
+    let text = |order: &[i32], hz: &dyn Fn(i32) -> f64| {
+        let rows = order.iter().map(|k| format!("{:?},{:?},{:?}\n", hz(*k), of(*k).re, of(*k).im));
+        format!("frequency_hz,real,imaginary\n{}", rows.collect::<String>())
+    };
+    let all: Vec<i32> = (0..n).collect();
+    let shuffled: Vec<i32> = (0..=n / 2).map(|k| k * 5 % (n / 2 + 1)).collect();
+    let signed = |k: i32| f64::from(if k <= n / 2 { k } else { k - n });
+    for (name, text, left_out) in [
+        ("mirrored", text(&all, &f64::from), 7),
+        ("negative", text(&all, &signed), 7),
+        ("unsorted", text(&shuffled, &f64::from), 0),
+    ] {
+        let found = parse(&text).unwrap();
+        let expected: Vec<f64> = (0..=n / 2).map(f64::from).collect();
+        assert_eq!(found.frequency_hz, expected, "{name}");
+        let values: Vec<_> = (0..=n / 2).map(of).collect();
+        assert_eq!(found.functions[0].values, values, "{name}");
+        let told = found.remarks.iter().any(|remark| remark.contains("left out: 7 mirrored"));
+        assert_eq!(told, left_out > 0, "{name}: {:?}", found.remarks);
+    }
+    let twice = parse("f,real,imaginary\n1,2,3\n1,2,3\n").unwrap_err().to_string();
+    assert!(twice.contains("twice"), "{twice}");
 }

@@ -92,8 +92,8 @@ fn reach(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((faintest / 1.5, strongest * 1.5))
 }
 
-fn unit(column: &Drawn) -> &'static str {
-    column.unit.map_or("", |unit| unit.name)
+fn unit(column: &Drawn) -> &str {
+    column.unit.as_ref().map_or("", |unit| unit.name.as_str())
 }
 
 fn shortened(name: &str) -> String {

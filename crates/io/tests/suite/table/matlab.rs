@@ -187,7 +187,9 @@ fn other_versions_say_how_to_save() {
     header.resize(512, 0);
     for bytes in [&header[..], b"\x89HDF\r\n\x1a\n rest"] {
         let e = Table::parse("a.mat", bytes).unwrap_err();
-        assert_eq!(e.to_string(), "a.mat is a MATLAB file of version 7.3 (HDF5): save it with -v7");
+        let what =
+            if cfg!(feature = "hdf5") { "HDF5 signature not found" } else { "save it with -v7" };
+        assert!(e.to_string().contains(what), "{e}");
     }
     // Level 4 has no header: a type, rows, columns, whether complex, and the length of the name.
     let level_4 = b"\0\0\0\0\x01\0\0\0\x01\0\0\0\0\0\0\0\x02\0\0\0a\0\0\0\0\0\0\0\xf0\x3f";

@@ -1,6 +1,9 @@
 //! Tables in every dialect and format, and what is said about those that are wrong.
 
 mod dialects;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+mod headings;
 mod matlab;
 mod packed;
 #[cfg(feature = "parquet")]

@@ -1,0 +1,199 @@
+//! Units of records as they reach the results: converted, or a warning among the checks. Judge: a machine of 12 kg
+//! whose exact steady state is written in the units of the header.
+
+use mechid_analysis::{
+    Channels, Identify, IdentifyResponses, Measurement, Reading, ResponseQuantity, Window,
+    identify, identify_responses,
+};
+use mechid_io::FrequencyResponses;
+use mechid_model::Sdof;
+use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::{Multisine, Phases, Sampling, lines};
+
+const PERIOD: usize = 128;
+const RATE_HZ: f64 = 128.0;
+const G: f64 = 9.80665;
+const POUND: f64 = 4.448_221_615_260_5;
+
+/// Force, displacement and acceleration of two periods, in SI units.
+fn record() -> [Vec<f64>; 3] {
+    let period = Sampling::from_rate_hz(RATE_HZ, PERIOD).unwrap();
+    let force = Multisine::flat(lines::band(period, 3.0, 40.0), 2.0, Phases::Schroeder).unwrap();
+    let force = force.sample(period).unwrap();
+    let machine = Sdof::new(12.0, 90.0, 68_000.0).unwrap();
+    let exact = exact_harmonic_periodic(&machine.system(), &force).unwrap();
+    [&force, exact.displacement(), exact.acceleration()]
+        .map(|record| record.repeated(2).unwrap().channel(0).to_vec())
+}
+
+/// Writes three columns of numbers below a header, and opens them by their numbers.
+fn open(
+    header: &str,
+    response: ResponseQuantity,
+    numbers: [f64; 3],
+    reading: &Reading,
+) -> Measurement {
+    let [force, x, a] = record();
+    let response_values = if response == ResponseQuantity::Displacement { x } else { a };
+    let [time, per_newton, per_si] = numbers;
+    let mut text = format!("{header}\n");
+    for (k, (f, r)) in force.iter().zip(&response_values).enumerate() {
+        let t = time * k as f64 / RATE_HZ;
+        text += &format!("{t:?},{:?},{:?}\n", f * per_newton, r * per_si);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rig.csv");
+    std::fs::write(&path, text).unwrap();
+    let channels = Channels::new("2", response, "3");
+    let record = Measurement::open_with(&path, &channels, reading).unwrap();
+    record.window(Window { start: 1, period: Some(PERIOD), periods: None }).unwrap()
+}
+
+/// Mass in kg, and the warnings of the subject `unit`.
+fn mass(measurement: Measurement) -> (f64, Vec<String>) {
+    let found = identify(&[measurement], &Identify::default()).unwrap();
+    let warnings =
+        found.summary().checks.iter().filter(|check| check.subject.to_string() == "unit");
+    let warnings = warnings.filter(|check| check.is_conspicuous()).map(|check| check.text.clone());
+    (found.estimate().parameter("m").unwrap().value, warnings.collect())
+}
+
+#[test]
+fn units_in_any_place_give_the_mass() {
+    use ResponseQuantity::{Acceleration, Displacement};
+    for (header, response, numbers) in [
+        ("time,force_N,accel_g", Acceleration, [1.0, 1.0, 1.0 / G]),
+        ("time,Force [N],Acc (G)", Acceleration, [1.0, 1.0, 1.0 / G]),
+        ("time,Force [N],Acceleration (g) - X", Acceleration, [1.0, 1.0, 1.0 / G]),
+        ("time,Force (lbs),x [m]", Displacement, [1.0, 1.0 / POUND, 1.0]),
+        ("time,[kN] Force,Disp (in.)", Displacement, [1.0, 1e-3, 1.0 / 0.0254]),
+        ("time,Force (kN) CH1,Disp [micron]", Displacement, [1.0, 1e-3, 1e6]),
+        ("# time [s],force [N],acc [g]", Acceleration, [1.0, 1.0, 1.0 / G]),
+        ("Time (msec),Force [mV; 11.2 mV/N],x [m]", Displacement, [1e3, 11.2, 1.0]),
+    ] {
+        let reading = Reading { time: Some("1".into()), ..Reading::default() };
+        let (mass, warnings) = mass(open(header, response, numbers, &reading));
+        assert!((mass / 12.0 - 1.0).abs() < 1e-6, "{header}: {mass}");
+        assert!(warnings.is_empty(), "{header}: {warnings:?}");
+    }
+}
+
+#[test]
+fn what_is_not_understood_is_a_warning_with_its_factor() {
+    use ResponseQuantity::{Acceleration, Displacement};
+    let days = 1.0 / 86_400.0;
+    for (header, response, time, told) in [
+        ("time,Force [mV],x [m]", Displacement, 1.0, "\"mV\" in the header of column 2"),
+        ("time,force,a_g", Acceleration, 1.0, "with the factor 9.80665"),
+        ("time,force,x", Displacement, days, "in days it would be 128"),
+    ] {
+        let (_, warnings) = mass(open(header, response, [time, 1.0, 1.0], &Reading::default()));
+        assert_eq!(warnings.len(), 1, "{header}: {warnings:?}");
+        assert!(warnings[0].contains(told), "{header}: {warnings:?}");
+    }
+}
+
+#[test]
+fn a_unit_or_a_factor_that_is_stated_counts() {
+    let mut reading = Reading::default();
+    reading.units.insert("acc [V]".into(), "g".into());
+    reading.units.insert("time".into(), "days".into());
+    reading.scales.insert("Force [mV]".into(), 1.0 / 11.2);
+    let numbers = [1.0 / 86_400.0, 11.2, 1.0 / G];
+    let header = "time,Force [mV],acc [V]";
+    let (mass, warnings) = mass(open(header, ResponseQuantity::Acceleration, numbers, &reading));
+    assert!((mass / 12.0 - 1.0).abs() < 1e-4, "{mass}");
+    assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+/// A dataset 58 of an accelerance, its label, and the direction of its force.
+fn accelerance(label: &str, per_si: f64, direction: i32) -> String {
+    let hz: Vec<f64> = (1..=60).map(f64::from).collect();
+    let mut text = format!(
+        "    -1\n    58\nNONE\nNONE\nNONE\nNONE\nNONE\n\
+         {:>5}{:>10}{:>5}{:>10} {:>10}{:>10}{:>4} {:>10}{:>10}{:>4}\n\
+         {:>10}{:>10}{:>10}{:>13.5e}{:>13.5e}{:>13.5e}\n\
+         {:>10}{:>5}{:>5}{:>5} {:20} {:20}\n\
+         {:>10}{:>5}{:>5}{:>5} {:20} {label:20}\n\
+         {:>10}{:>5}{:>5}{:>5} {:20} {:20}\n\
+         {:>10}{:>5}{:>5}{:>5} {:20} {:20}\n",
+        4,
+        0,
+        0,
+        0,
+        "NONE",
+        1,
+        3,
+        "NONE",
+        1,
+        direction,
+        6,
+        hz.len(),
+        1,
+        1.0,
+        1.0,
+        0.0,
+        18,
+        0,
+        0,
+        0,
+        "Frequency",
+        "Hz",
+        12,
+        0,
+        0,
+        0,
+        "Acceleration",
+        13,
+        0,
+        0,
+        0,
+        "Force",
+        "N",
+        0,
+        0,
+        0,
+        0,
+        "NONE",
+        "NONE",
+    );
+    for f in hz {
+        let w = std::f64::consts::TAU * f;
+        let (re, im) = (68_000.0 - 12.0 * w * w, 90.0 * w);
+        let size = -w * w / (re * re + im * im) * per_si * f64::from(direction.signum());
+        text += &format!("{:>20.11e}{:>20.11e}\n", size * re, -size * im);
+    }
+    text + "    -1\n"
+}
+
+#[test]
+fn labels_and_directions_of_universal_files_are_read() {
+    for (label, per_si, direction) in
+        [("m/s^2", 1.0, 3), ("g", 1.0 / G, 3), ("mm/s^2", 1e3, 3), ("m/s^2", 1.0, -3)]
+    {
+        let text = accelerance(label, per_si, direction);
+        let table = FrequencyResponses::parse("a.unv", text.as_bytes()).unwrap();
+        let found = identify_responses(&[table], &IdentifyResponses::default()).unwrap();
+        let mass = found.estimate().parameter("m").unwrap().value;
+        assert!((mass / 12.0 - 1.0).abs() < 1e-6, "{label} {direction}: {mass}");
+    }
+}
+
+/// Judge: the table of the same record with zeros in the place of the forces that do not act.
+#[test]
+fn frequency_responses_take_one_force_and_several_responses() {
+    use mechid_analysis::{FrfSettings, frf};
+    let [force, x, _] = record();
+    let sampling = Sampling::from_rate_hz(RATE_HZ, force.len()).unwrap();
+    let other: Vec<f64> = x.iter().map(|x| -0.5 * x).collect();
+    let columns = [("f", &force[..]), ("x", &x[..]), ("y", &other[..])];
+    let few = Channels::new("f", ResponseQuantity::Displacement, "x,y");
+    let padded = Channels::new("f,0", ResponseQuantity::Displacement, "x,y");
+    assert_eq!(few.clone().with_a_force_each(), padded);
+    let test = Measurement::from_columns(sampling, &columns, &few.with_a_force_each()).unwrap();
+    let table = frf(&test.period(PERIOD).unwrap(), &FrfSettings::default()).unwrap();
+    assert_eq!(table.responses.len(), 2);
+    for (at, re) in table.responses[0].real.iter().enumerate() {
+        assert!((table.responses[1].real[at] + 0.5 * re).abs() <= 1e-12 * re.abs());
+    }
+}

@@ -1,0 +1,131 @@
+//! Attributes that state units, rates and names.
+
+use hdf5_pure::{AttrValue, Dataset, Group};
+
+/// Names of an attribute with a unit, in lower case: NeXus, SEP 5, netCDF and programs of analysers.
+const UNITS: [&str; 9] =
+    ["units", "unit", "unit_str", "unit_string", "y_unit", "yunit", "unit_y", "y_unit_label", "eu"];
+
+/// Names of an attribute that describes a channel.
+const ABOUT: [&str; 6] = ["long_name", "name", "label", "description", "channel_name", "title"];
+
+/// Names of an attribute with the first instant, in s.
+const START: [&str; 4] = ["t0", "x0", "start_time", "wf_start_offset"];
+
+/// Largest number of attributes of an object that are looked at.
+const MAX_ATTRIBUTES: usize = 1024;
+
+/// Largest number of bytes of a text.
+const MAX_BYTES: usize = 256;
+
+/// Attributes of an object, in the order of their names.
+#[derive(Debug, Default)]
+pub(super) struct Attributes(Vec<(String, Value)>);
+
+#[derive(Debug)]
+enum Value {
+    Number(f64),
+    Texts(Vec<String>),
+}
+
+impl Attributes {
+    /// Reads the attributes of a group; none if they are damaged.
+    pub fn of_group(group: &Group) -> Self {
+        group.attrs().map(Self::new).unwrap_or_default()
+    }
+
+    /// Reads the attributes of a data set; none if they are damaged.
+    pub fn of_dataset(dataset: &Dataset) -> Self {
+        dataset.attrs().map(Self::new).unwrap_or_default()
+    }
+
+    fn new(all: std::collections::HashMap<String, AttrValue>) -> Self {
+        let values = all.into_iter().filter_map(|(name, value)| Some((name, read(value)?)));
+        let mut values: Vec<(String, Value)> = values.take(MAX_ATTRIBUTES).collect();
+        values.sort_by(|a, b| a.0.cmp(&b.0));
+        Self(values)
+    }
+
+    /// Numbers, with their names; those of MATLAB itself are left out.
+    pub fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.0.iter().filter_map(|(name, value)| match value {
+            Value::Number(number) if !name.starts_with("MATLAB") => Some((name.as_str(), *number)),
+            _ => None,
+        })
+    }
+
+    /// Whether there is an attribute of this name.
+    pub fn has(&self, wanted: &str) -> bool {
+        self.0.iter().any(|(name, _)| name == wanted)
+    }
+
+    /// First text of an attribute, by its name.
+    pub fn text(&self, wanted: &str) -> Option<&str> {
+        let named = self.0.iter().find(|(name, _)| name.eq_ignore_ascii_case(wanted))?;
+        match &named.1 {
+            Value::Texts(texts) => texts.first().map(String::as_str),
+            Value::Number(_) => None,
+        }
+    }
+
+    /// Unit of a channel, counted from 0.
+    pub fn unit(&self, channel: usize) -> Option<String> {
+        let texts = self.0.iter().find_map(|(name, value)| match value {
+            Value::Texts(texts) if UNITS.contains(&name.to_lowercase().as_str()) => Some(texts),
+            _ => None,
+        })?;
+        texts.get(channel).or(texts.first().filter(|_| texts.len() == 1)).cloned()
+    }
+
+    /// Description of a channel; empty if there is none.
+    pub fn about(&self) -> String {
+        ABOUT.iter().find_map(|name| self.text(name)).unwrap_or_default().to_owned()
+    }
+
+    /// First instant, in s.
+    pub fn start(&self) -> f64 {
+        let start = |name: &str| START.contains(&name.to_lowercase().as_str());
+        self.numbers().find(|(name, _)| start(name)).map_or(0.0, |(_, value)| value)
+    }
+}
+
+fn read(value: AttrValue) -> Option<Value> {
+    let one = |numbers: Vec<f64>| match numbers[..] {
+        [number] if number.is_finite() => Some(Value::Number(number)),
+        _ => None,
+    };
+    let text = |text: String| {
+        let text = text.trim_matches(['\0', ' ']).to_owned();
+        (text.len() <= MAX_BYTES).then(|| Value::Texts(vec![text]))
+    };
+    match value {
+        AttrValue::F32(number) => one(vec![number.into()]),
+        AttrValue::F64(number) => one(vec![number]),
+        AttrValue::I8(number) => one(vec![number.into()]),
+        AttrValue::I16(number) => one(vec![number.into()]),
+        AttrValue::I32(number) => one(vec![number.into()]),
+        AttrValue::I64(number) => one(vec![number as f64]),
+        AttrValue::U8(number) => one(vec![number.into()]),
+        AttrValue::U16(number) => one(vec![number.into()]),
+        AttrValue::U32(number) => one(vec![number.into()]),
+        AttrValue::U64(number) => one(vec![number as f64]),
+        AttrValue::F64Array(numbers) => one(numbers),
+        AttrValue::F32Array(numbers) => one(numbers.into_iter().map(f64::from).collect()),
+        AttrValue::I64Array(numbers) => one(numbers.into_iter().map(|n| n as f64).collect()),
+        AttrValue::I32Array(numbers) => one(numbers.into_iter().map(f64::from).collect()),
+        AttrValue::String(value)
+        | AttrValue::AsciiString(value)
+        | AttrValue::VarLenString(value)
+        | AttrValue::VarLenAsciiString(value)
+        | AttrValue::StringSized { value, .. }
+        | AttrValue::AsciiStringSized { value, .. } => text(value),
+        AttrValue::StringArray(values)
+        | AttrValue::VarLenStringArray(values)
+        | AttrValue::VarLenAsciiStringArray(values)
+        | AttrValue::AsciiStringArray(values)
+        | AttrValue::StringArraySized { values, .. } => {
+            Some(Value::Texts(values.into_iter().filter(|text| text.len() <= MAX_BYTES).collect()))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,116 @@
+//! Headers of LabVIEW measurement files (`.lvm`).
+//!
+//! # Source
+//! National Instruments, *Specification for the LabVIEW Measurement File (.lvm)*, version 2.
+
+use memchr::memmem;
+
+use super::rows::text_of;
+
+/// First words of such a file.
+const MAGIC: &[u8] = b"LabVIEW Measurement";
+
+/// Line that ends the header of the file, and that of each segment.
+const END: &[u8] = b"***End_of_Header***";
+
+/// Name of a column of instants.
+pub(super) const X: &str = "X_Value";
+
+/// Largest header, in bytes.
+pub(super) const MAX_BYTES: usize = 1 << 20;
+
+/// Header of a LabVIEW measurement file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LvmHeader {
+    /// Number of its lines.
+    pub lines: u64,
+    /// Number of its bytes.
+    pub bytes: usize,
+    /// Text for the unit of each channel.
+    pub units: Vec<String>,
+    /// First instant and step of each channel, in s.
+    pub axes: Vec<(f64, f64)>,
+    /// Columns of instants in the table.
+    pub instants: Instants,
+}
+
+/// Columns of instants in the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Instants {
+    /// None; the first field of a row is empty.
+    No,
+    /// One for all channels.
+    One,
+    /// One before each channel.
+    Each,
+}
+
+/// Returns whether a text is a LabVIEW measurement file.
+pub(super) fn is_lvm(text: &[u8]) -> bool {
+    text.starts_with(MAGIC)
+}
+
+/// Returns whether the text reaches beyond the headers.
+pub(super) fn is_complete(text: &[u8]) -> bool {
+    LvmHeader::parse(text, b'\n').is_some_and(|header| text[header.bytes..].contains(&b'\n'))
+}
+
+impl LvmHeader {
+    /// Reads the header of the file and that of its first segment; `None` if there is none.
+    pub fn parse(text: &[u8], terminator: u8) -> Option<Self> {
+        let start = &text[..text.len().min(MAX_BYTES)];
+        let mut ends = memmem::find_iter(start, END);
+        let first = ends.next()?;
+        // A second one belongs to the segment unless the table has begun before it.
+        let table = memmem::find(&start[first..], X.as_bytes()).map(|at| first + at);
+        let last =
+            ends.next().filter(|end| table.is_none_or(|table| *end < table)).unwrap_or(first);
+        let mut bytes = last + start[last..].iter().position(|b| *b == terminator)? + 1;
+        // Empty lines above the names.
+        while let Some(len) = start[bytes..].iter().position(|b| *b == terminator)
+            && start[bytes..bytes + len].trim_ascii().is_empty()
+        {
+            bytes += len + 1;
+        }
+        let lines = start[..bytes].iter().filter(|b| **b == terminator).count() as u64;
+        let mut header =
+            Self { lines, bytes, units: Vec::new(), axes: Vec::new(), instants: Instants::One };
+        let separator = if memmem::find(&start[..first], b"Separator\tComma").is_some()
+            || memmem::find(&start[..first], b"Separator,Comma").is_some()
+        {
+            b','
+        } else {
+            b'\t'
+        };
+        let (mut starts, mut steps) = (Vec::new(), Vec::new());
+        for line in start[..bytes].split(|b| *b == terminator) {
+            let mut fields =
+                line.split(|b| *b == separator).map(|field| text_of(field.trim_ascii()));
+            let key = fields.next().unwrap_or_default();
+            let number = |text: String| text.replace(',', ".").parse::<f64>().unwrap_or(f64::NAN);
+            match key.as_str() {
+                "X_Columns" => {
+                    header.instants = match fields.next().unwrap_or_default().as_str() {
+                        "No" => Instants::No,
+                        "Multi" => Instants::Each,
+                        _ => Instants::One,
+                    };
+                }
+                "Y_Unit_Label" => header.units = fields.collect(),
+                "X0" => starts = fields.map(number).collect(),
+                "Delta_X" => steps = fields.map(number).collect(),
+                _ => {}
+            }
+        }
+        header.axes = starts.into_iter().zip(steps).collect();
+        Some(header)
+    }
+
+    /// Returns the column of a channel, both counted from 0.
+    pub fn column(&self, channel: usize) -> usize {
+        match self.instants {
+            Instants::No | Instants::One => channel + 1,
+            Instants::Each => 2 * channel + 1,
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The unit vocabulary: every spelling of a unit, with its dimension and its factor to SI.
+//!
+//! This is the only list of units. Names of columns, lines of units, labels of universal files,
+//! attributes of HDF5 files, axes of frequency and time, and data frames are all read by it.
+
+/// Exponents of length, time, force, voltage, charge and counts.
+///
+/// Force is a base dimension, so that a mass is F·T²/L; angles are pure numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Dimension(pub [i8; 6]);
+
+impl Dimension {
+    pub const NONE: Self = Self([0; 6]);
+    pub const LENGTH: Self = Self([1, 0, 0, 0, 0, 0]);
+    pub const VELOCITY: Self = Self([1, -1, 0, 0, 0, 0]);
+    pub const ACCELERATION: Self = Self([1, -2, 0, 0, 0, 0]);
+    pub const TIME: Self = Self([0, 1, 0, 0, 0, 0]);
+    pub const FREQUENCY: Self = Self([0, -1, 0, 0, 0, 0]);
+    pub const FORCE: Self = Self([0, 0, 1, 0, 0, 0]);
+    pub const MASS: Self = Self([-1, 2, 1, 0, 0, 0]);
+    const MOMENT: Self = Self([1, 0, 1, 0, 0, 0]);
+    const PRESSURE: Self = Self([-2, 0, 1, 0, 0, 0]);
+    const VOLTAGE: Self = Self([0, 0, 0, 1, 0, 0]);
+    const CHARGE: Self = Self([0, 0, 0, 0, 1, 0]);
+    const COUNT: Self = Self([0, 0, 0, 0, 0, 1]);
+
+    /// Returns whether the numbers are those of a converter or an amplifier: voltage, charge or counts.
+    pub fn is_electric(self) -> bool {
+        self.0[3..].iter().any(|exponent| *exponent != 0)
+    }
+
+    /// Returns the dimension of a product of two powers.
+    pub fn times(self, other: Self, power: i8) -> Option<Self> {
+        let mut product = self;
+        for (into, exponent) in product.0.iter_mut().zip(other.0) {
+            *into = into.checked_add(exponent.checked_mul(power)?)?;
+        }
+        Some(product)
+    }
+}
+
+/// A unit and its spellings.
+pub(super) struct Entry {
+    /// Spellings, the usual one first.
+    pub spellings: &'static [&'static str],
+    pub dimension: Dimension,
+    /// Size in SI units: m, s, N, V, C, Hz.
+    pub in_si: f64,
+}
+
+const fn entry(spellings: &'static [&'static str], dimension: Dimension, in_si: f64) -> Entry {
+    Entry { spellings, dimension, in_si }
+}
+
+/// Standard gravity, in m/s²; exact since 1901.
+pub(super) const G: f64 = 9.80665;
+
+/// An inch, in m; exact since 1959.
+const INCH: f64 = 0.0254;
+
+/// A pound-force, in N; exact since 1959.
+const POUND: f64 = 0.45359237 * G;
+
+/// Radians per cycle.
+const TURN: f64 = std::f64::consts::TAU;
+
+use Dimension as D;
+
+/// All units. Spellings differ in case only where the units do (`mN` and `MN`).
+pub(super) const VOCABULARY: &[Entry] = &[
+    // Force.
+    entry(&["N", "newton", "newtons"], D::FORCE, 1.0),
+    entry(&["µN", "uN"], D::FORCE, 1e-6),
+    entry(&["mN", "millinewton", "millinewtons"], D::FORCE, 1e-3),
+    entry(&["daN", "decanewton"], D::FORCE, 10.0),
+    entry(&["kN", "kilonewton", "kilonewtons"], D::FORCE, 1e3),
+    entry(&["MN", "meganewton", "meganewtons"], D::FORCE, 1e6),
+    entry(&["dyn", "dyne", "dynes"], D::FORCE, 1e-5),
+    entry(&["gf", "gramf", "pond"], D::FORCE, 1e-3 * G),
+    entry(&["kgf", "kp", "kilopond", "kg-f", "kg_f"], D::FORCE, G),
+    entry(&["tf", "tonnef"], D::FORCE, 1e3 * G),
+    entry(&["lbf", "lb", "lbs", "lbsf", "pound", "pounds", "lb-f", "lb_f"], D::FORCE, POUND),
+    entry(&["ozf", "oz"], D::FORCE, POUND / 16.0),
+    entry(&["kip", "kips", "klbf", "klb", "klbs"], D::FORCE, 1e3 * POUND),
+    // Length.
+    entry(&["m", "meter", "meters", "metre", "metres"], D::LENGTH, 1.0),
+    entry(&["km"], D::LENGTH, 1e3),
+    entry(&["dm"], D::LENGTH, 0.1),
+    entry(&["cm", "centimeter", "centimeters", "centimetre", "centimetres"], D::LENGTH, 1e-2),
+    entry(&["mm", "millimeter", "millimeters", "millimetre", "millimetres"], D::LENGTH, 1e-3),
+    entry(
+        &["µm", "um", "mum", "micron", "microns", "micrometer", "micrometers", "micrometre"],
+        D::LENGTH,
+        1e-6,
+    ),
+    entry(&["nm", "nanometer", "nanometers", "nanometre"], D::LENGTH, 1e-9),
+    entry(&["in", "inch", "inches", "ins"], D::LENGTH, INCH),
+    entry(&["ft", "foot", "feet"], D::LENGTH, 12.0 * INCH),
+    entry(&["mil", "mils", "thou", "thous"], D::LENGTH, 1e-3 * INCH),
+    entry(&["µin", "uin", "microinch", "microinches"], D::LENGTH, 1e-6 * INCH),
+    // Velocity.
+    entry(&["mps"], D::VELOCITY, 1.0),
+    entry(&["ips"], D::VELOCITY, INCH),
+    entry(&["fps"], D::VELOCITY, 12.0 * INCH),
+    // Acceleration.
+    entry(&["g", "gn", "g_n", "g0", "gee", "gees", "g's", "gs", "grav"], D::ACCELERATION, G),
+    entry(&["mg", "milli-g", "millig"], D::ACCELERATION, 1e-3 * G),
+    entry(&["µg", "ug", "microg"], D::ACCELERATION, 1e-6 * G),
+    entry(&["gal", "gals"], D::ACCELERATION, 1e-2),
+    entry(&["mgal", "mgals"], D::ACCELERATION, 1e-5),
+    // Time.
+    entry(&["s", "sec", "secs", "second", "seconds", "sek", "sekunden"], D::TIME, 1.0),
+    entry(&["ms", "msec", "msecs", "millisecond", "milliseconds", "millis"], D::TIME, 1e-3),
+    entry(&["µs", "us", "usec", "µsec", "microsecond", "microseconds", "micros"], D::TIME, 1e-6),
+    entry(&["ns", "nsec", "nanosecond", "nanoseconds"], D::TIME, 1e-9),
+    entry(&["min", "mins", "minute", "minutes"], D::TIME, 60.0),
+    entry(&["h", "hr", "hrs", "hour", "hours"], D::TIME, 3600.0),
+    entry(&["d", "day", "days", "datenum"], D::TIME, 86_400.0),
+    // Frequency.
+    entry(&["Hz", "hertz", "cps"], D::FREQUENCY, 1.0),
+    entry(&["kHz", "kilohertz"], D::FREQUENCY, 1e3),
+    entry(&["MHz", "megahertz"], D::FREQUENCY, 1e6),
+    entry(&["rpm", "cpm"], D::FREQUENCY, 1.0 / 60.0),
+    entry(&["rps"], D::FREQUENCY, 1.0),
+    entry(&["rads"], D::FREQUENCY, 1.0 / TURN),
+    // Angles and cycles, so that rad/s and cycles/s are frequencies.
+    entry(&["rad", "radian", "radians"], D::NONE, 1.0 / TURN),
+    entry(&["krad"], D::NONE, 1e3 / TURN),
+    entry(&["deg", "degree", "degrees", "°"], D::NONE, 1.0 / 360.0),
+    entry(&["cycle", "cycles", "rev", "revs"], D::NONE, 1.0),
+    // Mass, of apparent masses; a load cell in kg is read as one in kgf, and that is reported.
+    entry(&["kg", "kilogram", "kilograms"], D::MASS, 1.0),
+    // Units that no force and no motion has: a column in one of them is never taken silently.
+    entry(&["Nm"], D::MOMENT, 1.0),
+    entry(&["Pa", "pascal"], D::PRESSURE, 1.0),
+    entry(&["kPa"], D::PRESSURE, 1e3),
+    entry(&["MPa"], D::PRESSURE, 1e6),
+    entry(&["bar"], D::PRESSURE, 1e5),
+    entry(&["psi"], D::PRESSURE, POUND / (INCH * INCH)),
+    entry(&["V", "volt", "volts", "vdc"], D::VOLTAGE, 1.0),
+    entry(&["mV", "millivolt", "millivolts", "mvolt"], D::VOLTAGE, 1e-3),
+    entry(&["µV", "uV", "microvolt", "microvolts"], D::VOLTAGE, 1e-6),
+    entry(&["kV"], D::VOLTAGE, 1e3),
+    entry(&["C", "coulomb"], D::CHARGE, 1.0),
+    entry(&["nC"], D::CHARGE, 1e-9),
+    entry(&["pC"], D::CHARGE, 1e-12),
+    entry(
+        &["counts", "count", "cnt", "cnts", "lsb", "lsbs", "adc", "digits", "bits"],
+        D::COUNT,
+        1.0,
+    ),
+];

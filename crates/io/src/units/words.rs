@@ -1,0 +1,244 @@
+//! Words in the names of columns: quantities, places and directions.
+
+use std::ops::Range;
+
+use super::Quantity;
+
+/// Words that stand for a force.
+const FORCE: &[&str] = &[
+    "force",
+    "forces",
+    "load",
+    "loadcell",
+    "thrust",
+    "hammer",
+    "impact",
+    "shaker",
+    "excitation",
+    "tension",
+    "kraft",
+    "fx",
+    "fy",
+    "fz",
+];
+
+/// Words that stand for a displacement.
+const DISPLACEMENT: &[&str] = &[
+    "disp",
+    "displ",
+    "displacement",
+    "deflection",
+    "position",
+    "pos",
+    "lvdt",
+    "laser",
+    "prox",
+    "proximity",
+    "gap",
+    "stroke",
+    "travel",
+    "weg",
+];
+
+/// Words that stand for a velocity.
+const VELOCITY: &[&str] = &["vel", "velo", "velocity", "speed", "vibration", "vib"];
+
+/// Words that stand for an acceleration.
+const ACCELERATION: &[&str] = &[
+    "acc",
+    "accel",
+    "accels",
+    "acceleration",
+    "accelerations",
+    "accelerometer",
+    "accelerance",
+    "beschleunigung",
+    "ax",
+    "ay",
+    "az",
+];
+
+/// Words that stand for a time.
+const TIME: &[&str] = &["time", "t", "zeit", "timestamp", "elapsed"];
+
+/// Words that stand for a frequency.
+const FREQUENCY: &[&str] = &["frequency", "freq", "omega", "w", "f", "frequenz", "speed"];
+
+/// Units that are English words, symbols of other things or ends of names: they count as units only behind the name of
+/// their quantity.
+const AMBIGUOUS: &[&str] =
+    &["g", "gs", "in", "ins", "m", "n", "s", "h", "d", "c", "v", "foot", "feet", "min"];
+
+/// Words in brackets that name a place, a direction, a channel or a treatment of the signal, and no unit.
+const LABELS: &[&str] = &[
+    "x",
+    "y",
+    "z",
+    "rx",
+    "ry",
+    "rz",
+    "axis",
+    "direction",
+    "dir",
+    "left",
+    "right",
+    "top",
+    "bottom",
+    "front",
+    "back",
+    "rear",
+    "upper",
+    "lower",
+    "inner",
+    "outer",
+    "middle",
+    "center",
+    "centre",
+    "drive",
+    "driven",
+    "end",
+    "free",
+    "fixed",
+    "de",
+    "nde",
+    "inboard",
+    "outboard",
+    "vertical",
+    "horizontal",
+    "vert",
+    "horiz",
+    "hor",
+    "axial",
+    "radial",
+    "tangential",
+    "lateral",
+    "longitudinal",
+    "transverse",
+    "north",
+    "south",
+    "east",
+    "west",
+    "up",
+    "down",
+    "side",
+    "base",
+    "tip",
+    "root",
+    "filtered",
+    "filt",
+    "corrected",
+    "measured",
+    "calculated",
+    "estimated",
+    "smoothed",
+    "mean",
+    "average",
+    "ch",
+    "chan",
+    "channel",
+    "ai",
+    "ain",
+    "input",
+    "output",
+    "node",
+    "point",
+    "pt",
+    "dof",
+    "sensor",
+    "shaker",
+    "hammer",
+    "exciter",
+    "motor",
+    "pump",
+    "bearing",
+    "shaft",
+    "rotor",
+    "beam",
+    "plate",
+    "mass",
+    "floor",
+    "table",
+    "ref",
+    "reference",
+    "driving",
+    "response",
+    "force",
+    "acceleration",
+    "velocity",
+    "displacement",
+    "signal",
+    "test",
+    "run",
+    "no",
+    "nr",
+    "position",
+    "pos",
+    "dev",
+    "mod",
+    "unit",
+    "of",
+    "the",
+    "at",
+    "on",
+];
+
+/// Returns the quantity that a word of three letters or more stands for.
+pub(super) fn quantity_word(word: &str) -> Option<Quantity> {
+    let all = [
+        Quantity::Force,
+        Quantity::DISPLACEMENT,
+        Quantity::VELOCITY,
+        Quantity::ACCELERATION,
+        Quantity::Time,
+    ];
+    all.into_iter().find(|quantity| word.len() > 2 && is_quantity_word(word, *quantity))
+}
+
+/// Returns whether a word, with a number behind it or not, stands for a quantity.
+pub(super) fn is_quantity_word(word: &str, quantity: Quantity) -> bool {
+    let lower = word.to_lowercase();
+    let word = lower.trim_end_matches(|c: char| c.is_ascii_digit());
+    let words = match quantity {
+        Quantity::Force => FORCE,
+        Quantity::DISPLACEMENT => DISPLACEMENT,
+        Quantity::VELOCITY => VELOCITY,
+        Quantity::ACCELERATION => ACCELERATION,
+        Quantity::Time => TIME,
+        Quantity::Frequency => FREQUENCY,
+    };
+    words.contains(&word)
+}
+
+/// Returns whether a unit is also a word or a symbol of something else.
+pub(super) fn is_ambiguous(unit: &str) -> bool {
+    AMBIGUOUS.contains(&unit.to_lowercase().as_str())
+}
+
+/// Returns whether a text names places, directions or channels: `left`, `+Z`, `AI0`, `shaker 1`, `Dev1/ai0`.
+pub(super) fn is_label(text: &str) -> bool {
+    let mut words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.all(|word| {
+        let lower = word.to_lowercase();
+        let stem = lower.trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_identifier = stem.len() < lower.len() && stem.chars().all(char::is_alphabetic);
+        is_identifier || LABELS.contains(&stem)
+    })
+}
+
+/// Splits a name into words, at blanks and punctuation.
+pub(super) fn split_words(name: &str) -> Vec<Range<usize>> {
+    let (mut words, mut start): (Vec<Range<usize>>, _) = (Vec::new(), None);
+    let mut chars = name.char_indices().peekable();
+    while let Some((at, c)) = chars.next() {
+        let next = chars.peek().map(|(_, c)| *c);
+        let is_minus = c == '-' && next.is_some_and(|c| c.is_ascii_digit());
+        let separates = c.is_whitespace() || "_,;:=.|#".contains(c) || c == '-' && !is_minus;
+        if separates {
+            words.extend(start.take().map(|start| start..at));
+        } else if start.is_none() {
+            start = Some(at);
+        }
+    }
+    words.extend(start.map(|start| start..name.len()));
+    words
+}

@@ -1,0 +1,204 @@
+//! Names, units and instants as measuring programs write them above and beside the numbers.
+
+use mechid_io::{Quantity, Table, TimeAxis};
+
+use super::table;
+
+/// Reads a text with three columns, instants every half second, a force of 1 to 4 and an acceleration of 5 to 8.
+fn three(text: &str) -> Table {
+    let table = table(text);
+    assert_eq!(table.len(), 4, "{text}");
+    for (column, first) in [(1, 1.0), (2, 5.0)] {
+        let expected: Vec<f64> = (0..4).map(|k| first + f64::from(k)).collect();
+        assert_eq!(table.values(column).unwrap(), expected, "{text}");
+    }
+    table
+}
+
+const ROWS: &str = "0.0,1,5\n0.5,2,6\n1.0,3,7\n1.5,4,8\n";
+
+#[test]
+fn a_comment_above_the_table_names_its_columns() {
+    let blanks = ROWS.replace(',', " ");
+    for text in [
+        format!("# time [s],force [N],acc [g]\n{ROWS}"),
+        format!("% time [s],force [N],acc [g]\n{ROWS}"),
+        format!("! time [s],force [N],acc [g]\n{ROWS}"),
+        format!("; time [s],force [N],acc [g]\n{ROWS}"),
+        format!("# Rig 4, left\n# time [s];force [N];acc [g]\n{ROWS}"),
+        format!("# time [s]  force [N]  acc [g]\n{blanks}"),
+        format!("# time [s] force [N] acc [g]\n{blanks}"),
+        format!("# time, force, acc\n# s, N, g\n{ROWS}"),
+        format!("# time force acc\ns,N,g\n{ROWS}"),
+    ] {
+        let table = three(&text);
+        assert_eq!(table.time_column().map(|name| &name[..4]), Some("time"), "{text}");
+        let acc = table.find("acc").unwrap();
+        assert!(
+            (table.to_si(acc, Quantity::ACCELERATION).unwrap() - 9.80665).abs() < 1e-12,
+            "{text}"
+        );
+        assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1.0, "{text}");
+    }
+    // No names: another number of words, and numbers.
+    for text in [format!("# rig 4\n{ROWS}"), format!("# 1,2,3\n{ROWS}")] {
+        assert_eq!(three(&text).names(), ["", "", ""], "{text}");
+    }
+}
+
+#[test]
+fn rows_above_the_names_are_left_out() {
+    for above in [
+        "1,2,3\n",
+        "CH1,CH2,CH3\n",
+        "Channel 1,Channel 2,Channel 3\n",
+        "Serial,1234,5\nRange,10,100\n",
+        "File,a,b\nRig,c,d\nOperator,e,f\n",
+    ] {
+        for units in ["", "s,N,g\n", "[s],[N],[g]\n", "(s),(N),(g)\n"] {
+            if units.is_empty() && above.starts_with("File") {
+                continue;
+            }
+            let table = three(&format!("{above}time,force,acc\n{units}{ROWS}"));
+            assert_eq!(table.names(), ["time", "force", "acc"], "{above}{units}");
+            let factor = if units.is_empty() { 1.0 } else { 9.80665 };
+            let si = table.to_si(2, Quantity::ACCELERATION).unwrap();
+            assert!((si - factor).abs() < 1e-12, "{above}{units}: {si}");
+        }
+    }
+}
+
+#[test]
+fn one_name_more_than_fields_does_no_harm() {
+    let table = three(&format!("X_Value,Force,Acc,Comment\n{ROWS}"));
+    assert_eq!(table.names(), ["X_Value", "Force", "Acc", "Comment"]);
+    assert_eq!(table.time_column(), Some("X_Value"));
+    let table =
+        three(&format!("X_Value,Force,Acc,Comment\n{}", ROWS.replacen("5\n", "5,start\n", 1)));
+    assert_eq!(table.sampling(&TimeAxis::Column("1"), &["2"]).unwrap().dt(), 0.5);
+}
+
+/// Judge: half a second from row to row.
+#[test]
+fn instants_of_dates_and_clocks_are_a_time_axis() {
+    for (name, instants) in [
+        (
+            "time",
+            [
+                "2023-03-14T23:59:59.000",
+                "2023-03-14T23:59:59.500",
+                "2023-03-15T00:00:00.000",
+                "2023-03-15T00:00:00.500",
+            ],
+        ),
+        (
+            "time",
+            [
+                "2023-03-14 09:26:53.0",
+                "2023-03-14 09:26:53.5",
+                "2023-03-14 09:26:54.0",
+                "2023-03-14 09:26:54.5",
+            ],
+        ),
+        ("Time [hh:mm:ss]", ["09:26:53.0", "09:26:53.5", "09:26:54.0", "09:26:54.5"]),
+        (
+            "Timestamp",
+            [
+                "3/14/2023 9:26:53.0 PM",
+                "3/14/2023 9:26:53.5 PM",
+                "3/14/2023 9:26:54.0 PM",
+                "3/14/2023 9:26:54.5 PM",
+            ],
+        ),
+    ] {
+        let rows = instants.iter().enumerate().map(|(k, at)| format!("{at},{},{}\n", k + 1, k + 5));
+        let rows: String = rows.collect();
+        for header in [format!("{name},force,acc\n"), String::new()] {
+            let table = three(&format!("{header}{rows}"));
+            let time = if header.is_empty() { "1" } else { table.time_column().unwrap() };
+            let sampling = table.sampling(&TimeAxis::Column(time), &["2"]).unwrap();
+            assert!((sampling.dt() - 0.5).abs() < 1e-9, "{name}: {}", sampling.dt());
+            assert!(table.says_unit_of_time(0));
+        }
+    }
+    let mixed = table("time,x\n2023-03-14T09:26:53,1\n0.5,2\n2023-03-14T09:26:54,3\n");
+    let error = mixed.column("time").unwrap_err().to_string();
+    assert!(error.contains("line 3") && error.contains("is not a number"), "{error}");
+}
+
+/// Spells of time that a person reads.
+#[test]
+fn units_of_time_are_read_or_named() {
+    for (name, factor) in [
+        ("Time (msec)", 1e-3),
+        ("TIME(S)", 1.0),
+        ("Zeit [ms]", 1e-3),
+        ("time [h]", 3600.0),
+        ("Time_usec", 1e-6),
+    ] {
+        let table = three(&format!("{name},force,acc\n{ROWS}"));
+        let sampling =
+            table.sampling(&TimeAxis::Column(table.time_column().unwrap()), &["2"]).unwrap();
+        assert!((sampling.dt() / (0.5 * factor) - 1.0).abs() < 1e-12, "{name}");
+    }
+    let table = three(&format!("time [samples],force,acc\n{ROWS}"));
+    assert_eq!(table.time_column(), None);
+    assert_eq!(table.unclear_time(), Some((0, "samples".into())));
+}
+
+/// The header of a LabVIEW measurement file.
+fn lvm(x_columns: &str, names: &str, rows: &str, steps: [f64; 2]) -> String {
+    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\n\
+                Multi_Headings\tNo\n";
+    let segment = "Time_Pref\tAbsolute\nOperator\tlab\nDate\t2020/02/02\nTime\t10:11:12.5\n***End_of_Header***\t\n\t\n\
+                   Channels\t2\t\t\nSamples\t4\t4\t\nDate\t2020/02/02\t2020/02/02\t\nTime\t10:11:12.5\t10:11:12.5\t\n\
+                   Y_Unit_Label\tN\tg\t\nX_Dimension\tTime\tTime\t\nX0\t0.0E+0\t0.0E+0\t\n";
+    let [a, b] = steps;
+    format!(
+        "{head}X_Columns\t{x_columns}\n{segment}Delta_X\t{a}\t{b}\t\n***End_of_Header***\t\t\t\n{names}\n{rows}"
+    )
+}
+
+#[test]
+fn labview_measurement_files_are_read_with_their_units_and_time() {
+    let one = lvm("One", "X_Value\tForce\tAcc\tComment", &ROWS.replace(',', "\t"), [0.5; 2]);
+    let none: String = (0..4).map(|k| format!("\t{}\t{}\n", k + 1, k + 5)).collect();
+    let none = lvm("No", "X_Value\tForce\tAcc\tComment", &none, [0.5; 2]);
+    let each: String = (0..4)
+        .map(|k| {
+            let t = 0.5 * f64::from(k);
+            format!("{t}\t{}\t{t}\t{}\n", k + 1, k + 5)
+        })
+        .collect();
+    let each = lvm("Multi", "X_Value\tForce\tX_Value\tAcc\tComment", &each, [0.5; 2]);
+    for (kind, text) in [("One", one), ("No", none), ("Multi", each)] {
+        for text in [text.clone(), text.replace('\n', "\r\n")] {
+            let table = table(&text);
+            let [force, acc] = ["Force", "Acc"].map(|name| table.find(name).unwrap());
+            assert_eq!(table.values(force).unwrap(), [1.0, 2.0, 3.0, 4.0], "{kind}");
+            assert_eq!(table.values(acc).unwrap(), [5.0, 6.0, 7.0, 8.0], "{kind}");
+            assert_eq!(table.to_si(force, Quantity::Force).unwrap(), 1.0, "{kind}");
+            assert!(
+                (table.to_si(acc, Quantity::ACCELERATION).unwrap() - 9.80665).abs() < 1e-12,
+                "{kind}"
+            );
+            let time = if table.has_time_axis() {
+                TimeAxis::OfFile
+            } else {
+                TimeAxis::Column(table.time_column().unwrap())
+            };
+            assert_eq!(table.sampling(&time, &["Force", "Acc"]).unwrap().dt(), 0.5, "{kind}");
+        }
+    }
+}
+
+#[test]
+fn channels_of_different_rates_in_a_labview_file_are_refused_together() {
+    let rows: String = (0..4)
+        .map(|k| format!("{}\t1\t{}\t2\n", 0.5 * f64::from(k), 0.25 * f64::from(k)))
+        .collect();
+    let table = table(&lvm("Multi", "X_Value\tForce\tX_Value\tAcc", &rows, [0.5, 0.25]));
+    let error = table.sampling(&TimeAxis::OfFile, &["Force", "Acc"]).unwrap_err().to_string();
+    assert!(error.contains("same time axis"), "{error}");
+    assert_eq!(table.sampling(&TimeAxis::OfFile, &["Acc"]).unwrap().dt(), 0.25);
+}

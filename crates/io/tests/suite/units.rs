@@ -1,0 +1,257 @@
+//! Units in headers as rigs and spreadsheets write them.
+
+use mechid_io::{Evidence, Quantity, Table, Unit, stated_unit};
+
+/// Words for a quantity, and spellings of its units with their size in SI units, worked from the definitions.
+type Group = (Quantity, &'static [&'static str], &'static [(&'static str, f64)]);
+
+const POUND: f64 = 4.448_221_615_260_5;
+const G: f64 = 9.80665;
+
+const GROUPS: [Group; 4] = [
+    (
+        Quantity::Force,
+        &["Force", "load", "Hammer force"],
+        &[
+            ("N", 1.0),
+            ("kN", 1e3),
+            ("KN", 1e3),
+            ("Newton", 1.0),
+            ("lbf", POUND),
+            ("lbs", POUND),
+            ("LBF", POUND),
+            ("lb", POUND),
+            ("kip", 1e3 * POUND),
+            ("kgf", G),
+        ],
+    ),
+    (
+        Quantity::DISPLACEMENT,
+        &["Disp", "position", "x"],
+        &[
+            ("mm", 1e-3),
+            ("um", 1e-6),
+            ("µm", 1e-6),
+            ("micron", 1e-6),
+            ("in", 0.0254),
+            ("in.", 0.0254),
+            ("inch", 0.0254),
+            ("mil", 25.4e-6),
+            ("thou", 25.4e-6),
+            ("cm", 1e-2),
+        ],
+    ),
+    (
+        Quantity::VELOCITY,
+        &["Vel", "velocity", "v"],
+        &[("m/s", 1.0), ("mm/s", 1e-3), ("in/s", 0.0254), ("ips", 0.0254), ("cm/sec", 1e-2)],
+    ),
+    (
+        Quantity::ACCELERATION,
+        &["Acc", "accel", "a"],
+        &[
+            ("g", G),
+            ("G", G),
+            ("gn", G),
+            ("m/s^2", 1.0),
+            ("m/s2", 1.0),
+            ("mm/s²", 1e-3),
+            ("in/sec^2", 0.0254),
+            ("mg", 1e-3 * G),
+            ("m s-2", 1.0),
+            ("m/s/s", 1.0),
+        ],
+    ),
+];
+
+/// Styles with a place for the word and the unit; the first ones state the unit in brackets.
+const BRACKETED: [&str; 12] = [
+    "W [U]",
+    "W (U)",
+    "W(U)",
+    "W {U}",
+    "[U] W",
+    "(U) W",
+    "W (U) CH1",
+    "W [U] [AI0]",
+    "W (U) - X",
+    "W [U].1",
+    "W [unit: U]",
+    "W <U>",
+];
+const OTHER: [&str; 8] = ["W_U", "W.U", "W U", "W, U", "W / U", "W in U", "W-U", "WU"];
+
+fn header(style: &str, word: &str, unit: &str) -> String {
+    style.replace('W', "\u{1}").replace('U', unit).replace('\u{1}', word)
+}
+
+/// Judge: the definitions of the units. A header in brackets has the right factor; one of another style has it, or a
+/// finding says that there is a doubt.
+#[test]
+fn generated_headers_have_the_right_factor_or_a_finding() {
+    let (mut all, mut right) = (0, 0);
+    for (quantity, words, units) in GROUPS {
+        for word in words {
+            for (unit, factor) in units {
+                for style in BRACKETED.iter().chain(&OTHER) {
+                    let name = header(style, word, unit);
+                    let stated = stated_unit(&name, "", Some(quantity));
+                    let used = stated.as_ref().and_then(|stated| stated.used());
+                    let used_factor = used.map_or(1.0, |unit| unit.in_si);
+                    let is_right = (used_factor / factor - 1.0).abs() < 1e-12
+                        && used.is_none_or(|unit| unit.quantity == quantity);
+                    let is_doubted =
+                        stated.as_ref().is_some_and(|stated| stated.evidence != Evidence::Stated);
+                    assert!(is_right || is_doubted, "{name}: {stated:?}");
+                    if BRACKETED.contains(style) {
+                        assert!(is_right && !is_doubted, "{name}: {stated:?}");
+                    }
+                    all += 1;
+                    right += usize::from(is_right);
+                }
+                // A line of units, in brackets of any kind or none.
+                for row in [
+                    unit.to_string(),
+                    format!("[{unit}]"),
+                    format!("({unit})"),
+                    format!("{{{unit}}}"),
+                ] {
+                    let stated = stated_unit(word, &row, Some(quantity)).unwrap();
+                    assert!(
+                        (stated.used().unwrap().in_si / factor - 1.0).abs() < 1e-12,
+                        "{word}, {row}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(all >= 2000, "{all}");
+    // Nearly all of them are understood.
+    assert!(10 * right >= 9 * all, "{right} of {all}");
+}
+
+#[test]
+fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
+    for (name, quantity, factor) in [
+        ("Force [mV]", Quantity::Force, None),
+        ("Force_mV", Quantity::Force, None),
+        ("acc counts", Quantity::ACCELERATION, None),
+        ("Disp [dB re 1 m]", Quantity::DISPLACEMENT, None),
+        ("LVDT (mm/V)", Quantity::DISPLACEMENT, None),
+        ("Acc (100 mV/g)", Quantity::ACCELERATION, None),
+        ("Acc (50 g)", Quantity::ACCELERATION, Some(50.0 * G)),
+        ("Disp [0.1 mm]", Quantity::DISPLACEMENT, Some(1e-4)),
+        // The ground acceleration, or a column in g.
+        ("a_g", Quantity::ACCELERATION, Some(G)),
+        ("x in", Quantity::DISPLACEMENT, Some(0.0254)),
+        ("Disp in test rig", Quantity::DISPLACEMENT, Some(0.0254)),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Unused, "{name}");
+        let unit = stated.unit.map(|unit| unit.in_si);
+        assert_eq!(unit.is_some(), factor.is_some(), "{name}");
+        assert!(unit.zip(factor).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{name}");
+    }
+    for (name, quantity, factor) in [
+        ("Disp [um pk-pk]", Quantity::DISPLACEMENT, 1e-6),
+        ("Acc [g rms]", Quantity::ACCELERATION, G),
+        ("Load (kg)", Quantity::Force, G),
+        ("accG", Quantity::ACCELERATION, G),
+        ("xmm", Quantity::DISPLACEMENT, 1e-3),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Likely, "{name}");
+        assert!((stated.used().unwrap().in_si / factor - 1.0).abs() < 1e-12, "{name}");
+    }
+}
+
+/// Judge: 11.2 mV per newton makes 1 mV 1/11.2 N.
+#[test]
+fn a_sensitivity_beside_the_unit_gives_the_factor() {
+    for (name, quantity, factor) in [
+        ("Force [mV; 11.2 mV/N]", Quantity::Force, 1.0 / 11.2),
+        ("Force [mV] (11.2 mV/N)", Quantity::Force, 1.0 / 11.2),
+        ("Acc (V, 100 mV/g)", Quantity::ACCELERATION, 10.0 * G),
+        ("Force {pC; 4.0 pC/N}", Quantity::Force, 0.25),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap();
+        assert_eq!(stated.evidence, Evidence::Stated, "{name}");
+        let unit = stated.used().unwrap();
+        assert_eq!(unit.quantity, quantity, "{name}");
+        assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}: {}", unit.in_si);
+    }
+}
+
+#[test]
+fn places_directions_and_channels_are_no_units() {
+    for name in [
+        "Force [shaker 1]",
+        "Force (left)",
+        "x (+Z)",
+        "x [AI0]",
+        "x [Dev1/ai0]",
+        "Force [1]",
+        "x (12+Z)",
+        "x",
+        "force_in",
+        "x_m",
+        "velocity_N",
+        "count",
+        "a1",
+        "",
+    ] {
+        for quantity in [Quantity::Force, Quantity::VELOCITY] {
+            let stated = stated_unit(name, "", Some(quantity));
+            let is_si = |stated: &mechid_io::StatedUnit| {
+                stated.evidence == Evidence::Stated && stated.used().is_some_and(|u| u.in_si == 1.0)
+            };
+            assert!(stated.as_ref().is_none_or(is_si), "{name}: {stated:?}");
+        }
+    }
+}
+
+#[test]
+fn a_name_is_what_stands_beside_the_unit() {
+    let table =
+        |name: &str| Table::parse("a.csv", format!("\"{name}\",b\n1,2\n").as_bytes()).unwrap();
+    for (name, bare) in [
+        ("Fx [N]", "Fx"),
+        ("[kN] Force", "Force"),
+        ("Force (kN) CH1", "Force CH1"),
+        ("Force [shaker 1]", "Force"),
+        ("F / kN", "F"),
+        ("v/mm/s", "v"),
+        ("x_mm", "x"),
+        ("Disp um", "Disp"),
+        ("force_lbf", "force"),
+        ("accel_g", "accel"),
+        ("time_ms", "time"),
+        ("Time / s", "Time"),
+        ("Force [N].1", "Force .1"),
+        ("x_m", "x_m"),
+        ("m/s", "m/s"),
+        ("N]", "N]"),
+    ] {
+        assert_eq!(table(name).short_name(0), bare, "{name}");
+    }
+    // In any case, and with the other brackets kept.
+    let columns = table("Force [N] (left)");
+    for wanted in ["Force [N] (left)", "Force (left)", "Force", "force"] {
+        assert_eq!(columns.find(wanted).unwrap(), 0, "{wanted}");
+    }
+}
+
+#[test]
+fn a_unit_or_a_factor_may_be_stated() {
+    let mut table = Table::parse("a.csv", b"t,Force [mV],acc\n0,1,2\n1,2,3\n").unwrap();
+    table.set_scale("Force", 0.25).unwrap();
+    table.set_unit("acc", "g").unwrap();
+    table.set_unit("t", "ms").unwrap();
+    assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 0.25);
+    assert_eq!(table.to_si(2, Quantity::ACCELERATION).unwrap(), G);
+    let time = mechid_io::TimeAxis::Column("t");
+    assert_eq!(table.sampling(&time, &["acc"]).unwrap().dt(), 1e-3);
+    assert!(table.set_unit("acc", "furlong").unwrap_err().to_string().contains("furlong"));
+    assert!(table.set_scale("acc", 0.0).is_err());
+    assert!(Unit::parse("furlong").is_none());
+}
