@@ -38,7 +38,7 @@ mod _mechid {
     #[pymodule_export]
     use super::machine::{Machine, selected_modes};
     #[pymodule_export]
-    use super::measurement::Measurement;
+    use super::measurement::{Measurement, find_column, rate_of, time_column};
     #[pymodule_export]
     use super::predicted::{Predicted, predict_record};
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! Measured forces and responses.
 
 use mechid::analysis::{RecordPlan, Window};
+use mechid::io::{IoError, Table, TimeAxis};
 use mechid::signal::Sampling;
 use mechid::{Channels, analysis::AnalysisError};
 use numpy::{PyArray2, PyReadonlyArray1};
@@ -8,6 +9,35 @@ use pyo3::prelude::*;
 
 use crate::arrays::{self, Named};
 use crate::{failure, work};
+
+/// Finds the column that a name means, with its unit or without, by its index counted from 0; `None` if none does.
+#[pyfunction]
+pub fn find_column(py: Python<'_>, names: Vec<String>, wanted: &str) -> PyResult<Option<usize>> {
+    let columns = names.into_iter().map(|name| (name, vec![0.0]));
+    let table = Table::from_columns("the table", columns);
+    work::brief(py, || match table.find(wanted) {
+        Ok(at) => Ok(Some(at)),
+        Err(IoError::MissingColumn { .. }) => Ok(None),
+        Err(error) => Err(error),
+    })
+}
+
+/// Finds the first column that is called time, by its index counted from 0.
+#[pyfunction]
+pub fn time_column(names: Vec<String>) -> Option<usize> {
+    let columns = names.iter().map(|name| (name.clone(), vec![0.0]));
+    let table = Table::from_columns("the table", columns);
+    let time = table.time_column()?;
+    names.iter().position(|name| name == time)
+}
+
+/// Sampling rate, in Hz, of equally spaced instants in the unit that the name of their column states.
+#[pyfunction]
+pub fn rate_of(py: Python<'_>, name: &str, instants: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+    let values = instants.as_array().to_vec();
+    let table = Table::from_columns("the table", [(name.to_owned(), values)]);
+    work::brief(py, || Ok::<_, IoError>(table.sampling(&TimeAxis::Column("1"), &["1"])?.rate_hz()))
+}
 
 /// Forces and responses of a machine, from a file or from arrays, and the window of them to use.
 #[pyclass(frozen, module = "mechid._mechid")]

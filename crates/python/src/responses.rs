@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use mechid::estimate::EstimateError;
 use mechid::io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid::io::{AveragedSegments, CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid::{IdentifyResponses, ResponseQuantity};
 use nalgebra::Complex;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
@@ -22,9 +23,10 @@ pub struct ResponseTable(pub FrequencyResponses);
 #[serde(deny_unknown_fields)]
 struct Layout {
     name: String,
-    quantity: ResponseQuantity,
+    quantity: Option<ResponseQuantity>,
     points: Vec<String>,
     forces: Vec<String>,
+    segments: Option<[f64; 5]>,
 }
 
 #[pymethods]
@@ -47,7 +49,7 @@ impl ResponseTable {
         std_error: Option<PyReadonlyArray3<'_, f64>>,
         coherence: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Self> {
-        let Layout { name, quantity, points, forces } = failure::settings(py, layout)?;
+        let Layout { name, quantity, points, forces, segments } = failure::settings(py, layout)?;
         let (response, errors) = (response.as_array(), std_error.as_ref().map(|e| e.as_array()));
         let lines = frequency_hz.as_array().len();
         let mut functions = Vec::new();
@@ -56,7 +58,7 @@ impl ResponseTable {
                 functions.push(ResponseFunction {
                     response: point.clone(),
                     reference: force.clone(),
-                    quantity: Some(quantity),
+                    quantity,
                     values: (0..lines).map(|line| response[(line, i, j)]).collect(),
                     standard_error: errors
                         .map(|errors| (0..lines).map(|line| errors[(line, i, j)]).collect()),
@@ -74,14 +76,23 @@ impl ResponseTable {
             coherence: points.iter().enumerate().filter_map(of_point).collect(),
             functions,
             added_decay: None,
-            segments: None,
+            segments: segments.and_then(AveragedSegments::of_numbers),
             remarks: Vec::new(),
+            doubts: Vec::new(),
         }))
     }
 
     #[getter]
     fn name(&self) -> &str {
         &self.0.file
+    }
+
+    /// Quantity that all responses state; `None` without one.
+    #[getter]
+    fn quantity(&self) -> Option<String> {
+        let mut stated = self.0.functions.iter().map(|function| function.quantity);
+        let first = stated.next()??;
+        stated.all(|other| other == Some(first)).then(|| first.to_string())
     }
 
     #[getter]

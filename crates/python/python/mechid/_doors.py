@@ -292,7 +292,8 @@ def identify_responses(
     >>> import mechid, numpy as np
     >>> omega = np.linspace(10.0, 60.0, 100)
     >>> response = 1 / (5000 - omega**2 * 10 + 1j * omega * 180)
-    >>> found = mechid.identify_responses(mechid.ResponseTable(omega / (2 * np.pi), response))
+    >>> table = mechid.ResponseTable(omega / (2 * np.pi), response, quantity="displacement")
+    >>> found = mechid.identify_responses(table)
     >>> round(found.parameters["k"].value, 6)
     5000.0
     """

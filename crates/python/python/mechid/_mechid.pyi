@@ -24,6 +24,7 @@ __all__ = [
     "bearing",
     "bearing_of_responses",
     "decay",
+    "find_column",
     "fleet_begin",
     "fleet_part",
     "fleet_rows",
@@ -39,14 +40,19 @@ __all__ = [
     "predict",
     "predict_record",
     "program",
+    "rate_of",
     "reconstruct",
     "selected_modes",
     "simulate",
     "sweep",
+    "time_column",
 ]
 
 __version__: str
 
+def find_column(names: Sequence[str], wanted: str) -> int | None: ...
+def time_column(names: Sequence[str]) -> int | None: ...
+def rate_of(name: str, instants: NDArray[np.float64]) -> float: ...
 @final
 class Measurement:
     @staticmethod
@@ -141,6 +147,8 @@ class ResponseTable:
     ) -> ResponseTable: ...
     @property
     def name(self) -> str: ...
+    @property
+    def quantity(self) -> str | None: ...
     @property
     def frequencies(self) -> int: ...
 

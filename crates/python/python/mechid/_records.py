@@ -47,6 +47,7 @@ _NAME_BYTES = 4096
 
 _UNEVEN = 1e-3
 """Largest deviation of a step between instants from their mean, as a part of it."""
+_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id", "unit", "scale")
 
 
 class Window(TypedDict, total=False):
@@ -72,6 +73,11 @@ class RecordOptions(Window, total=False):
     channel, ``record_column`` names the column that tells the records of a Parquet file apart,
     ``record_id`` the record by its value there, and ``memory_gb`` is the memory in GB that the numbers
     and the work on them may take.
+    sampling rate in Hz, which arrays need, and tables without a column or an index of time. Of files and
+    tables: ``time`` names the time column, ``unit`` states units of columns (``{"acc": "g"}``) and
+    ``scale`` factors that take columns to SI units, whatever their names say. Of files: ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
+    channel, ``record_column`` names the column that tells the records of a Parquet file apart, and
+    ``record_id`` the record by its value there.
     """
 
     force: Names | ArrayLike
@@ -85,6 +91,8 @@ class RecordOptions(Window, total=False):
     record_column: str | None
     record_id: str | None
     memory_gb: float | None
+    unit: Mapping[str, str]
+    scale: Mapping[str, float]
 
 
 @final
@@ -117,9 +125,11 @@ class Measurement:
         record_column: str | None = None,
         record_id: str | None = None,
         memory_gb: float | None = None,
+        unit: Mapping[str, str] | None = None,
+        scale: Mapping[str, float] | None = None,
         **window: Unpack[Window],
     ) -> Measurement:
-        """Open a record file: text, MATLAB or universal file, packed with gzip or not.
+        """Open a record file: text, MATLAB, HDF5 or universal file, packed with gzip or not.
 
         Parameters
         ----------
@@ -143,6 +153,10 @@ class Measurement:
         memory_gb : float, optional
             Memory that the numbers and the work on them may take, in GB; 0.27 GB and 512 bytes for each
             byte of the file, without, and 8.6 GB at most.
+        unit : mapping of str to str, optional
+            Units of columns, whatever their names say: ``{"acc": "g", "time": "ms"}``.
+        scale : mapping of str to float, optional
+            Factors that take columns to SI units, such as those of sensors: ``{"force": 0.0893}``.
         **window
             ``start``, ``period`` and ``periods``, as in `window`.
 
@@ -154,6 +168,7 @@ class Measurement:
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         channels = {kind: _names(kind, given) for kind, given in columns.items()}
         reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
+        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, unit, scale)
         plan = plan_of(path, channels, reading, window)
         return cls(_mechid.Measurement.open(json.dumps(plan)))
 
@@ -212,6 +227,9 @@ class Measurement:
         velocity: Names = (),
         acceleration: Names = (),
         fs: float | None = None,
+        time: str | None = None,
+        unit: Mapping[str, str] | None = None,
+        scale: Mapping[str, float] | None = None,
         name: str = "the record",
         **window: Unpack[Window],
     ) -> Measurement:
@@ -221,11 +239,19 @@ class Measurement:
         ----------
         table : mapping of names to columns, or sequence of SEP 5 dictionaries
             Columns in other units than N, m, m/s and m/s² are converted where the name says so, such
-            as ``"x [um]"``, or the ``unit_str`` of a SEP 5 channel.
+            as ``"x [um]"``, the ``units`` among the ``attrs``, or the ``unit_str`` of a SEP 5 channel.
         force, displacement, velocity, acceleration : str or sequence of str
-            Names of columns, one per degree of freedom; ``"0"`` where no force acts.
+            Names of columns, with their units or without, one per degree of freedom; ``"0"`` where no
+            force acts.
         fs : float, optional
-            Sampling rate, in Hz; SEP 5 channels have their own.
+            Sampling rate, in Hz. Without, that of the time column, of the index (numbers in s, or dates)
+            or of SEP 5 channels (``fs`` or ``time``).
+        time : str, optional
+            The time column.
+        unit : mapping of str to str, optional
+            Units of columns, whatever their names say: ``{"acc": "g"}``.
+        scale : mapping of str to float, optional
+            Factors that take columns to SI units, such as those of sensors.
         name : str
             Name of the record in messages and results.
         **window
@@ -245,21 +271,23 @@ class Measurement:
             _same_labels((name, _column(table, name)) for name in used)
         else:
             source.check_starts(used)
+        source = _Sep5(table) if isinstance(table, Sequence) else _Frame(table, unit, scale)
         for kind, names in given.items():
             channels[kind] = []
             for column in _names(kind, names):
                 label = column
                 if column != "0":
-                    label = source.label(column) if source else column
-                    values = source[column] if source else _column(table, column)
-                    found = _columns(column, values)
+                    label, factor = source.label(column, kind)
+                    found = _columns(column, source[column])
                     if len(found) != 1:
                         raise ValueError(f"column {column!r} has {len(found)} columns of its own")
-                    columns.append((label, found[0]))
+                    columns.append((label, found[0] * factor if factor != 1.0 else found[0]))
                 channels[kind].append(label)
-        rate = source.fs(given) if source and fs is None else fs
+        rate = source.fs(given, time) if fs is None else fs
         if rate is None:
-            raise TypeError("a table needs its sampling rate: give `fs`, in Hz")
+            raise TypeError(
+                "a table needs its sampling rate: give `fs`, in Hz, or a column or an index of time (`time`)"
+            )
         return cls._of(name, rate, columns, json.dumps(channels), window)
 
     @classmethod
@@ -337,11 +365,35 @@ class Measurement:
         """Responses of the window by quantity, each (samples, degrees of freedom), in SI units."""
         return MappingProxyType(dict(self._inner.responses()))
 
+    def __copy__(self) -> Measurement:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Measurement:
+        return self
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        plan = self.plan
+        if plan is not None:
+            return _opened, (json.dumps(plan),)
+        used = {"force": self.force, **self.responses}
+        arrays = {kind: values for kind, values in used.items() if values.shape[1]}
+        window = json.loads(self._inner.window_settings)
+        kept = {name: window[name] for name in ("period", "periods") if window.get(name) is not None}
+        return _copied, (arrays, self.fs, self.name, kept)
+
     def __len__(self) -> int:
         return self.samples
 
     def __repr__(self) -> str:
         return f"<Measurement {self.name!r}: {self.samples} samples at {self.fs:g} Hz>"
+
+
+def _opened(plan: str) -> Measurement:
+    return Measurement(_mechid.Measurement.open(plan))
+
+
+def _copied(arrays: Mapping[str, Any], fs: float, name: str, window: Window) -> Measurement:
+    return Measurement.from_arrays(**arrays, fs=fs, name=name, **window)
 
 
 class _Sep5:
@@ -363,9 +415,9 @@ class _Sep5:
         values: ArrayLike = channel["data"]  # type: ignore[assignment]
         return values
 
-    def label(self, name: str) -> str:
+    def label(self, name: str, kind: str) -> tuple[str, float]:
         unit = self._channels.get(name, {}).get("unit_str")
-        return f"{name} [{unit}]" if unit else name
+        return (f"{name} [{unit}]" if unit else name), 1.0
 
     def check_starts(self, names: Sequence[str]) -> None:
         """Refuse channels that begin at different instants, by any field that says so."""
@@ -439,6 +491,98 @@ def _labels(values: object) -> Any:
     if isinstance(indexes, Mapping) and isinstance(dims, tuple) and dims:
         return indexes.get(dims[0])
     return None
+    def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
+        used = [self._channels[name] for name in names if name in self._channels]
+        rates: set[float] = set()
+        for channel in used:
+            rate, instants = channel.get("fs"), channel.get("time")
+            if rate is not None:
+                rates.add(float(rate))  # type: ignore[arg-type]
+            elif instants is not None:
+                rates.add(_rate_of("time", instants))
+        if len(rates) > 1:
+            raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
+        return rates.pop() if rates else None
+_SI = {"force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+class _Frame:
+    """A data frame, an xarray dataset or a mapping of arrays."""
+    def __init__(
+        self, table: Table, unit: Mapping[str, str] | None, scale: Mapping[str, float] | None
+    ) -> None:
+        self._table = table
+        # Each name by what it is called in messages and found by.
+        self._names = {str(name): name for name in table.keys()}  # type: ignore[attr-defined]
+        self._unit = {self._find(name): text for name, text in (unit or {}).items()}
+        self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
+    def _find(self, wanted: str) -> str:
+        if wanted in self._names:
+            return wanted
+        names = list(self._names)
+        at = None if wanted.isdigit() else _mechid.find_column(names, wanted)
+        if at is None:
+            try:
+                # What the table knows and its keys do not list, such as a coordinate.
+                self._table[wanted]
+            except Exception:
+                raise _no_column(wanted, names) from None
+            return wanted
+        return names[at]
+    def __getitem__(self, wanted: str) -> ArrayLike:
+        name = self._find(wanted)
+        return self._table[self._names.get(name, name)]  # type: ignore[arg-type]
+    def label(self, wanted: str, kind: str) -> tuple[str, float]:
+        """Return the name of a column with its unit, and a factor for its numbers."""
+        name = self._find(wanted)
+        if name in self._scale:
+            return f"[{_SI[kind]}] {name}", self._scale[name]
+        if name in self._unit:
+            return f"[{self._unit[name]}] {name}", 1.0
+        unit = self._stated(name)
+        return (f"{name} [{unit}]" if unit else name), 1.0
+    def _stated(self, name: str) -> str | None:
+        """Return the unit among the attributes of a column or of the table."""
+        own = getattr(self[name], "attrs", None)
+        shared = getattr(self._table, "attrs", None)
+        units = shared.get("units") if isinstance(shared, Mapping) else None
+        if isinstance(units, Mapping) and name in units:
+            return str(units[name])
+        # The column of a data frame has the attributes of the whole.
+        stated = own.get("units", own.get("unit")) if isinstance(own, Mapping) else None
+        return stated if isinstance(stated, str) else None
+    def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
+        """Return the sampling rate by a time column, or by the index or coordinate of time."""
+        if time is not None:
+            return self._rate(self._find(time))
+        coords = getattr(self._table, "coords", None)
+        for names in (self._names, coords or ()):
+            listed = [str(name) for name in names]
+            at = _mechid.time_column(listed)
+            if at is not None:
+                return self._rate(listed[at])
+        shared = getattr(self._table, "attrs", None)
+        if isinstance(shared, Mapping):
+            for key in ("fs", "sample_rate", "sampling_rate", "sample_rate_hz"):
+                if isinstance(shared.get(key), (int, float)):
+                    return float(shared[key])
+        index = getattr(self._table, "index", None)
+        instants = np.asarray(index) if index is not None and not callable(index) else None
+        named = getattr(index, "name", None)
+        is_time = named is not None and _mechid.time_column([str(named)]) is not None
+        if instants is not None and (instants.dtype.kind in "mMf" or is_time):
+            return _rate_of(str(named) if is_time else "time", instants)
+        unit = self._unit.get(name) or self._stated(name)
+        return _rate_of(f"[{unit}] {name}" if unit else name, self[name])
+def _rate_of(name: str, instants: object) -> float:
+    """Return the sampling rate, in Hz, of numbers in the unit that the name states, or of dates."""
+    array = np.asarray(instants)
+    if array.dtype.kind in "mM":
+        # Whole nanoseconds: the differences are exact.
+        nanoseconds = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]")
+        array = (nanoseconds - nanoseconds[:1]).astype(np.int64).astype(np.float64) * 1e-9
+        name = "time [s]"
+    if array.dtype.kind not in "fiu" or array.ndim != 1:
+        raise TypeError(f"`time` holds {array.dtype}, not one column of numbers or dates")
+    return _mechid.rate_of(name, np.ascontiguousarray(array, dtype=np.float64))
 
 
 def measurements(
@@ -449,6 +593,10 @@ def measurements(
     Either the sources are records (measurements, or files or tables with columns), or they are the
     force and the displacement as arrays.
     """
+    known_options = RecordOptions.__annotations__.keys() | Window.__annotations__.keys()
+    for name in options:
+        if name not in known_options:
+            raise _unexpected(threads_of, name, known_options)
     if sources and all(isinstance(source, Measurement) for source in sources):
         known = [source for source in sources if isinstance(source, Measurement)]
         given = [name for name in ("fs", *_OF_FILES, *_KINDS) if name in options]
@@ -475,6 +623,20 @@ def measurements(
     return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
 
 
+def _unexpected(function: str, name: str, known: Iterable[str]) -> TypeError:
+    """Return the error for a keyword that there is not."""
+    import difflib
+    import inspect
+
+    import mechid
+
+    signature = inspect.signature(getattr(mechid, function, lambda: None))
+    others = [p.name for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
+    close = difflib.get_close_matches(name, [*known, *others], n=1, cutoff=0.5)
+    hint = f"; did you mean `{close[0]}`?" if close else ""
+    return TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
+
+
 def reading_of(
     fs: float | None,
     time: str | None,
@@ -483,9 +645,13 @@ def reading_of(
     record_column: str | None,
     record_id: str | None,
     memory_gb: float | None = None,
+    unit: Mapping[str, str] | None = None,
+    scale: Mapping[str, float] | None = None,
 ) -> dict[str, object]:
     """Return how a file is read."""
     return {
+        "units": dict(unit or {}),
+        "scales": {column: float(factor) for column, factor in (scale or {}).items()},
         "skip_lines": skip_lines,
         "time": time,
         "sample_rate_hz": _rate(fs),
@@ -532,8 +698,8 @@ class ResponseTable:
     response : array_like of complex
         Responses per unit of force, in m/N, m/(s·N) or m/(s²·N): shape (frequencies,) of one degree of
         freedom, otherwise (frequencies, degrees of freedom, forces).
-    quantity : {"displacement", "velocity", "acceleration"}
-        Measured quantity.
+    quantity : {"displacement", "velocity", "acceleration"}, optional
+        Measured quantity; without, `identify_responses` is told it as ``quantity``.
     std_error : array_like, optional
         Standard error of the real and of the imaginary part alike, of the shape of ``response``.
     coherence : array_like, optional
@@ -542,6 +708,10 @@ class ResponseTable:
         Names of the degrees of freedom; ``"1"``, ``"2"`` …, without.
     forces : sequence of str, optional
         Points at which the forces act; the first ones, without.
+    segments : mapping, optional
+        Segments of a record that the responses are averages over, so that what their window blunts is
+        known: ``samples`` and ``count``, ``fs`` in Hz, and ``hop`` (``samples``, without) and ``window``
+        (``"hann"``, ``"hamming"``, ``"blackman"``, ``"rectangular"``; whole periods, without).
     name : str
         Name of the table in messages.
 
@@ -556,11 +726,12 @@ class ResponseTable:
         frequency_hz: ArrayLike,
         response: ArrayLike,
         *,
-        quantity: Literal["displacement", "velocity", "acceleration"] = "displacement",
+        quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
         std_error: ArrayLike | None = None,
         coherence: ArrayLike | None = None,
         points: Sequence[str] | None = None,
         forces: Sequence[str] | None = None,
+        segments: Mapping[str, Any] | None = None,
         name: str = "arrays",
     ) -> None:
         hz = _finite("frequency_hz", np.asarray(frequency_hz, dtype=np.float64))
@@ -590,7 +761,13 @@ class ResponseTable:
             raise ValueError(
                 f"{len(names)} names of points and {len(driven)} of forces for {motions} × {columns}"
             )
-        layout = {"name": name, "quantity": quantity, "points": names, "forces": driven}
+        layout = {
+            "name": name,
+            "quantity": quantity,
+            "points": names,
+            "forces": driven,
+            "segments": None if segments is None else _segments(segments),
+        }
         self._inner = _mechid.ResponseTable.from_arrays(
             json.dumps(layout), hz, values, errors, coherent
         )
@@ -615,7 +792,26 @@ class ResponseTable:
         return self._inner.name
 
     def __repr__(self) -> str:
-        return f"<ResponseTable {self.name!r}: {self._inner.frequencies} frequencies>"
+        quantity = self._inner.quantity or "no quantity stated"
+        return f"<ResponseTable {self.name!r}: {quantity}, {self._inner.frequencies} frequencies>"
+
+
+def _segments(given: Mapping[str, Any]) -> list[float]:
+    """Return samples, hop, number, code of the window, and rate in Hz."""
+    windows = ("hann", "hamming", "blackman", "rectangular")
+    known = ("samples", "hop", "count", "window", "fs")
+    for name in given:
+        if name not in known:
+            raise TypeError(f"`segments` has no `{name}`: it has {', '.join(known)}")
+    for name in ("samples", "count", "fs"):
+        if name not in given:
+            raise TypeError(f"`segments` needs its `{name}`")
+    window = given.get("window")
+    if window is not None and window not in windows:
+        raise ValueError(f"`window` of `segments` is one of {', '.join(windows)}, got {window!r}")
+    code = 0 if window is None else windows.index(window) + 1
+    samples = float(given["samples"])
+    return [samples, float(given.get("hop", samples)), float(given["count"]), float(code), float(given["fs"])]
 
 
 _Numbers = TypeVar("_Numbers", bound="NDArray[Any]")
@@ -713,6 +909,7 @@ def _column(table: Table | Sequence[Mapping[str, object]], name: str) -> ArrayLi
 
 
 def no_column(name: str, known: object) -> Exception:
+def _no_column(name: str, known: object) -> Exception:
     from ._errors import MechidError
 
     available = ", ".join(str(column) for column in known)  # type: ignore[attr-defined]

@@ -19,7 +19,19 @@ from ._records import Measurement, RecordOptions, Window, measurements
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+    from pandas import DataFrame
     from xarray import Dataset
+
+
+def labelled() -> Any:
+    """Return the module that makes xarray datasets."""
+    try:
+        from . import _labelled
+    except ImportError as error:
+        raise ImportError(
+            f'this needs {error.name or "xarray"}, which is not installed: pip install "mechid[tables]"'
+        ) from None
+    return _labelled
 
 
 @final
@@ -191,6 +203,17 @@ class Result:
         told: dict[str, Any] = json.loads(self.to_json())
         return told
 
+    def __copy__(self) -> Result:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Result:
+        return self
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        from ._stored import restored, stored
+
+        return restored, (type(self), stored(self.__dict__))
+
     def to_json(self) -> str:
         """Return the result as the program prints it with ``--json``."""
         raise NotImplementedError
@@ -325,6 +348,23 @@ class Estimated(Drawn):
         """
         told = self._told.get("unscaled")
         return None if told is None else MappingProxyType(told)
+
+    def to_frame(self) -> DataFrame:
+        """Return the parameters as a pandas data frame, one row each: value, standard error, interval, unit.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed: ``pip install pandas``.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("this needs pandas, which is not installed: pip install pandas") from None
+        rows = self._told["parameters"]
+        columns = ("value", "standard_error", "unit", "known")
+        table = {column: [row[column] for row in rows] for column in columns}
+        return pandas.DataFrame(table, index=pandas.Index([row["name"] for row in rows], name="parameter"))
 
     def _parameter(self, row: dict[str, Any]) -> Parameter:
         return Parameter(
@@ -550,7 +590,7 @@ class Identified(Estimated):
         ImportError
             If xarray is not installed: ``pip install "mechid[tables]"``.
         """
-        from . import _labelled
+        _labelled = labelled()
 
         return _labelled.identified(self)
 
@@ -920,7 +960,7 @@ class FrequencyResponses(Drawn):
         ImportError
             If xarray is not installed: ``pip install "mechid[tables]"``.
         """
-        from . import _labelled
+        _labelled = labelled()
 
         return _labelled.frequency_responses(self)
 
@@ -1036,7 +1076,7 @@ class Sweep(Drawn):
         ImportError
             If xarray is not installed: ``pip install "mechid[tables]"``.
         """
-        from . import _labelled
+        _labelled = labelled()
 
         return _labelled.sweep(self)
 
@@ -1081,7 +1121,7 @@ class Reconstructed(Drawn):
         ImportError
             If xarray is not installed: ``pip install "mechid[tables]"``.
         """
-        from . import _labelled
+        _labelled = labelled()
 
         return _labelled.reconstructed(self)
 
@@ -1197,7 +1237,7 @@ class Simulation:
         ImportError
             If xarray is not installed: ``pip install "mechid[tables]"``.
         """
-        from . import _labelled
+        _labelled = labelled()
 
         return _labelled.simulation(self)
 

@@ -1,0 +1,120 @@
+"""Columns as people name them, time as data frames have it, and results that travel."""
+
+import copy
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import mechid
+
+FS = 100.0
+T = np.arange(200) / FS
+W = 2 * np.pi * 5
+FORCE = np.cos(W * T) + np.cos(3 * W * T)
+# 2 kg, 30 N·s/m and 5000 N/m.
+ACC = sum((-(k * W) ** 2 / (5000 - 2 * (k * W) ** 2 + 30j * k * W) * np.exp(1j * k * W * T)).real for k in (1, 3))
+PERIOD = {"period": 20}
+
+
+def mass(table, **how):
+    found = mechid.identify(table, **{"force": "force", "acceleration": "acc", **PERIOD, **how})
+    return found.parameters["m"].value
+
+
+def test_columns_are_found_with_their_units_or_without():
+    frame = pd.DataFrame({"Force [kN]": FORCE / 1e3, "acc [g]": ACC / 9.80665})
+    assert mass(frame, fs=FS) == pytest.approx(2.0)
+    assert mass(frame, fs=FS, acceleration="acc [g]") == pytest.approx(2.0)
+    with pytest.raises(mechid.MechidError, match="no column") as caught:
+        mass(frame, fs=FS, acceleration="vel")
+    assert caught.value.code == "analysis.no-column"
+
+
+def test_units_of_attributes_and_of_the_call_are_used():
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC / 9.80665})
+    frame.attrs = {"units": {"acc": "g"}, "fs": FS}
+    assert mass(frame) == pytest.approx(2.0)
+    dataset = xr.Dataset(
+        {"force": ("time", FORCE), "acc": ("time", ACC / 9.80665, {"units": "g"})}, {"time": T}
+    )
+    assert mass(dataset) == pytest.approx(2.0)
+    bare = {"force": FORCE * 11.2, "acc": ACC / 9.80665}
+    assert mass(bare, fs=FS, unit={"acc": "g"}, scale={"force": 1 / 11.2}) == pytest.approx(2.0)
+    doubtful = mechid.identify({"force": FORCE, "acc [V]": ACC}, force="force", acceleration="acc", fs=FS, **PERIOD)
+    assert [finding.subject for finding in doubtful.warnings if finding.subject == "unit"] == ["unit"]
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        pd.DataFrame({"time": T, "force": FORCE, "acc": ACC}),
+        pd.DataFrame({"time_ms": 1e3 * T, "force": FORCE, "acc": ACC}),
+        pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.Index(T, name="time")),
+        pd.DataFrame({"force": FORCE, "acc": ACC}, index=T),
+        pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.to_datetime("2023-03-14") + pd.to_timedelta(T, "s")),
+        pd.DataFrame({"force": FORCE, "acc": ACC}, index=pd.to_timedelta(T, "s")),
+        pd.DataFrame({"time": pd.to_datetime("2023-03-14") + pd.to_timedelta(T, "s"), "force": FORCE, "acc": ACC}),
+    ],
+)
+def test_the_time_of_a_table_gives_its_rate(frame):
+    assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
+def test_a_table_without_time_is_asked_for_its_rate():
+    with pytest.raises(TypeError, match="sampling rate"):
+        mechid.Measurement.from_table(pd.DataFrame({"force": FORCE, "acc": ACC}), force="force", acceleration="acc")
+
+
+def test_channels_of_sep_5_may_have_instants():
+    channels = [
+        {"name": "force", "data": FORCE, "time": T, "unit_str": "N"},
+        {"name": "acc", "data": ACC / 9.80665, "time": T, "unit_str": "g"},
+    ]
+    assert mass(channels) == pytest.approx(2.0)
+
+
+def test_a_misspelt_keyword_is_named():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'acceleratoin'; did you mean `acceleration`"):
+        mechid.identify({"force": FORCE}, force="force", acceleratoin="acc", fs=FS)
+
+
+def test_results_are_copied_and_pickled():
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC})
+    record = mechid.Measurement.from_table(frame, force="force", acceleration="acc", fs=FS, **PERIOD)
+    found = mechid.identify(record)
+    assert copy.deepcopy(found) is found
+    assert found.parameters["m"].value == pytest.approx(2.0)
+    again = pickle.loads(pickle.dumps(found))
+    assert str(again) == str(found)
+    assert again.parameters["m"].value == found.parameters["m"].value
+    np.testing.assert_array_equal(again.mass, found.mass)
+    np.testing.assert_array_equal(again.covariance, found.covariance)
+    with pytest.raises(mechid.MechidError, match="was pickled"):
+        again.to_svg()
+    np.testing.assert_allclose(pickle.loads(pickle.dumps(record)).force, record.force)
+    assert len(repr(found)) < 200
+
+
+def test_parameters_are_a_data_frame():
+    found = mechid.identify({"force": FORCE, "acc": ACC}, force="force", acceleration="acc", fs=FS, **PERIOD)
+    frame = found.to_frame()
+    assert list(frame.index) == ["m", "c", "k"]
+    assert frame.loc["k", "value"] == pytest.approx(5000.0)
+    assert frame.loc["k", "unit"] == "N/m"
+
+
+def test_a_response_table_states_its_quantity_or_is_asked():
+    hz = np.arange(1.0, 40.0)
+    s = 2j * np.pi * hz
+    accelerance = s**2 / (2 * s**2 + 30 * s + 5000)
+    stated = mechid.ResponseTable(hz, accelerance, quantity="acceleration")
+    assert "acceleration" in repr(stated)
+    assert mechid.identify_responses(stated).parameters["m"].value == pytest.approx(2.0)
+    bare = mechid.ResponseTable(hz, accelerance)
+    with pytest.raises(mechid.MechidError, match="what was measured"):
+        mechid.identify_responses(bare)
+    with pytest.raises(TypeError, match="`segments` needs its `count`"):
+        mechid.ResponseTable(hz, accelerance, segments={"samples": 100, "fs": FS})
