@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use mechid_io::{
-    Experiment, IoError, Limits, LineSpec, ReadOptions, RecordFile, Table, TimeAxis, escaped,
-    parse_matrix_market, read_covariance, read_system,
+    Experiment, IoError, Limits, LineSpec, Quantity, ReadOptions, RecordFile, Table, TimeAxis,
+    escaped, parse_matrix_market, read_covariance, read_system,
 };
 use mechid_signal::Sampling;
 
@@ -33,6 +33,16 @@ const TEXT: &[&str] = &[
     "\u{202e}",
     "\u{1b}[2J",
     "−",
+    "LabVIEW Measurement\n",
+    "***End_of_Header***\n",
+    "X_Value",
+    "Delta_X\t",
+    "X_Columns\tMulti\n",
+    "Y_Unit_Label\tN\tg\n",
+    "2023-03-14T09:26:53.5",
+    "09:26:53.5",
+    "[mV; 11.2 mV/N]",
+    "((((",
 ];
 
 /// Words of MATLAB and universal files.
@@ -83,7 +93,7 @@ const JSON: &[&str] = &[
     "[[[[",
 ];
 
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 8] = [
     Target {
         name: "text",
         corpus: "text",
@@ -110,6 +120,24 @@ pub const TARGETS: [Target; 7] = [
             "{\"x\": \"mm\"}",
         ]),
         memory: [8 << 20, 200],
+        run: record,
+    },
+    Target {
+        name: "hdf5",
+        corpus: "hdf5",
+        input: Input::Mutations(&[
+            "\u{89}HDF",
+            "MATLAB_class",
+            "MATLAB_empty",
+            "TREE",
+            "SNOD",
+            "HEAP",
+            "OHDR",
+            "units",
+            "\u{7f}\u{7f}\u{7f}\u{7f}",
+            "\0\0\0\0\0\0\0\0",
+        ]),
+        memory: [16 << 20, 400],
         run: record,
     },
     Target {
@@ -218,6 +246,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
     for column in 0..table.width() {
         shown(&table.label(column))?;
         let _ = (table.unit(column), table.about(column), table.says_unit_of_time(column));
+        let _ = table.stated_unit(column, Some(Quantity::Force));
         if let Some(values) = told(table.values(column))? {
             ensure(values.iter().all(|v| v.is_finite()), "a column is not finite")?;
             good.push((column + 1).to_string());
