@@ -9,6 +9,9 @@ use super::limits::NOISE_TERMS;
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::search::{Effort, search};
+use super::limits::{NOISE_TERMS, SHORT_SEARCH};
+use super::parameters::{Kernel, Layout, Parameters};
+use super::search::search;
 use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
@@ -30,6 +33,8 @@ const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Sampled, 0.0),
     (Kernel::Vanishing, FRAC_PI_2),
 ];
+const QUANTITIES: [(Kernel, f64); 3] =
+    [(Kernel::Static, -FRAC_PI_2), (Kernel::Static, 0.0), (Kernel::Vanishing, FRAC_PI_2)];
 
 /// Returns the start with the quantity (displacement, velocity or acceleration) that explains the lines best
 /// after a few steps; `None` if none has a likelihood.
@@ -39,6 +44,7 @@ pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Par
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
         let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
         search(start, &pooled, band.span, Effort::SHORT)
+        search(start, &pooled, band.duration, SHORT_SEARCH)
     });
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     Some(best.parameters)
@@ -72,6 +78,7 @@ fn start(
     }
     for _ in 0..AMPLITUDE_STEPS {
         match_amplitudes(&mut parameters, pooled, band.span, band.spacing());
+        match_amplitudes(&mut parameters, pooled, band.duration, band.spacing());
     }
     parameters
 }
@@ -81,6 +88,7 @@ pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],
     span: Span,
+    duration: f64,
     spacing: f64,
 ) {
     let coefficients = Coefficients::new(parameters);
@@ -92,6 +100,7 @@ pub(super) fn match_amplitudes(
             let mut powers = [0.0; 2];
             for line in pooled.iter().filter(|line| (line.omega - pole.im).abs() < reach) {
                 let kernels = coefficients.kernels(line.omega, span);
+                let kernels = coefficients.kernels(line.omega, duration);
                 let model = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
                 for (power, matrix) in powers.iter_mut().zip([&line.periodogram, &model]) {
                     *power += line.count * direction.dotc(&(matrix * &direction)).re;
@@ -112,6 +121,8 @@ pub(super) struct Candidate {
     pub pole: Pole,
     /// Increase of 2 ln L that a mode there promises.
     pub gain: f64,
+    /// Amplitude along the shape in units of the standard deviation that noise alone gives.
+    pub score: f64,
 }
 
 /// Damping ratios at which further modes are looked for.
@@ -121,6 +132,7 @@ const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 const SCAN_REACH: f64 = 8.0;
 
 /// Returns candidates of further modes by falling gain: at each pole of a grid the largest eigenvalue of
+/// Returns candidates of further modes by falling score: at each pole of a grid the largest eigenvalue of
 /// Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
     let coefficients = Coefficients::new(parameters);
@@ -129,6 +141,7 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
     for (k, omega) in band.omega.iter().enumerate() {
         let terms = band.noise_terms(*omega, parameters.layout.noise_terms);
         let kernels = coefficients.kernels(*omega, band.span);
+        let kernels = coefficients.kernels(*omega, band.duration);
         let factor = positive_factor(coefficients.spectrum(&kernels, &noise(parameters, &terms)))?;
         let lower = factor.l();
         let line = lower.solve_lower_triangular(&band.amplitudes.row(k).transpose())?;
@@ -146,6 +159,7 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             let to = band.omega.partition_point(|w| *w <= centre + reach);
             let mut sum = nalgebra::DMatrix::zeros(p, p);
             let (mut total, mut squares) = (0.0, 0.0);
+            let mut squares = 0.0;
             for k in from..to {
                 let weight = rate * rate / (rate * rate + (band.omega[k] - centre).powi(2));
                 let line = &whitened[k].0;
@@ -169,5 +183,8 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
         }
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            let score = eigen.eigenvalues[best] / f64::sqrt(squares);
+            candidates.push(Candidate { pole, score });
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
     Some(candidates)
 }

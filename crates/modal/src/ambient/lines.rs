@@ -16,6 +16,8 @@ pub(super) struct BandLines {
     pub scale: Vec<f64>,
     /// Time axis of the record.
     pub span: Span,
+    /// Length of the record, in s.
+    pub duration: f64,
 }
 
 /// Neighbouring lines with their mean periodogram.
@@ -39,6 +41,7 @@ impl BandLines {
     /// Distance of two lines, in rad/s.
     pub fn spacing(&self) -> f64 {
         std::f64::consts::TAU / self.span.duration
+        std::f64::consts::TAU / self.duration
     }
 
     /// Returns Chebyshev polynomials over the band at `omega`.
