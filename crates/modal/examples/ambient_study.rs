@@ -12,7 +12,8 @@ use std::time::Instant;
 
 use ambient_generator::{Quantity, Structure};
 use mechid_modal::ambient::{AmbientSettings, identify_ambient, ssi_cov};
-use mechid_modal::stabilisation::Stabilisation;
+use mechid_modal::indicators::mac;
+use mechid_modal::stabilisation::{Pole, Stabilisation};
 use mechid_signal::Record;
 use nalgebra::{Complex, dmatrix};
 
@@ -131,7 +132,7 @@ fn study(case: &Case, seeds: u64) {
             let distance = |index: &usize| {
                 let mode = &estimate.modes[*index];
                 let gap = (mode.natural_frequency_hz.value / f - 1.0).abs();
-                gap + 0.02 * (1.0 - mechid_modal::indicators::mac(mode.shape.shape(), &shape))
+                gap + 0.02 * (1.0 - mac(mode.shape.shape(), &shape))
             };
             let free = (0..taken.len()).filter(|index| !taken[*index]);
             let Some(best) = free.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
@@ -181,7 +182,7 @@ impl Tally {
                 self.predicted[k] += (value.standard_error().unwrap_or(0.0) / truth[k]).powi(2);
             }
         }
-        let reference = mode.shape.shape().icamax();
+        let reference = mode.shape.largest_entry();
         let exact = shape / shape[reference];
         let p = shape.len();
         for i in (0..p).filter(|i| *i != reference) {
@@ -253,10 +254,11 @@ impl SubspaceErrors {
                 let nearest = poles
                     .map(|p| &p.pole)
                     .min_by(|a, b| distance(a.pole).total_cmp(&distance(b.pole)));
-                // A pole further away is no estimate of this mode.
-                let Some(pole) = nearest.filter(|p| distance(p.pole) < 3.0 * -exact.re) else {
-                    continue;
-                };
+                // A pole further away, or of another shape, is no estimate of this mode.
+                let shape = truth.shapes.column(r).into_owned();
+                let is_mode =
+                    |p: &&Pole| distance(p.pole) < 3.0 * -exact.re && mac(&p.vector, &shape) > 0.9;
+                let Some(pole) = nearest.filter(is_mode) else { continue };
                 let sums = &mut self.sums[r][row][half];
                 sums[0] += (pole.pole.norm() / exact.norm() - 1.0).powi(2);
                 sums[1] += (pole.damping_ratio() / truth.dampings[r] - 1.0).powi(2);

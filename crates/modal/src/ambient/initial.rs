@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Complex, DVector};
 
 use super::likelihood::{noise, positive_factor};
-use super::limits::NOISE_TERMS;
+use super::limits::{COARSE_POOLING, NOISE_TERMS};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::search::{Effort, search};
@@ -40,7 +40,7 @@ const QUANTITIES: [(Kernel, f64); 3] =
 /// after a few steps; `None` if none has a likelihood.
 pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Parameters> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
-    let pooled = band.pooled(&poles, NOISE_TERMS);
+    let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
         let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
         search(start, &pooled, band.span, Effort::SHORT)

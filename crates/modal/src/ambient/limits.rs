@@ -35,9 +35,12 @@ pub(super) const MAX_DAMPING: f64 = 0.2;
 /// Smallest share of the orders in which an initial mode has a pole.
 pub(super) const MIN_SHARE: f64 = 0.3;
 
-/// Lines are pooled over this part of the distance to the nearest pole, over which the spectrum is constant to
-/// some 0.06 %.
-pub(super) const POOLING: f64 = 0.05;
+/// Lines are pooled over this part of the distance to the nearest pole, over which the mean of the spectrum
+/// is that of its middle to 0.25 %.
+pub(super) const POOLING: f64 = 0.1;
+
+/// The same where starts are compared.
+pub(super) const COARSE_POOLING: f64 = 0.3;
 
 /// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band.
 pub(super) const NOISE_TERMS: usize = 3;
@@ -75,3 +78,9 @@ pub(super) const EXCLUDED_LINES: f64 = 2.0;
 
 /// Part of a channel that another does not explain, below which the two are copies.
 pub(super) const COPIED_CHANNEL: f64 = 1e-10;
+
+/// Wald statistic of a shape over the price of a mode above which the mode needs no further test.
+pub(super) const STRONG_EVIDENCE: f64 = 4.0;
+
+/// Number of poles beside the modes that may explain harmonics, a background or modes outside the band.
+pub(super) const NUISANCE_POLES: usize = 4;

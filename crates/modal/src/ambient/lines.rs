@@ -2,7 +2,6 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::limits::POOLING;
 use super::parameters::Span;
 
 /// Lines of one record in a band, without the excluded ones.
@@ -56,8 +55,13 @@ impl BandLines {
         terms
     }
 
-    /// Pools lines over a fixed part of their distance to the nearest of `poles`.
-    pub fn pooled(&self, poles: &[Complex<f64>], noise_terms: usize) -> Vec<PooledLines> {
+    /// Pools lines over a `part` of their distance to the nearest of `poles`.
+    pub fn pooled(
+        &self,
+        poles: &[Complex<f64>],
+        part: f64,
+        noise_terms: usize,
+    ) -> Vec<PooledLines> {
         let distance = |omega: f64| {
             let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
             poles.iter().map(to).fold(f64::INFINITY, f64::min)
@@ -65,7 +69,7 @@ impl BandLines {
         let mut pooled = Vec::new();
         let mut first = 0;
         while first < self.omega.len() {
-            let width = POOLING * distance(self.omega[first]);
+            let width = part * distance(self.omega[first]);
             let ahead = self.omega[first..].iter().take_while(|w| **w - self.omega[first] < width);
             let count = ahead.count().max(1);
             pooled.push(self.pool(first, count, noise_terms));

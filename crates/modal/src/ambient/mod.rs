@@ -100,11 +100,11 @@ pub fn identify_ambient(
     let stabilisation = subspace_models(&record, band_hz, &band.scale, most)?;
     let candidates = candidates(&stabilisation.clusters(MAX_DAMPING, MIN_SHARE), band_hz);
     let wanted = Wanted { exactly: settings.modes, most: settings.max_modes };
-    let Chosen { fit, dropped } = choose(&candidates, &band, wanted);
+    let (chosen, dropped) = choose(&candidates, &band, wanted);
     let [from_hz, to_hz] = band_hz;
     let none = AmbientError::NoMode { candidates: dropped.len(), from_hz, to_hz };
-    let fit = fit.ok_or(none)?;
-    let found = fit.parameters.layout.modes;
+    let Chosen { fit, sound } = chosen.ok_or(none)?;
+    let found = sound.len();
     if let Some(asked) = settings.modes.filter(|asked| *asked > found) {
         return Err(AmbientError::FewerModes { asked, found, from_hz, to_hz });
     }
@@ -116,6 +116,8 @@ pub fn identify_ambient(
     };
     let modes = modes_of(&fit, scale, &sinusoids)?;
     let factor = fit.parameters.factor();
+    let modes = modes_of(&fit, &sound, scale, &sinusoids)?;
+    let factor = fit.parameters.factor().select_rows(&sound);
     Ok(AmbientEstimate {
         modes,
         harmonics: sinusoids,
@@ -141,10 +143,10 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
 
 fn modes_of(
     fit: &Fit,
+    sound: &[usize],
     scale: RecordScale<'_>,
     sinusoids: &[Harmonic],
 ) -> Result<Vec<AmbientMode>, AmbientError> {
-    let count = fit.parameters.layout.modes;
     let failed = AmbientError::Numerics {
         what: "the covariance of the modes",
         size: fit.parameters.layout.len(),
@@ -154,6 +156,8 @@ fn modes_of(
     let spacing_hz = 1.0 / scale.duration;
     let mut modes = Vec::with_capacity(count);
     for mode in 0..count {
+    let mut modes = Vec::with_capacity(sound.len());
+    for &mode in sound {
         let mut one = AmbientMode::new(fit, &covariance, mode, scale).ok_or(failed.clone())?;
         let frequency_hz = fit.poles()[mode].im / TAU;
         let width_hz = -fit.poles()[mode].re / TAU + spacing_hz;
@@ -161,6 +165,5 @@ fn modes_of(
         one.harmonic = sinusoids.iter().position(at);
         modes.push(one);
     }
-    modes.sort_by(|a, b| a.natural_frequency_hz.value.total_cmp(&b.natural_frequency_hz.value));
     Ok(modes)
 }

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::initial::{initial_parameters, match_amplitudes, scan};
-use super::limits::{DAMPING_SIGNIFICANCE, MAX_DAMPING, REFUSALS};
+use super::limits::{
+    DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
+};
 use super::lines::BandLines;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
@@ -23,8 +25,9 @@ pub(super) struct Wanted {
 
 /// Outcome of the choice.
 pub(super) struct Chosen {
-    pub fit: Option<Fit>,
-    pub dropped: Vec<DroppedCandidate>,
+    pub fit: Fit,
+    /// Modes of the fit that are no poles of the noise.
+    pub sound: Vec<usize>,
 }
 
 struct Choice<'a> {
@@ -33,8 +36,16 @@ struct Choice<'a> {
     dropped: Vec<DroppedCandidate>,
 }
 
-/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first).
-pub(super) fn choose(candidates: &[Pole], band: &BandLines, wanted: Wanted) -> Chosen {
+/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first), and lists
+/// the candidates that are not among them.
+///
+/// Poles that explain lines without being modes (a harmonic, a background, a mode outside the band) stay in
+/// the fit, for the modes would change without them.
+pub(super) fn choose(
+    candidates: &[Pole],
+    band: &BandLines,
+    wanted: Wanted,
+) -> (Option<Chosen>, Vec<DroppedCandidate>) {
     let mut choice = Choice { band, wanted, dropped: Vec::new() };
     let limit = wanted.exactly.unwrap_or(wanted.most);
     for pole in candidates.iter().skip(limit) {
@@ -46,11 +57,12 @@ pub(super) fn choose(candidates: &[Pole], band: &BandLines, wanted: Wanted) -> C
         .and_then(|start| search_pooled(start, band, Effort::TEST))
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
-        .map(|fit| choice.pruned(fit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL));
         .and_then(|start| search_pooled(start, band, ITERATIONS))
         .map(|fit| choice.pruned(fit));
     Chosen { fit: fit.filter(|fit| fit.parameters.layout.modes > 0), dropped: choice.dropped }
+    let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
+    (chosen, choice.dropped)
 }
 
 impl Choice<'_> {
@@ -79,10 +91,27 @@ impl Choice<'_> {
         });
     }
 
-    /// Removes modes one after another as long as one is refused.
+    /// Separates modes from poles that only explain lines.
+    fn judged(&mut self, fit: Fit) -> Chosen {
+        let mut sound = Vec::new();
+        for mode in 0..fit.parameters.layout.modes {
+            match self.broken_rule(&fit, mode) {
+                Some(reason) => self.drop_mode(&fit.parameters, mode, reason),
+                None => sound.push(mode),
+            }
+        }
+        Chosen { fit, sound }
+    }
+
+    fn sound_modes(&self, fit: &Fit) -> usize {
+        let modes = 0..fit.parameters.layout.modes;
+        modes.filter(|mode| self.broken_rule(fit, *mode).is_none()).count()
+    }
+
+    /// Removes modes one after another as long as the likelihood does not need one.
     fn pruned(&mut self, mut fit: Fit) -> Fit {
-        while fit.parameters.layout.modes > 0 {
-            if self.wanted.exactly.is_some_and(|n| fit.parameters.layout.modes <= n) {
+        while fit.parameters.layout.modes > 1 {
+            if self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) <= n) {
                 break;
             }
             let Some((next, mode, reason)) = self.refused(&fit) else { break };
@@ -92,26 +121,22 @@ impl Choice<'_> {
         fit
     }
 
-    /// Returns the fit without the first mode that is refused.
+    /// Returns the fit without the first mode that the likelihood does not need; those with the least
+    /// evidence are tried first, and strong ones not at all.
     fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
-        let parameters = &fit.parameters;
-        let modes = parameters.layout.modes;
-        for mode in 0..modes {
-            if let Some(reason) = self.broken_rule(fit, mode) {
-                return Some((self.without(fit, mode)?, mode, reason));
-            }
-        }
-        // The likelihood decides about the mode with the least evidence; stronger ones need no test then.
+        let (parameters, needed) = (&fit.parameters, self.price());
         let covariance = fit.covariance()?;
-        let evidence = |mode: usize| wald(parameters, &covariance, mode);
-        let weakest = (0..modes).min_by(|a, b| evidence(*a).total_cmp(&evidence(*b)))?;
-        let needed = self.price();
-        if evidence(weakest) > 4.0 * needed {
-            return None;
-        }
-        let next = self.without(fit, weakest)?;
-        let gain = 2.0 * (next.cost - fit.cost);
-        (gain < needed).then_some((next, weakest, DropReason::SmallGain { gain, needed }))
+        let evidence = |mode: usize| (wald(parameters, &covariance, mode), mode);
+        let mut weak: Vec<(f64, usize)> = (0..parameters.layout.modes)
+            .map(evidence)
+            .filter(|(evidence, _)| *evidence < STRONG_EVIDENCE * needed)
+            .collect();
+        weak.sort_by(|a, b| a.0.total_cmp(&b.0));
+        weak.into_iter().find_map(|(_, mode)| {
+            let next = self.without(fit, mode)?;
+            let gain = 2.0 * (next.cost - fit.cost);
+            (gain < needed).then_some((next, mode, DropReason::SmallGain { gain, needed }))
+        })
     }
 
     fn broken_rule(&self, fit: &Fit, mode: usize) -> Option<DropReason> {
@@ -137,12 +162,14 @@ impl Choice<'_> {
         search_pooled(fit.parameters.reordered(&rest), self.band, ITERATIONS)
     }
 
-    /// Adds modes as long as the likelihood pays for them.
+    /// Adds modes as long as the likelihood pays for them, and removes those that they replace.
     fn extended(&mut self, mut fit: Fit, limit: usize) -> Fit {
         let mut refusals = 0;
+        let before = fit.parameters.layout.modes;
         let mut refused: Vec<f64> = Vec::new();
         while refusals < REFUSALS {
-            let full = fit.parameters.layout.modes >= limit;
+            let poles = fit.parameters.layout.modes;
+            let full = self.sound_modes(&fit) >= limit || poles >= limit + NUISANCE_POLES;
             let Some(candidates) = scan(&fit.parameters, self.band) else { break };
             let near = |omega: f64, other: &f64| (omega - other).abs() < 0.01 * omega;
             let fresh = candidates.into_iter().find(|candidate| {
@@ -164,7 +191,12 @@ impl Choice<'_> {
                 break;
             }
             match self.with(&fit, &candidate.pole) {
-                Ok(next) => fit = next,
+                Ok(next) => {
+                    // A pole that is no mode may explain a background; only few of them are useful.
+                    let modes = self.sound_modes(&next);
+                    refusals += usize::from(modes <= self.sound_modes(&fit));
+                    fit = next;
+                }
                 Err(reason) => {
                     self.drop_pole(&candidate.pole, reason);
                     refused.push(candidate.pole.pole.norm());
@@ -172,7 +204,7 @@ impl Choice<'_> {
                 }
             }
         }
-        fit
+        if fit.parameters.layout.modes > before { self.pruned(fit) } else { fit }
     }
 
     /// Returns the fit with one more mode, or why there is none.
@@ -183,7 +215,7 @@ impl Choice<'_> {
         order.sort_by(|a, b| start.omega(*a).total_cmp(&start.omega(*b)));
         start = start.reordered(&order);
         let added = order.iter().position(|r| *r + 1 == order.len()).unwrap_or(0);
-        let pooled = self.band.pooled(&start.poles(), start.layout.noise_terms);
+        let pooled = self.band.pooled(&start.poles(), POOLING, start.layout.noise_terms);
         let mut matched = start.clone();
         match_amplitudes(&mut matched, &pooled, self.band.span, self.band.spacing());
         start.set_shape(added, &matched.shape(added));
@@ -194,10 +226,7 @@ impl Choice<'_> {
         if self.wanted.exactly.is_none() && gain < needed {
             return Err(DropReason::SmallGain { gain, needed });
         }
-        match self.broken_rule(&next, added) {
-            Some(reason) => Err(reason),
-            None => Ok(next),
-        }
+        Ok(next)
     }
 }
 

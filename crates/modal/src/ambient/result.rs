@@ -172,7 +172,7 @@ impl AmbientMode {
         let relative = |index: usize| covariance[(index, index)].max(0.0).sqrt();
         let frequency_hz = omega / std::f64::consts::TAU;
         let shape = scaled_shape(parameters, covariance, mode, record.scale)?;
-        let largest = shape.shape().camax();
+        let largest = shape.shape()[shape.largest_entry()].norm();
         let shape = shape.normalised();
         Some(Self {
             natural_frequency_hz: ModalValue::new(

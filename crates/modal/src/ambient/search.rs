@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::likelihood::{cost, gradient, information};
-use super::limits::{ENOUGH, LARGEST_STEP};
+use super::limits::{ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
 use super::parameters::Parameters;
@@ -39,7 +39,7 @@ pub(super) struct Effort {
 
 impl Effort {
     /// Compares starts.
-    pub const SHORT: Self = Self { iterations: 8, slow: 0.5 };
+    pub const SHORT: Self = Self { iterations: 6, slow: 0.5 };
     /// Tests a mode, whose price is a gain of several tens.
     pub const TEST: Self = Self { iterations: 40, slow: 0.5 };
     /// What remains moves no parameter by a tenth of its standard error.
@@ -111,8 +111,9 @@ fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> 
 /// Searches from `start`, with lines pooled about the poles of the start and again about those of the end.
 pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
     let terms = start.layout.noise_terms;
-    let first = search(start.clone(), &band.pooled(&start.poles(), terms), band.span, effort)?;
-    let pooled = band.pooled(&first.parameters.poles(), terms);
+    let first =
+        search(start.clone(), &band.pooled(&start.poles(), POOLING, terms), band.span, effort)?;
+    let pooled = band.pooled(&first.parameters.poles(), POOLING, terms);
     search(first.parameters, &pooled, band.span, effort)
     duration: f64,
     iterations: usize,

@@ -38,7 +38,7 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
     let band = BandLines { omega, amplitudes, scale, span: SPAN };
     let band = BandLines { omega, amplitudes, scale, duration: DURATION };
     let coefficients = Coefficients::new(parameters);
-    let mut pooled = band.pooled(&[], 3);
+    let mut pooled = band.pooled(&[], 0.1, 3);
     pooled = (0..360)
         .map(|k| PooledLines { omega: band.omega[k], count: 1.0, ..pooled[0].clone() })
         .collect();

@@ -104,7 +104,13 @@ impl ShapeWithCovariance {
 
     /// Returns the shape divided by its largest entry.
     pub fn normalised(&self) -> Self {
-        let largest = self.shape.icamax();
-        self.normalised_to(largest).unwrap_or_else(|| self.clone())
+        self.normalised_to(self.largest_entry()).unwrap_or_else(|| self.clone())
+    }
+
+    /// Returns the index of the entry of the largest modulus.
+    pub fn largest_entry(&self) -> usize {
+        // `icamax` of nalgebra compares |Re| + |Im|, which depends on the phase of the shape.
+        let modulus = |i: &usize| self.shape[*i].norm_sqr();
+        (0..self.shape.len()).max_by(|a, b| modulus(a).total_cmp(&modulus(b))).unwrap_or(0)
     }
 }
