@@ -1,5 +1,5 @@
-//! Comparison of two sets of modes: a structure before and after a change, or a test and a finite-element
-//! model.
+//! Comparison of two sets of modes: a structure before and after a change, or a test and a
+//! finite-element model.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -7,14 +7,15 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::indicators::{Indicator, IndicatorError, ShapeWithCovariance, mac, mac_with_error};
 
-/// Largest ratio of the frequencies of two modes that can be one mode: finite-element models miss measured
-/// frequencies by up to a fifth before they are updated.
+/// Largest ratio of the frequencies of two modes that can be one mode: finite-element models miss
+/// measured frequencies by up to a fifth before they are updated.
 const MAX_FREQUENCY_RATIO: f64 = 1.25;
 
 /// Smallest MAC of two modes that can be one mode; below it their shapes have little in common.
 const MIN_MAC: f64 = 0.3;
 
-/// Singular values of the covariance of a shape difference below this part of the largest count as no error.
+/// Singular values of the covariance of a shape difference below this part of the largest count as
+/// no error.
 const COVARIANCE_RANK: f64 = 1e-12;
 
 /// Value with its standard error; 0 for an exact value, such as one of a finite-element model.
@@ -106,11 +107,11 @@ pub struct Comparison {
     pub only_second: Vec<usize>,
 }
 
-/// Pairs modes by frequency and shape: pairs (index of the first set, index of the second set), by rising
-/// index of the first.
+/// Pairs modes by frequency and shape: pairs (index of the first set, index of the second set), by
+/// rising index of the first.
 ///
-/// Of all pairs that the rule allows, the one with the largest MAC, reduced for its distance in frequency, is
-/// taken first.
+/// Of all pairs that the rule allows, the one with the largest MAC, reduced for its distance in
+/// frequency, is taken first.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if shapes differ in length.
@@ -146,11 +147,12 @@ pub fn pair_modes(
     Ok(pairs)
 }
 
-/// Compares two sets of modes: pairs, differences over their standard errors, and modes without a partner.
+/// Compares two sets of modes: pairs, differences over their standard errors, and modes without a
+/// partner.
 ///
-/// The errors of the two sets are independent. Differences, p-values and the test of each shape together are
-/// adjusted for their number by Holm's method: the modes that have changed are those whose adjusted p-value is
-/// small.
+/// The errors of the two sets are independent. Differences, p-values and the test of each shape
+/// together are adjusted for their number by Holm's method: the modes that have changed are those
+/// whose adjusted p-value is small.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if shapes differ in length.
@@ -281,7 +283,8 @@ mod tests {
         assert_eq!((equal.value, equal.adjusted_p_value), (0.0, Some(1.0)));
     }
 
-    /// Judge: two tests of one structure; the least adjusted p-value is below 5 % in 5 % of the comparisons.
+    /// Judge: two tests of one structure; the least adjusted p-value is below 5 % in 5 % of the
+    /// comparisons.
     #[test]
     fn equal_structures_are_called_different_at_the_stated_rate() {
         let mut random = ChaCha8Rng::seed_from_u64(2);

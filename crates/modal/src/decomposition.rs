@@ -1,13 +1,15 @@
-//! Decompositions of small matrices, with `None` where one does not converge or an entry is not finite.
+//! Decompositions of small matrices, with `None` where one does not converge or an entry is not
+//! finite.
 
 use mechid_model::{RealSchur, linear_algebra};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
-/// Distance of the shift of inverse iteration from the eigenvalue, over the norm of the matrix: far enough
-/// for a regular factorisation, near enough that one step separates the eigenvector.
+/// Distance of the shift of inverse iteration from the eigenvalue, over the norm of the matrix: far
+/// enough for a regular factorisation, near enough that one step separates the eigenvector.
 const SHIFT: f64 = 1e-13;
 
-/// Steps of inverse iteration: the first leaves of other eigenvectors what rounding does, the second less.
+/// Steps of inverse iteration: the first leaves of other eigenvectors what rounding does, the
+/// second less.
 const STEPS: usize = 2;
 
 pub(crate) fn svd<T: ComplexField<RealField = f64>>(

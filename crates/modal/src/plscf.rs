@@ -1,9 +1,9 @@
 //! Poly-reference least-squares complex frequency-domain estimator (pLSCF, "PolyMAX") for tables of
 //! frequency responses.
 //!
-//! The responses of a table are fitted by a right matrix fraction H = B(z) A(z)⁻¹ with real coefficients in
-//! z = exp(−j(ω − ω₁)Δ), where Δ maps the band to half the unit circle. Only sums over the lines enter; those
-//! of the highest order contain those of every lower one.
+//! The responses of a table are fitted by a right matrix fraction H = B(z) A(z)⁻¹ with real
+//! coefficients in z = exp(−j(ω − ω₁)Δ), where Δ maps the band to half the unit circle. Only sums
+//! over the lines enter; those of the highest order contain those of every lower one.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,8 @@ use thiserror::Error;
 use crate::decomposition;
 use crate::stabilisation::{Pole, PoleCluster, Stabilisation};
 
-/// Part of the half circle that the band is mapped to: the two ends do not meet with their mirror images.
+/// Part of the half circle that the band is mapped to: the two ends do not meet with their mirror
+/// images.
 const CIRCLE: f64 = 0.995;
 
 /// Largest damping ratio of a pole that counts as a mode of the band.
@@ -87,7 +88,8 @@ pub struct ResponseTable {
 }
 
 impl ResponseTable {
-    /// Takes the angular frequencies (rad/s, rising) and the responses H (outputs × inputs) of each line.
+    /// Takes the angular frequencies (rad/s, rising) and the responses H (outputs × inputs) of each
+    /// line.
     ///
     /// # Errors
     /// [`PlscfError::Size`], [`PlscfError::Value`].
@@ -112,10 +114,11 @@ impl ResponseTable {
         Ok(Self { omega, responses, weights: None })
     }
 
-    /// Weights every line of every output (lines × outputs) by the inverse of its standard deviation.
+    /// Weights every line of every output (lines × outputs) by the inverse of its standard
+    /// deviation.
     ///
-    /// The variance of a response that was smoothed over the resonances must not be used: it takes a narrow
-    /// resonance for noise.
+    /// The variance of a response that was smoothed over the resonances must not be used: it takes
+    /// a narrow resonance for noise.
     ///
     /// # Errors
     /// [`PlscfError::Size`], [`PlscfError::Value`].
@@ -154,16 +157,16 @@ impl ResponseTable {
 
 /// Returns the poles and participations of models of all `orders` (of the denominator, rising).
 ///
-/// A model of order n with q inputs has n q poles; those in the band that decay are returned, with the
-/// participations of the inputs.
+/// A model of order n with q inputs has n q poles; those in the band that decay are returned, with
+/// the participations of the inputs.
 ///
 /// # Errors
 /// [`PlscfError::Orders`], [`PlscfError::TooFewLines`], [`PlscfError::Singular`].
 ///
 /// # Source
-/// Guillaume, Verboven, Vanlanduit, Van der Auweraer & Peeters (2003), Proceedings of the 21st International
-/// Modal Analysis Conference; Peeters, Van der Auweraer, Guillaume & Leuridan (2004), Shock and Vibration 11,
-/// 395–409.
+/// Guillaume, Verboven, Vanlanduit, Van der Auweraer & Peeters (2003), Proceedings of the 21st
+/// International Modal Analysis Conference; Peeters, Van der Auweraer, Guillaume & Leuridan (2004),
+/// Shock and Vibration 11, 395–409.
 pub fn plscf(table: &ResponseTable, orders: &[usize]) -> Result<Stabilisation, PlscfError> {
     let inputs = table.inputs();
     let rising = orders.windows(2).all(|pair| pair[0] < pair[1]);
@@ -183,8 +186,8 @@ pub fn plscf(table: &ResponseTable, orders: &[usize]) -> Result<Stabilisation, P
     Ok(Stabilisation::new(models?))
 }
 
-/// Returns the modes of a table as the clusters of its poles over `orders`, by rising frequency: initial
-/// values of a maximum-likelihood fit.
+/// Returns the modes of a table as the clusters of its poles over `orders`, by rising frequency:
+/// initial values of a maximum-likelihood fit.
 ///
 /// # Errors
 /// As [`plscf`].
@@ -288,15 +291,16 @@ impl NormalEquations {
 
 /// Sums over the lines of one output.
 struct OutputSums {
-    /// L⁻¹ S with the Cholesky factor L of the sums of the numerator: leading rows and columns are those of
-    /// lower orders.
+    /// L⁻¹ S with the Cholesky factor L of the sums of the numerator: leading rows and columns are
+    /// those of lower orders.
     whitened: DMatrix<f64>,
     /// Sums of the denominator.
     denominator: DMatrix<f64>,
 }
 
 impl OutputSums {
-    /// All sums are of Toeplitz blocks: products of two powers of z depend on their difference alone.
+    /// All sums are of Toeplitz blocks: products of two powers of z depend on their difference
+    /// alone.
     fn new(table: &ResponseTable, powers: &[Vec<Complex<f64>>], output: usize) -> Option<Self> {
         let (len, q) = (powers[0].len(), table.inputs());
         let mut numerator = vec![0.0; len];
@@ -342,8 +346,8 @@ fn accumulate(sums: &mut [f64], powers: &[Complex<f64>], value: Complex<f64>) {
     }
 }
 
-/// Solves A X = B of a positive definite A, each unknown scaled by its diagonal; by LU where rounding makes
-/// A indefinite.
+/// Solves A X = B of a positive definite A, each unknown scaled by its diagonal; by LU where
+/// rounding makes A indefinite.
 fn scaled_solve(mut matrix: DMatrix<f64>, mut right: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale: Vec<f64> = matrix.diagonal().iter().map(|d| d.max(0.0).sqrt()).collect();
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {

@@ -1,4 +1,5 @@
-//! Poles of models of rising order: which of them stay where they are, and the clusters that they form.
+//! Poles of models of rising order: which of them stay where they are, and the clusters that they
+//! form.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -14,11 +15,12 @@ pub const STABLE_DAMPING: f64 = 0.05;
 /// Largest loss of the MAC of participations or shapes from one order to the next of a stable pole.
 pub const STABLE_VECTOR: f64 = 0.02;
 
-/// Smallest relative distance of two poles that are not members of one cluster for frequency alone, on top of
-/// the twofold half-power width: rounding and noise of very lightly damped poles.
+/// Smallest relative distance of two poles that are not members of one cluster for frequency alone,
+/// on top of the twofold half-power width: rounding and noise of very lightly damped poles.
 const CLUSTER_FREQUENCY: f64 = 4e-4;
 
-/// Largest relative distance in frequency of two members of a cluster, however strongly they are damped.
+/// Largest relative distance in frequency of two members of a cluster, however strongly they are
+/// damped.
 const CLUSTER_REACH: f64 = 0.005;
 
 /// Largest relative distance in damping of two members of a cluster.
@@ -32,8 +34,8 @@ const CLUSTER_CLAIM: f64 = 0.3;
 pub struct Pole {
     /// λ, in rad/s, with Im λ > 0 and Re λ < 0.
     pub pole: Complex<f64>,
-    /// Participation of the inputs (tables of frequency responses) or shape of the outputs (ambient records)
-    /// of unit length.
+    /// Participation of the inputs (tables of frequency responses) or shape of the outputs (ambient
+    /// records) of unit length.
     pub vector: DVector<Complex<f64>>,
 }
 
@@ -83,8 +85,8 @@ pub struct PoleCluster {
 /// Poles of all orders, rising, with what is stable from one order to the next.
 ///
 /// # Source
-/// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal Analysis
-/// Conference (stabilisation diagram).
+/// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
+/// Analysis Conference (stabilisation diagram).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stabilisation {
     orders: Vec<usize>,
@@ -114,8 +116,8 @@ impl Stabilisation {
         &self.poles
     }
 
-    /// Returns the clusters of poles damped less than `max_damping` that have members in at least `min_share`
-    /// of the orders, by rising frequency.
+    /// Returns the clusters of poles damped less than `max_damping` that have members in at least
+    /// `min_share` of the orders, by rising frequency.
     pub fn clusters(&self, max_damping: f64, min_share: f64) -> Vec<PoleCluster> {
         let candidates = self.poles.iter().filter(|p| p.pole.damping_ratio() < max_damping);
         let mut free: Vec<&StabilisationPole> = candidates.collect();

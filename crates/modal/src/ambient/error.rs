@@ -9,7 +9,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum AmbientError {
     /// A channel does not change.
-    #[error("channel {}: all {samples} samples are {value}: the sensor is dead or not connected", channel.saturating_add(1))]
+    #[error(
+        "channel {}: all {samples} samples are {value}: the sensor is dead or not connected",
+        channel.saturating_add(1)
+    )]
     ConstantChannel {
         /// Channel, counted from 0.
         channel: usize,
@@ -20,7 +23,8 @@ pub enum AmbientError {
     },
     /// A channel has next to no signal in the band.
     #[error(
-        "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} of the strongest channel's: the sensor is dead or in another unit",
+        "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} of the \
+         strongest channel's: the sensor is dead or in another unit",
         channel.saturating_add(1), ratio
     )]
     DeadChannel {
@@ -33,7 +37,8 @@ pub enum AmbientError {
     },
     /// A channel is a multiple of another.
     #[error(
-        "channels {} and {} are copies of one another: all but {unexplained:.0e} of their power is common; leave one out",
+        "channels {} and {} are copies of one another: all but {unexplained:.0e} of their \
+         power is common; leave one out",
         first.saturating_add(1), second.saturating_add(1)
     )]
     CopiedChannel {
@@ -46,7 +51,8 @@ pub enum AmbientError {
     },
     /// The band has too few lines.
     #[error(
-        "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode at {outputs} outputs needs {needed}: record longer or widen `band_hz`"
+        "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode at {outputs} \
+         outputs needs {needed}: record longer or widen `band_hz`"
     )]
     TooFewLines {
         /// Number of lines in the band.
@@ -99,7 +105,8 @@ pub enum AmbientError {
     },
     /// There is no mode in the band.
     #[error(
-        "no mode between {from_hz} and {to_hz} Hz: none of {candidates} candidates stands out of the noise"
+        "no mode between {from_hz} and {to_hz} Hz: none of {candidates} candidates stands out of \
+         the noise"
     )]
     NoMode {
         /// Number of candidates examined.

@@ -1,4 +1,5 @@
-//! Sinusoids of machines in an ambient record: Thomson's F-test with sine tapers, and their removal.
+//! Sinusoids of machines in an ambient record: Thomson's F-test with sine tapers, and their
+//! removal.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,20 +25,21 @@ pub struct Harmonic {
     pub channel: usize,
     /// Amplitude in that channel, in its unit.
     pub amplitude: f64,
-    /// F statistic of a line against its neighbourhood, with 2 and 2 × tapers − 2 degrees of freedom.
+    /// F statistic of a line against its neighbourhood, with 2 and 2 × tapers − 2 degrees of
+    /// freedom.
     pub statistic: f64,
-    /// Probability of a statistic as large in a record without harmonics, for all frequencies and channels
-    /// of the band together (Bonferroni).
+    /// Probability of a statistic as large in a record without harmonics, for all frequencies and
+    /// channels of the band together (Bonferroni).
     pub p_value: f64,
-    /// Excess kurtosis of the signal within two lines of the frequency: −1.5 for a sinusoid, 0 for a random
-    /// response.
+    /// Excess kurtosis of the signal within two lines of the frequency: −1.5 for a sinusoid, 0 for
+    /// a random response.
     pub kurtosis: f64,
 }
 
 /// Returns the harmonics of the channels in a band, by rising frequency.
 ///
-/// A resonance is not a harmonic however sharp it looks: its amplitude and phase wander over the record, so
-/// that the tapers disagree.
+/// A resonance is not a harmonic however sharp it looks: its amplitude and phase wander over the
+/// record, so that the tapers disagree.
 ///
 /// # Errors
 /// [`AmbientError::Signal`] if the padded record cannot be transformed.
@@ -126,7 +128,8 @@ fn f_statistic(lines: &[Complex<f64>], index: usize, sums: &[f64]) -> f64 {
     (TAPERS as f64 - 1.0) * mean.norm_sqr() * power / residual.max(f64::MIN_POSITIVE)
 }
 
-/// Refines the frequency and measures amplitude and kurtosis in the channel that shows the harmonic.
+/// Refines the frequency and measures amplitude and kurtosis in the channel that shows the
+/// harmonic.
 fn measured(record: &Record, mut harmonic: Harmonic) -> Harmonic {
     let dt = record.sampling().dt();
     let samples = record.channel(harmonic.channel);
@@ -152,8 +155,8 @@ fn refined(samples: &[f64], mut frequency_hz: f64, dt: f64) -> f64 {
     frequency_hz
 }
 
-/// Returns the complex amplitude of a sinusoid of `angle` radians per sample, under a Hann window, which
-/// keeps neighbours out, or without a window.
+/// Returns the complex amplitude of a sinusoid of `angle` radians per sample, under a Hann window,
+/// which keeps neighbours out, or without a window.
 fn fitted(samples: &[f64], angle: f64, windowed: bool) -> Complex<f64> {
     let len = samples.len() as f64;
     let (turn, slow) = (Complex::cis(-angle), Complex::cis(TAU / len));
@@ -194,7 +197,8 @@ fn narrow_kurtosis(samples: &[f64], cycles: f64) -> f64 {
     1.5 * square / (mean * mean) - 3.0
 }
 
-/// Returns the record without the sinusoids at `frequencies_hz`, fitted to each channel by least squares.
+/// Returns the record without the sinusoids at `frequencies_hz`, fitted to each channel by least
+/// squares.
 ///
 /// # Errors
 /// [`AmbientError::Numerics`] if two frequencies cannot be told apart, [`AmbientError::Signal`].

@@ -12,6 +12,7 @@ use super::search::{Effort, search};
 use super::limits::{NOISE_TERMS, SHORT_SEARCH};
 use super::parameters::{Kernel, Layout, Parameters};
 use super::search::search;
+use super::search::{Effort, Fit, search, search_pooled};
 use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
@@ -36,9 +37,12 @@ const QUANTITIES: [(Kernel, f64); 5] = [
 const QUANTITIES: [(Kernel, f64); 3] =
     [(Kernel::Static, -FRAC_PI_2), (Kernel::Static, 0.0), (Kernel::Vanishing, FRAC_PI_2)];
 
-/// Returns the start with the quantity (displacement, velocity or acceleration) that explains the lines best
-/// after a few steps; `None` if none has a likelihood.
-pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Parameters> {
+/// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration, filtered
+/// or not) that explains the lines best; `None` if none has a likelihood.
+///
+/// A few steps choose the phase of each kernel; only maxima decide between kernels, whose differences in the
+/// tails of the resonances bias frequency and damping where the wrong one is taken.
+pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
@@ -48,6 +52,17 @@ pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Par
     });
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     Some(best.parameters)
+    let lower = |a: &Fit, b: &Fit| a.cost.total_cmp(&b.cost);
+    let maxima =
+        [Kernel::Static, Kernel::Sampled, Kernel::Vanishing].into_iter().filter_map(|kernel| {
+            let phases = QUANTITIES.iter().filter(|(other, _)| *other == kernel);
+            let starts = phases.filter_map(|&(kernel, phase)| {
+                let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
+                search(start, &pooled, band.span, Effort::SHORT)
+            });
+            search_pooled(starts.min_by(lower)?.parameters, band, Effort::TEST)
+        });
+    maxima.min_by(lower)
 }
 
 fn start(
@@ -134,6 +149,8 @@ const SCAN_REACH: f64 = 8.0;
 /// Returns candidates of further modes by falling gain: at each pole of a grid the largest eigenvalue of
 /// Returns candidates of further modes by falling score: at each pole of a grid the largest eigenvalue of
 /// Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
+/// Returns candidates of further modes by falling gain: at each pole of a grid the largest
+/// eigenvalue of Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
     let coefficients = Coefficients::new(parameters);
     let p = band.outputs();
@@ -163,6 +180,8 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             for k in from..to {
                 let weight = rate * rate / (rate * rate + (band.omega[k] - centre).powi(2));
                 let line = &whitened[k].0;
+            for (omega, (line, _)) in band.omega[from..to].iter().zip(&whitened[from..to]) {
+                let weight = rate * rate / (rate * rate + (omega - centre).powi(2));
                 sum.gerc(weight.into(), line, line, Complex::from(1.0));
                 for i in 0..p {
                     sum[(i, i)] -= Complex::from(weight);

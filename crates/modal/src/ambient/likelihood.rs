@@ -13,8 +13,8 @@ const TASK: usize = 64;
 
 /// Returns the factor of a Hermitian matrix if it is positive definite.
 ///
-/// nalgebra takes complex square roots of the pivots, so that those of an indefinite matrix come out
-/// imaginary.
+/// nalgebra takes complex square roots of the pivots, so that those of an indefinite matrix come
+/// out imaginary.
 pub(super) fn positive_factor(
     matrix: DMatrix<Complex<f64>>,
 ) -> Option<Cholesky<Complex<f64>, Dyn>> {
@@ -28,7 +28,8 @@ pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
     (0..parameters.layout.outputs).map(|i| parameters.log_noise(i, terms).exp()).collect()
 }
 
-/// Returns −log L, Σ (ln det S + Yᴴ S⁻¹ Y) over the lines; infinite where S is not positive definite.
+/// Returns −log L, Σ (ln det S + Yᴴ S⁻¹ Y) over the lines; infinite where S is not positive
+/// definite.
 ///
 /// # Source
 /// Whittle (1953), Arkiv för Matematik 2, 423–434.
@@ -230,8 +231,8 @@ fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &m
 /// Returns the Fisher information of the parameters; `None` where S is not positive definite.
 ///
 /// # Source
-/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines; Zeira & Nehorai (1990), IEEE Transactions on
-/// Acoustics, Speech, and Signal Processing 38, 1031–1036.
+/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines; Zeira & Nehorai (1990), IEEE Transactions
+/// on Acoustics, Speech, and Signal Processing 38, 1031–1036.
 pub(super) fn information(
     parameters: &Parameters,
     lines: &[PooledLines],
@@ -385,4 +386,24 @@ impl LineInformation<'_> {
             }
         }
     }
+}
+
+/// Returns the mean part of the expected power of a line that is leakage of the open record.
+///
+/// Lines that leakage dominates repeat one another, for all of it comes from the states at the two ends; the
+/// likelihood takes them for independent.
+pub(super) fn leakage_share(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
+    let coefficients = Coefficients::new(parameters);
+    let endless = Span { duration: f64::INFINITY, ..span };
+    let share = |line: &PooledLines| {
+        let variances = noise(parameters, &line.terms);
+        let spectrum =
+            |span| coefficients.spectrum(&coefficients.kernels(line.omega, span), &variances);
+        let (open, steady) = (spectrum(span), spectrum(endless));
+        let change = &open - steady;
+        let relative = positive_factor(open).map(|factor| factor.solve(&change).trace().re);
+        line.count * relative.map_or(1.0, |r| r.abs() / parameters.layout.outputs as f64)
+    };
+    let total: f64 = lines.iter().map(|line| line.count).sum();
+    lines.iter().map(share).sum::<f64>() / total
 }

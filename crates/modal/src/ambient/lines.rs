@@ -4,6 +4,10 @@ use nalgebra::{Complex, DMatrix};
 
 use super::parameters::Span;
 
+/// Largest part of the band that lines are pooled over, however far the poles are: the noise
+/// changes too.
+const WIDEST: f64 = 0.02;
+
 /// Lines of one record in a band, without the excluded ones.
 #[derive(Debug, Clone)]
 pub(super) struct BandLines {
@@ -66,10 +70,11 @@ impl BandLines {
             let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
             poles.iter().map(to).fold(f64::INFINITY, f64::min)
         };
+        let whole = self.omega[self.omega.len() - 1] - self.omega[0];
         let mut pooled = Vec::new();
         let mut first = 0;
         while first < self.omega.len() {
-            let width = part * distance(self.omega[first]);
+            let width = (part * distance(self.omega[first])).min(WIDEST * whole);
             let ahead = self.omega[first..].iter().take_while(|w| **w - self.omega[first] < width);
             let count = ahead.count().max(1);
             pooled.push(self.pool(first, count, noise_terms));

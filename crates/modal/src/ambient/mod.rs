@@ -1,8 +1,9 @@
 //! Modes from responses alone: structures that wind, traffic or their own machinery excites.
 //!
-//! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white forces on
-//! the modes and smooth sensor noise then maximise Whittle's likelihood with the expected periodogram, which
-//! includes the leakage of the open record; no window, no averaging, no model order to choose.
+//! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white
+//! forces on the modes and smooth sensor noise then maximise Whittle's likelihood with the expected
+//! periodogram, which includes the leakage of the open record; no window, no averaging, no model
+//! order to choose.
 
 mod error;
 pub mod harmonics;
@@ -23,7 +24,7 @@ mod tests;
 
 pub use error::AmbientError;
 pub use harmonics::Harmonic;
-pub use limits::MIN_DECAY_TIMES;
+pub use limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
 pub use result::{
     AmbientEstimate, AmbientMode, DropReason, DroppedCandidate, ModalValue, Uncertainty,
 };
@@ -33,7 +34,8 @@ use std::f64::consts::TAU;
 
 use mechid_signal::Record;
 
-use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE};
+use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE, POOLING};
+use lines::BandLines;
 use order::{Chosen, Wanted, choose};
 use prepare::{band_lines, checked_band, subspace_models};
 use result::RecordScale;
@@ -68,19 +70,19 @@ impl Default for AmbientSettings {
     }
 }
 
-/// Identifies the modes of a structure from its responses (samples × sensors, displacements, velocities or
-/// accelerations, in any units) to unmeasured forces that are white over the band.
+/// Identifies the modes of a structure from its responses (samples × sensors, displacements,
+/// velocities or accelerations, in any units) to unmeasured forces that are white over the band.
 ///
 /// # Errors
-/// [`AmbientError::ConstantChannel`], [`AmbientError::DeadChannel`], [`AmbientError::CopiedChannel`],
-/// [`AmbientError::Band`], [`AmbientError::TooFewLines`], [`AmbientError::TooShort`],
-/// [`AmbientError::NoModesAsked`], [`AmbientError::NoMode`], [`AmbientError::FewerModes`],
-/// [`AmbientError::Numerics`].
+/// [`AmbientError::ConstantChannel`], [`AmbientError::DeadChannel`],
+/// [`AmbientError::CopiedChannel`], [`AmbientError::Band`], [`AmbientError::TooFewLines`],
+/// [`AmbientError::TooShort`], [`AmbientError::NoModesAsked`], [`AmbientError::NoMode`],
+/// [`AmbientError::FewerModes`], [`AmbientError::Numerics`].
 ///
 /// # Source
-/// Whittle (1953), Arkiv för Matematik 2, 423–434; Sykulski et al. (2019), Biometrika 106, 251–266 (expected
-/// periodogram in Whittle's likelihood); Au (2017), *Operational Modal Analysis*; Peeters & De Roeck (1999),
-/// Mechanical Systems and Signal Processing 13, 855–878 (start).
+/// Whittle (1953), Arkiv för Matematik 2, 423–434; Sykulski et al. (2019), Biometrika 106, 251–266
+/// (expected periodogram in Whittle's likelihood); Au (2017), *Operational Modal Analysis*; Peeters
+/// & De Roeck (1999), Mechanical Systems and Signal Processing 13, 855–878 (start).
 pub fn identify_ambient(
     record: &Record,
     settings: &AmbientSettings,
@@ -116,6 +118,8 @@ pub fn identify_ambient(
     };
     let modes = modes_of(&fit, scale, &sinusoids)?;
     let factor = fit.parameters.factor();
+    let leakage_share = leakage_of(&fit, &band);
+    let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
     let modes = modes_of(&fit, &sound, scale, &sinusoids)?;
     let factor = fit.parameters.factor().select_rows(&sound);
     Ok(AmbientEstimate {
@@ -126,6 +130,7 @@ pub fn identify_ambient(
         band_hz,
         lines: band.omega.len(),
         log_likelihood: -fit.cost,
+        leakage_share,
         force_correlation: &factor * factor.transpose(),
     })
 }
@@ -139,6 +144,15 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
     let mut clusters: Vec<_> = clusters.iter().filter(|c| inside(&c.pole)).collect();
     clusters.sort_by(|a, b| b.share.total_cmp(&a.share));
     clusters.into_iter().map(|cluster| cluster.pole.clone()).collect()
+}
+
+fn leakage_of(fit: &Fit, band: &BandLines) -> f64 {
+    let terms = fit.parameters.layout.noise_terms;
+    likelihood::leakage_share(
+        &fit.parameters,
+        &band.pooled(&fit.poles(), POOLING, terms),
+        band.span,
+    )
 }
 
 fn modes_of(

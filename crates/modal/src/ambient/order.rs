@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::initial::{initial_parameters, match_amplitudes, scan};
+use super::initial::{initial_fit, match_amplitudes, scan};
 use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
 };
@@ -36,11 +36,11 @@ struct Choice<'a> {
     dropped: Vec<DroppedCandidate>,
 }
 
-/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first), and lists
-/// the candidates that are not among them.
+/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first),
+/// and lists the candidates that are not among them.
 ///
-/// Poles that explain lines without being modes (a harmonic, a background, a mode outside the band) stay in
-/// the fit, for the modes would change without them.
+/// Poles that explain lines without being modes (a harmonic, a background, a mode outside the band)
+/// stay in the fit, for the modes would change without them.
 pub(super) fn choose(
     candidates: &[Pole],
     band: &BandLines,
@@ -53,8 +53,7 @@ pub(super) fn choose(
     }
     let mut first: Vec<Pole> = candidates.iter().take(limit).cloned().collect();
     first.sort_by(|a, b| a.pole.norm().total_cmp(&b.pole.norm()));
-    let fit = initial_parameters(&first, band)
-        .and_then(|start| search_pooled(start, band, Effort::TEST))
+    let fit = initial_fit(&first, band)
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL));
@@ -110,7 +109,7 @@ impl Choice<'_> {
 
     /// Removes modes one after another as long as the likelihood does not need one.
     fn pruned(&mut self, mut fit: Fit) -> Fit {
-        while fit.parameters.layout.modes > 1 {
+        while fit.parameters.layout.modes > 0 {
             if self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) <= n) {
                 break;
             }
@@ -121,8 +120,8 @@ impl Choice<'_> {
         fit
     }
 
-    /// Returns the fit without the first mode that the likelihood does not need; those with the least
-    /// evidence are tried first, and strong ones not at all.
+    /// Returns the fit without the first mode that the likelihood does not need; those with the
+    /// least evidence are tried first, and strong ones not at all.
     fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
         let (parameters, needed) = (&fit.parameters, self.price());
         let covariance = fit.covariance()?;

@@ -9,8 +9,8 @@ use super::limits::CORRELATED_NEIGHBOURS;
 pub(super) enum Kernel {
     /// A static deflection, 1/(s − λ): displacements, and velocities too.
     Static,
-    /// The same without an anti-aliasing filter: frequencies above half the sampling rate fold into the
-    /// band.
+    /// The same without an anti-aliasing filter: frequencies above half the sampling rate fold into
+    /// the band.
     Sampled,
     /// Nothing, s/(λ(s − λ)): accelerations, and velocities too.
     Vanishing,
@@ -25,8 +25,8 @@ pub(super) struct Span {
     pub sample_interval: f64,
 }
 
-/// Places of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each shape, the
-/// factors of the correlation of the modal forces, and the noise of each sensor.
+/// Places of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each
+/// shape, the factors of the correlation of the modal forces, and the noise of each sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
     pub modes: usize,
@@ -67,7 +67,8 @@ impl Layout {
         self.correlation(self.pairs.len()) + term * self.outputs + output
     }
 
-    /// Returns the parameters of poles and correlations: those whose derivatives have no simple form.
+    /// Returns the parameters of poles and correlations: those whose derivatives have no simple
+    /// form.
     pub fn dense(&self) -> Vec<usize> {
         let correlations = self.correlation(0)..self.noise(0, 0);
         (0..2 * self.modes).chain(correlations).collect()

@@ -45,7 +45,7 @@ pub(super) fn band_lines(
     excluded_hz: &[f64],
 ) -> Result<BandLines, AmbientError> {
     let data = LineData::from_open_record(None, &record.without_mean(), band_hz)?;
-    let duration = record.sampling().duration();
+    let (duration, sample_interval) = (record.sampling().duration(), record.sampling().dt());
     let reach = EXCLUDED_LINES * TAU / duration;
     let kept: Vec<usize> = (0..data.len())
         .filter(|k| excluded_hz.iter().all(|f| (data.omega()[*k] - TAU * f).abs() > reach))
@@ -72,7 +72,7 @@ pub(super) fn band_lines(
     }
     check_copies(&amplitudes)?;
     let omega = kept.iter().map(|k| data.omega()[*k]).collect();
-    let span = Span { duration, sample_interval: record.sampling().dt() };
+    let span = Span { duration, sample_interval };
     Ok(BandLines { omega, amplitudes, scale, span })
     Ok(BandLines { omega, amplitudes, scale, duration })
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::harmonics::Harmonic;
-use super::limits::MIN_DECAY_TIMES;
+use super::limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
 use super::parameters::Parameters;
 use super::search::Fit;
@@ -24,12 +24,21 @@ pub enum Uncertainty {
         /// Ends of the interval, in the unit of the value.
         interval: [f64; 2],
     },
-    /// The record is too short: the distribution of the estimate is not known well enough for an interval.
+    /// The record is too short: the distribution of the estimate is not known well enough for an
+    /// interval.
     RecordTooShort {
         /// ζωT, the length of the record in decay times of the mode.
         decay_times: f64,
         /// Smallest ζωT for an interval.
         needed: f64,
+    },
+    /// Much of the lines is leakage of the open record, as of displacements with little noise: differentiate
+    /// the record (velocities or accelerations) or record longer.
+    Leakage {
+        /// Mean part of the power of a line that is leakage.
+        share: f64,
+        /// Largest part for an interval.
+        most: f64,
     },
 }
 
@@ -44,9 +53,11 @@ pub struct ModalValue {
 
 impl ModalValue {
     /// Takes a value whose logarithm has the standard error `relative`.
-    fn new(value: f64, relative: f64, decay_times: f64) -> Self {
+    fn new(value: f64, relative: f64, decay_times: f64, share: f64) -> Self {
         let uncertainty = if decay_times < MIN_DECAY_TIMES {
             Uncertainty::RecordTooShort { decay_times, needed: MIN_DECAY_TIMES }
+        } else if share > MAX_LEAKAGE {
+            Uncertainty::Leakage { share, most: MAX_LEAKAGE }
         } else {
             let end = |side: f64| value * (side * QUANTILE * relative).exp();
             let interval = [end(-1.0), end(1.0)];
@@ -55,19 +66,19 @@ impl ModalValue {
         Self { value, uncertainty }
     }
 
-    /// Returns the standard error; `None` if the record is too short.
+    /// Returns the standard error; `None` where it is refused.
     pub fn standard_error(&self) -> Option<f64> {
         match self.uncertainty {
             Uncertainty::Known { standard_error, .. } => Some(standard_error),
-            Uncertainty::RecordTooShort { .. } => None,
+            Uncertainty::RecordTooShort { .. } | Uncertainty::Leakage { .. } => None,
         }
     }
 
-    /// Returns the interval of 95 %; `None` if the record is too short.
+    /// Returns the interval of 95 %; `None` where it is refused.
     pub fn interval(&self) -> Option<[f64; 2]> {
         match self.uncertainty {
             Uncertainty::Known { interval, .. } => Some(interval),
-            Uncertainty::RecordTooShort { .. } => None,
+            Uncertainty::RecordTooShort { .. } | Uncertainty::Leakage { .. } => None,
         }
     }
 }
@@ -81,8 +92,8 @@ pub struct AmbientMode {
     pub damping_ratio: ModalValue,
     /// Shape in the units of the channels over that of the largest entry, which is 1.
     pub shape: ShapeWithCovariance,
-    /// Power density of the force on the mode: the output of the largest entry has the one-sided power
-    /// density `force_power`/|jω − λ|² near the resonance, in its unit² (rad/s)²/Hz.
+    /// Power density of the force on the mode: the output of the largest entry has the one-sided
+    /// power density `force_power`/|jω − λ|² near the resonance, in its unit² (rad/s)²/Hz.
     pub force_power: f64,
     /// Modal phase collinearity of the shape.
     pub mpc: Indicator,
@@ -152,6 +163,8 @@ pub struct AmbientEstimate {
     pub lines: usize,
     /// ln L of the lines, each output over its RMS value in the band.
     pub log_likelihood: f64,
+    /// Mean part of the power of a line that is leakage of the open record.
+    pub leakage_share: f64,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
 }
@@ -179,8 +192,14 @@ impl AmbientMode {
                 frequency_hz,
                 relative(layout.frequency(mode)),
                 decay_times,
+                record.leakage_share,
             ),
-            damping_ratio: ModalValue::new(zeta, relative(layout.damping(mode)), decay_times),
+            damping_ratio: ModalValue::new(
+                zeta,
+                relative(layout.damping(mode)),
+                decay_times,
+                record.leakage_share,
+            ),
             force_power: 2.0 * record.span.sample_interval * largest * largest,
             force_power: 2.0 * record.sample_interval * largest * largest,
             mpc: mpc_with_error(&shape),
@@ -199,6 +218,8 @@ pub(super) struct RecordScale<'a> {
     pub sample_interval: f64,
     /// Unit of each output of the fit.
     pub scale: &'a [f64],
+    /// Mean part of the power of a line that is leakage.
+    pub leakage_share: f64,
 }
 
 fn scaled_shape(

@@ -19,13 +19,13 @@ const TRIALS: usize = 12;
 /// Slow steps in a row that end a search.
 const SLOW_STEPS: usize = 2;
 
-/// Smallest logarithms of a damping ratio and of a noise variance (over the variance in the band): what is
-/// smaller has no effect on the lines.
+/// Smallest logarithms of a damping ratio and of a noise variance (over the variance in the band):
+/// what is smaller has no effect on the lines.
 const LEAST_LOG_DAMPING: f64 = -14.0;
 const LEAST_LOG_NOISE: f64 = -28.0;
 
-/// Information that every parameter has, as part of the largest: keeps the covariance finite along phases
-/// that the lines do not determine.
+/// Information that every parameter has, as part of the largest: keeps the covariance finite along
+/// phases that the lines do not determine.
 const LEAST_INFORMATION: f64 = 1e-10;
 
 /// Effort of a search.
@@ -108,7 +108,8 @@ fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> 
     Some(0.0)
 }
 
-/// Searches from `start`, with lines pooled about the poles of the start and again about those of the end.
+/// Searches from `start`, with lines pooled about the poles of the start and again about those of
+/// the end.
 pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
     let terms = start.layout.noise_terms;
     let first =
@@ -147,6 +148,10 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, iterations: usi
     let first =
         search(start.clone(), &band.pooled(&start.poles(), terms), band.duration, iterations)?;
     search(first.parameters, &pooled, band.duration, iterations)
+    let mut fit = search(first.parameters, &pooled, band.span, effort)?;
+    // Fits are compared on the same lines, however each was pooled.
+    fit.cost = cost(&fit.parameters, &band.pooled(&[], 0.0, terms), band.span);
+    Some(fit)
 }
 
 fn damped_step(
@@ -160,7 +165,8 @@ fn damped_step(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-/// Returns the matrix with a unit diagonal, `damping` added to it, and the scale of rows and columns.
+/// Returns the matrix with a unit diagonal, `damping` added to it, and the scale of rows and
+/// columns.
 fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
     let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
     let floor = LEAST_INFORMATION.powi(2) * largest;
@@ -172,7 +178,8 @@ fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f6
     (scaled, scale)
 }
 
-/// Returns the parameters after a step, which is limited where the likelihood is far from quadratic.
+/// Returns the parameters after a step, which is limited where the likelihood is far from
+/// quadratic.
 fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
     let layout = &parameters.layout;
     let mut next = parameters.clone();

@@ -1,18 +1,19 @@
 //! Expected periodogram of outputs that white, unmeasured forces drive through the modes.
 //!
-//! The outputs are y = Σ_r H_r w_r + n with H_r(s) = Σ ψ g(s, λ) over the pair (ψ, λ), (ψ*, λ*); the forces w
-//! on the modes are white with correlation Q, the noise n of each sensor is smooth. The covariance function
-//! is Σ ψ γᵀ exp(λτ) for τ > 0 with γ_r = Σ_s Q_rs H_s(−λ_r), and its expected periodogram over a record
-//! of length T follows exactly:
+//! The outputs are y = Σ_r H_r w_r + n with H_r(s) = Σ ψ g(s, λ) over the pair (ψ, λ), (ψ*, λ*);
+//! the forces w on the modes are white with correlation Q, the noise n of each sensor is smooth.
+//! The covariance function is Σ ψ γᵀ exp(λτ) for τ > 0 with γ_r = Σ_s Q_rs H_s(−λ_r), and its
+//! expected periodogram over a record of length T follows exactly:
 //!
 //! ```text
 //! S(ω) = A + Aᴴ + D Q Dᵀ + N,   A = Σ_λ k(ω, λ) ψ γᵀ,
 //! k = 1/(jω − λ) − (1 − exp λT)/(T (jω − λ)²)
 //! ```
 //!
-//! The second term of k is the leakage of the open record; D is the value of H at high frequency. Of a record
-//! without an anti-aliasing filter, Δ coth((jω − λ)Δ)  and Δ/sinh((jω − λ)Δ) take the place of 1/(jω − λ), with
-//! half the time between two samples Δ: sums over all frequencies that fold onto ω.
+//! The second term of k is the leakage of the open record; D is the value of H at high frequency.
+//! Of a record without an anti-aliasing filter, Δ coth((jω − λ)Δ)  and Δ/sinh((jω − λ)Δ) take the
+//! place of 1/(jω − λ), with half the time between two samples Δ: sums over all frequencies that
+//! fold onto ω.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -127,13 +128,17 @@ impl Coefficients {
             let square = inverse * inverse;
             let value = inverse - lost * square;
             (value, square - lost * square * inverse * 2.0 + decay * square)
+            let leakage = lost * square;
+            let value = inverse - leakage;
+            (value, square - leakage * inverse * 2.0 + decay * square)
         };
         let pairs = self.poles.iter().map(|pole| [at(*pole), at(pole.conj())]);
         let (value, derivative) = pairs.map(|[a, b]| ([a.0, b.0], [a.1, b.1])).unzip();
         Kernels { value, derivative }
     }
 
-    /// Returns the spectral matrix at a line where the noise of the sensors has the variances `noise`.
+    /// Returns the spectral matrix at a line where the noise of the sensors has the variances
+    /// `noise`.
     pub fn spectrum(&self, kernels: &Kernels, noise: &[f64]) -> DMatrix<Complex<f64>> {
         let outputs = self.shapes.nrows();
         let mut half = DMatrix::zeros(outputs, outputs);
@@ -169,8 +174,8 @@ impl Coefficients {
         hermitian_sum(&half, &direction.direct_power)
     }
 
-    /// Returns the vectors x with ∂S/∂ψ_i = e_i xᴴ + x e_iᵀ, for the real and the imaginary part of each
-    /// mode's shape: outputs × 2 modes.
+    /// Returns the vectors x with ∂S/∂ψ_i = e_i xᴴ + x e_iᵀ, for the real and the imaginary part of
+    /// each mode's shape: outputs × 2 modes.
     pub fn shape_directions(&self, kernels: &Kernels) -> DMatrix<Complex<f64>> {
         let (outputs, modes) = self.shapes.shape();
         let direct = &self.direct * &self.correlation;

@@ -75,7 +75,8 @@ fn gradients_are_the_differences_of_the_cost() {
     }
 }
 
-/// Judge: where the periodogram is the expected one, the information is the derivative of the gradient.
+/// Judge: where the periodogram is the expected one, the information is the derivative of the
+/// gradient.
 #[test]
 fn the_information_is_the_curvature_at_the_expectation() {
     for kernel in [Kernel::Static, Kernel::Sampled, Kernel::Vanishing] {
@@ -102,7 +103,8 @@ fn the_information_is_the_curvature_at_the_expectation() {
     }
 }
 
-/// Judge: Σ (1 − |τ|/T) R(τ) exp(−jωτ) with the covariance function of the state equations, sampled finely.
+/// Judge: Σ (1 − |τ|/T) R(τ) exp(−jωτ) with the covariance function of the state equations, sampled
+/// finely.
 #[test]
 fn the_expected_periodogram_is_the_sum_of_the_covariances() {
     let mut parameters = parameters(Kernel::Static, 2);

@@ -5,14 +5,15 @@ use nalgebra::{Complex, DMatrix};
 use super::IndicatorError;
 use crate::decomposition;
 
-/// Returns the complex mode indicator function: the singular values of H (outputs × inputs) of each line,
-/// falling; lines × min(outputs, inputs), in the unit of H.
+/// Returns the complex mode indicator function: the singular values of H (outputs × inputs) of each
+/// line, falling; lines × min(outputs, inputs), in the unit of H.
 ///
-/// Peaks of the first value are modes; a peak of the second at the same line is a second mode there.
+/// Peaks of the first value are modes; a peak of the second at the same line is a second mode
+/// there.
 ///
 /// # Errors
-/// [`IndicatorError::Size`] if the responses differ in shape, [`IndicatorError::NotConverged`] also for
-/// entries that are not finite.
+/// [`IndicatorError::Size`] if the responses differ in shape, [`IndicatorError::NotConverged`] also
+/// for entries that are not finite.
 ///
 /// # Source
 /// Shih, Tsuei, Allemang & Brown (1988), Mechanical Systems and Signal Processing 2, 367–377.
@@ -29,17 +30,19 @@ pub fn complex_mode_indicator(
     Ok(indicator)
 }
 
-/// Returns the multivariate mode indicator function: for each line and each of q combinations of the forces
-/// the power of the response in phase with the force over its whole power, rising; lines × q.
+/// Returns the multivariate mode indicator function: for each line and each of q combinations of
+/// the forces the power of the response in phase with the force over its whole power, rising; lines
+/// × q.
 ///
-/// It drops from about 1 towards 0 where a real mode is in phase resonance; the responses are displacements
-/// or accelerations over forces.
+/// It drops from about 1 towards 0 where a real mode is in phase resonance; the responses are
+/// displacements or accelerations over forces.
 ///
 /// # Errors
 /// As [`complex_mode_indicator`].
 ///
 /// # Source
-/// Williams, Crowley & Vold (1985), Proceedings of the 3rd International Modal Analysis Conference, 66–70.
+/// Williams, Crowley & Vold (1985), Proceedings of the 3rd International Modal Analysis Conference,
+/// 66–70.
 pub fn multivariate_mode_indicator(
     responses: &[DMatrix<Complex<f64>>],
 ) -> Result<DMatrix<f64>, IndicatorError> {

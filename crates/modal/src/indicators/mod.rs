@@ -1,5 +1,5 @@
-//! Indicators of modes and of mode shapes: modal assurance criterion (MAC), modal phase collinearity (MPC),
-//! mean phase, and the indicator functions of frequency responses.
+//! Indicators of modes and of mode shapes: modal assurance criterion (MAC), modal phase
+//! collinearity (MPC), mean phase, and the indicator functions of frequency responses.
 
 mod functions;
 mod propagation;
@@ -50,14 +50,15 @@ pub enum IndicatorError {
     },
 }
 
-/// Returns the modal assurance criterion |aᴴb|²/(aᴴa bᴴb) of two complex shapes: 1 if they are multiples of
-/// one another, 0 if they are orthogonal. It is 0 where a shape is zero.
+/// Returns the modal assurance criterion |aᴴb|²/(aᴴa bᴴb) of two complex shapes: 1 if they are
+/// multiples of one another, 0 if they are orthogonal. It is 0 where a shape is zero.
 ///
 /// # Panics
 /// If the shapes differ in length.
 ///
 /// # Source
-/// Allemang & Brown (1982), Proceedings of the 1st International Modal Analysis Conference, 110–116.
+/// Allemang & Brown (1982), Proceedings of the 1st International Modal Analysis Conference,
+/// 110–116.
 ///
 /// ```
 /// use mechid_modal::indicators::mac;
@@ -77,8 +78,8 @@ fn mac_of_views(a: DVectorView<'_, Complex<f64>>, b: DVectorView<'_, Complex<f64
     if size > 0.0 { a.dotc(&b).norm_sqr() / size } else { 0.0 }
 }
 
-/// Returns the MAC of every pair of columns of `a` (outputs × modes) and `b` (outputs × modes of another
-/// result): modes of `a` × modes of `b`.
+/// Returns the MAC of every pair of columns of `a` (outputs × modes) and `b` (outputs × modes of
+/// another result): modes of `a` × modes of `b`.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if the numbers of outputs differ.
@@ -94,17 +95,19 @@ pub fn mac_matrix(
     Ok(DMatrix::from_fn(a.ncols(), b.ncols(), entry))
 }
 
-/// Returns the MAC of two uncertain, independent shapes with its standard error and its expected loss.
+/// Returns the MAC of two uncertain, independent shapes with its standard error and its expected
+/// loss.
 ///
-/// Where the shapes agree the MAC is at its maximum: its gradient is zero and errors of the shapes lower it
-/// on average, by `expected_loss`. Terms of second order are therefore part of the standard error.
+/// Where the shapes agree the MAC is at its maximum: its gradient is zero and errors of the shapes
+/// lower it on average, by `expected_loss`. Terms of second order are therefore part of the
+/// standard error.
 ///
 /// # Errors
 /// [`IndicatorError::Size`], [`IndicatorError::ZeroShape`].
 ///
 /// # Source
-/// Greś, Döhler & Mevel (2021), Mechanical Systems and Signal Processing 152, 107326 (uncertainty of the
-/// modal assurance criterion by the delta method of first and second order).
+/// Greś, Döhler & Mevel (2021), Mechanical Systems and Signal Processing 152, 107326 (uncertainty
+/// of the modal assurance criterion by the delta method of first and second order).
 pub fn mac_with_error(
     a: &ShapeWithCovariance,
     b: &ShapeWithCovariance,
@@ -123,12 +126,12 @@ pub fn mac_with_error(
     Ok(propagate(value, &point, &covariance))
 }
 
-/// Returns the modal phase collinearity |φᵀφ|²/(φᴴφ)²: 1 for a shape whose entries are all in phase or in
-/// opposition, as of a structure with proportional damping, and 0 for a travelling wave.
+/// Returns the modal phase collinearity |φᵀφ|²/(φᴴφ)²: 1 for a shape whose entries are all in phase
+/// or in opposition, as of a structure with proportional damping, and 0 for a travelling wave.
 ///
 /// # Source
-/// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Pappa, Elliott & Schenk
-/// (1993), ibid. 16, 832–838.
+/// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Pappa, Elliott &
+/// Schenk (1993), ibid. 16, 832–838.
 ///
 /// ```
 /// use mechid_modal::indicators::mpc;
@@ -151,8 +154,8 @@ pub fn mpc_with_error(shape: &ShapeWithCovariance) -> Indicator {
     propagate(|x| mpc(&unstacked(x.rows(0, len))), &point, shape.covariance())
 }
 
-/// Returns the mean phase of the entries of a shape, in rad, in (−π/2, π/2]: the direction in the complex
-/// plane that they scatter about least.
+/// Returns the mean phase of the entries of a shape, in rad, in (−π/2, π/2]: the direction in the
+/// complex plane that they scatter about least.
 ///
 /// # Source
 /// The direction of the first principal component of the real and imaginary parts; Pappa, Elliott &
@@ -203,6 +206,20 @@ mod tests {
         assert!((mean_phase(&line) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
         assert_eq!(mac(&a, &shape(&[(0.0, 0.0); 2])), 0.0);
         assert!(mac_matrix(&set, &DMatrix::zeros(3, 1)).is_err());
+    }
+
+    #[test]
+    fn shapes_are_normalised_to_the_entry_of_the_largest_modulus() {
+        // |Re| + |Im| of the second entry is larger, its modulus smaller.
+        let entries = shape(&[(1.0, 0.0), (-0.7, 0.7)]);
+        let uncertain = ShapeWithCovariance::from_standard_errors(entries, &[0.1; 2]).unwrap();
+        let normalised = uncertain.normalised();
+        assert_eq!(normalised.shape()[0], Complex::from(1.0));
+        assert_eq!(normalised.standard_errors()[0], 0.0);
+        // Both entries have an error of 0.1 in each part; |φ₂/φ₁|² = 0.98.
+        let expected = (2.0f64 * 0.01 * (1.0 + 0.98)).sqrt();
+        assert!((normalised.standard_errors()[1] - expected).abs() < 1e-12);
+        assert_eq!(uncertain.normalised_to(2), None);
     }
 
     /// Judge: the scatter of a MAC and an MPC over many draws of the shapes.

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Step of the central differences over the root mean square of the variables: the fourth root of the
-/// rounding error balances rounding and truncation of second differences.
+/// Step of the central differences over the root mean square of the variables: the fourth root of
+/// the rounding error balances rounding and truncation of second differences.
 const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Indicator between 0 and 1, with the effect of the errors of the shapes.
@@ -17,8 +17,8 @@ pub struct Indicator {
     pub expected_loss: f64,
 }
 
-/// Returns f at `point` with its error to second order, for normally distributed variables: the variance is
-/// gᵀCg + ½ tr (HC)², the bias ½ tr HC, with the gradient g and the Hessian H of f.
+/// Returns f at `point` with its error to second order, for normally distributed variables: the
+/// variance is gᵀCg + ½ tr (HC)², the bias ½ tr HC, with the gradient g and the Hessian H of f.
 pub(super) fn propagate(
     f: impl Fn(&DVector<f64>) -> f64,
     point: &DVector<f64>,

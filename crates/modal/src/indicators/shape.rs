@@ -12,8 +12,8 @@ pub struct ShapeWithCovariance {
 }
 
 impl ShapeWithCovariance {
-    /// Takes a shape and the 2p × 2p covariance of its parts, the p real parts first, in squared units of
-    /// the shape; zeros stand for entries without error, as of a finite-element model.
+    /// Takes a shape and the 2p × 2p covariance of its parts, the p real parts first, in squared
+    /// units of the shape; zeros stand for entries without error, as of a finite-element model.
     ///
     /// # Errors
     /// [`IndicatorError::Size`], [`IndicatorError::NotFinite`], [`IndicatorError::ZeroShape`].
@@ -46,7 +46,8 @@ impl ShapeWithCovariance {
         Self::new(shape, DMatrix::zeros(len, len))
     }
 
-    /// Takes a shape whose entries have independent errors, equal in the real and the imaginary part.
+    /// Takes a shape whose entries have independent errors, equal in the real and the imaginary
+    /// part.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -77,8 +78,8 @@ impl ShapeWithCovariance {
         DVector::from_fn(p, |i, _| variance(i).max(0.0).sqrt())
     }
 
-    /// Returns the shape divided by one of its entries, which becomes 1 without error; `None` if that
-    /// entry is zero.
+    /// Returns the shape divided by one of its entries, which becomes 1 without error; `None` if
+    /// that entry is zero.
     pub fn normalised_to(&self, entry: usize) -> Option<Self> {
         let p = self.shape.len();
         let reference = *self.shape.get(entry)?;

@@ -80,8 +80,8 @@ fn mast() -> Structure {
     }
 }
 
-/// Judge: the truth behind twelve records; of 72 intervals of 95 % at least 61 hold, four standard deviations
-/// below the expectation. The long study is `examples/ambient_study.rs`.
+/// Judge: the truth behind twelve records; of 72 intervals of 95 % at least 61 hold, four standard
+/// deviations below the expectation. The long study is `examples/ambient_study.rs`.
 #[test]
 fn intervals_hold_the_truth() {
     let truth = mast();
@@ -146,8 +146,8 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     }
 }
 
-/// Judge: resonances of 15 decay times are no harmonics; the level of the test allows one in a thousand
-/// records.
+/// Judge: resonances of 15 decay times are no harmonics; the level of the test allows one in a
+/// thousand records.
 #[test]
 fn resonances_are_not_taken_for_harmonics() {
     let truth = mast();

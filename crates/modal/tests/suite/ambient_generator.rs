@@ -1,5 +1,5 @@
-//! Ambient records of a known structure: an exact discretisation of its modes under white forces, and a
-//! band-limited steady state for accelerations.
+//! Ambient records of a known structure: an exact discretisation of its modes under white forces,
+//! and a band-limited steady state for accelerations.
 
 use std::f64::consts::TAU;
 
@@ -34,8 +34,8 @@ impl Structure {
         self.frequencies_hz.iter().zip(&self.dampings).map(pole).collect()
     }
 
-    /// Record of displacements or velocities: the modal states are advanced exactly from sample to sample, with
-    /// the covariance of what white forces add in one.
+    /// Record of displacements or velocities: the modal states are advanced exactly from sample to
+    /// sample, with the covariance of what white forces add in one.
     pub fn record(
         &self,
         quantity: Quantity,
@@ -82,8 +82,8 @@ impl Structure {
         with_noise(data, rate_hz, noise, seed)
     }
 
-    /// Record of accelerations: a piece of a four times longer steady state under forces that are white up
-    /// to 90 % of half the sampling rate.
+    /// Record of accelerations: a piece of a four times longer steady state under forces that are
+    /// white up to 90 % of half the sampling rate.
     pub fn accelerations(&self, rate_hz: f64, len: usize, noise: f64, seed: u64) -> Record {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let long = 4 * len;
@@ -114,7 +114,8 @@ impl Structure {
     }
 }
 
-/// Adds noise of each sensor: white and first-order low-pass parts, together `noise` of the RMS value.
+/// Adds noise of each sensor: white and first-order low-pass parts, together `noise` of the RMS
+/// value.
 fn with_noise(mut data: DMatrix<f64>, rate_hz: f64, noise: f64, seed: u64) -> Record {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let len = data.nrows();
