@@ -135,7 +135,6 @@ fn measured(record: &Record, mut harmonic: Harmonic) -> Harmonic {
     let samples = record.channel(harmonic.channel);
     harmonic.frequency_hz = refined(samples, harmonic.frequency_hz, dt);
     let amplitude = fitted(samples, harmonic.frequency_hz * TAU * dt, true);
-    let amplitude = fitted(samples, harmonic.frequency_hz * TAU * dt);
     harmonic.amplitude = amplitude.norm();
     harmonic.kurtosis = narrow_kurtosis(samples, harmonic.frequency_hz * dt);
     harmonic
@@ -146,7 +145,6 @@ fn refined(samples: &[f64], mut frequency_hz: f64, dt: f64) -> f64 {
     let mut step = 1.0 / (PADDING as f64 * samples.len() as f64 * dt);
     for _ in 0..REFINEMENTS {
         let power = |f: f64| fitted(samples, f * TAU * dt, true).norm_sqr();
-        let power = |f: f64| fitted(samples, f * TAU * dt).norm_sqr();
         let candidates = [frequency_hz - step, frequency_hz, frequency_hz + step];
         let best = candidates.into_iter().max_by(|a, b| power(*a).total_cmp(&power(*b)));
         frequency_hz = best.unwrap_or(frequency_hz);
@@ -165,12 +163,6 @@ fn fitted(samples: &[f64], angle: f64, windowed: bool) -> Complex<f64> {
     let mut sum = Complex::default();
     for sample in samples {
         sum += phase * (sample * (1.0 - depth * window.re));
-/// Returns the complex amplitude of a sinusoid of `angle` radians per sample, under a Hann window that keeps
-/// neighbours out.
-fn fitted(samples: &[f64], angle: f64) -> Complex<f64> {
-    let turn = Complex::cis(-angle);
-    let slow = Complex::cis(TAU / len);
-        sum += phase * (sample * (1.0 - window.re));
         phase *= turn;
         window *= slow;
     }
@@ -183,8 +175,6 @@ fn narrow_kurtosis(samples: &[f64], cycles: f64) -> f64 {
     let lines: Vec<Complex<f64>> = (-2..=2)
         .map(|offset| fitted(samples, TAU * (cycles + f64::from(offset) / len), false))
         .collect();
-    let lines: Vec<Complex<f64>> =
-        (-2..=2).map(|offset| fitted(samples, TAU * (cycles + f64::from(offset) / len))).collect();
     let instants = 8 * lines.len();
     let envelope = |k: usize| {
         let turn = TAU * k as f64 / instants as f64;

@@ -8,10 +8,6 @@ use super::likelihood::{noise, positive_factor};
 use super::limits::{COARSE_POOLING, NOISE_TERMS};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
-use super::search::{Effort, search};
-use super::limits::{NOISE_TERMS, SHORT_SEARCH};
-use super::parameters::{Kernel, Layout, Parameters};
-use super::search::search;
 use super::search::{Effort, Fit, search, search_pooled};
 use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
@@ -34,8 +30,6 @@ const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Sampled, 0.0),
     (Kernel::Vanishing, FRAC_PI_2),
 ];
-const QUANTITIES: [(Kernel, f64); 3] =
-    [(Kernel::Static, -FRAC_PI_2), (Kernel::Static, 0.0), (Kernel::Vanishing, FRAC_PI_2)];
 
 /// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration, filtered
 /// or not) that explains the lines best; `None` if none has a likelihood.
@@ -45,13 +39,6 @@ const QUANTITIES: [(Kernel, f64); 3] =
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
-    let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
-        let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
-        search(start, &pooled, band.span, Effort::SHORT)
-        search(start, &pooled, band.duration, SHORT_SEARCH)
-    });
-    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    Some(best.parameters)
     let lower = |a: &Fit, b: &Fit| a.cost.total_cmp(&b.cost);
     let maxima =
         [Kernel::Static, Kernel::Sampled, Kernel::Vanishing].into_iter().filter_map(|kernel| {
@@ -93,7 +80,6 @@ fn start(
     }
     for _ in 0..AMPLITUDE_STEPS {
         match_amplitudes(&mut parameters, pooled, band.span, band.spacing());
-        match_amplitudes(&mut parameters, pooled, band.duration, band.spacing());
     }
     parameters
 }
@@ -103,7 +89,6 @@ pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],
     span: Span,
-    duration: f64,
     spacing: f64,
 ) {
     let coefficients = Coefficients::new(parameters);
@@ -115,7 +100,6 @@ pub(super) fn match_amplitudes(
             let mut powers = [0.0; 2];
             for line in pooled.iter().filter(|line| (line.omega - pole.im).abs() < reach) {
                 let kernels = coefficients.kernels(line.omega, span);
-                let kernels = coefficients.kernels(line.omega, duration);
                 let model = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
                 for (power, matrix) in powers.iter_mut().zip([&line.periodogram, &model]) {
                     *power += line.count * direction.dotc(&(matrix * &direction)).re;
@@ -136,8 +120,6 @@ pub(super) struct Candidate {
     pub pole: Pole,
     /// Increase of 2 ln L that a mode there promises.
     pub gain: f64,
-    /// Amplitude along the shape in units of the standard deviation that noise alone gives.
-    pub score: f64,
 }
 
 /// Damping ratios at which further modes are looked for.
@@ -146,9 +128,6 @@ const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 /// Half width of the lines that one place of the scan uses, in decay rates.
 const SCAN_REACH: f64 = 8.0;
 
-/// Returns candidates of further modes by falling gain: at each pole of a grid the largest eigenvalue of
-/// Returns candidates of further modes by falling score: at each pole of a grid the largest eigenvalue of
-/// Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 /// Returns candidates of further modes by falling gain: at each pole of a grid the largest
 /// eigenvalue of Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
@@ -158,7 +137,6 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
     for (k, omega) in band.omega.iter().enumerate() {
         let terms = band.noise_terms(*omega, parameters.layout.noise_terms);
         let kernels = coefficients.kernels(*omega, band.span);
-        let kernels = coefficients.kernels(*omega, band.duration);
         let factor = positive_factor(coefficients.spectrum(&kernels, &noise(parameters, &terms)))?;
         let lower = factor.l();
         let line = lower.solve_lower_triangular(&band.amplitudes.row(k).transpose())?;
@@ -176,10 +154,6 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             let to = band.omega.partition_point(|w| *w <= centre + reach);
             let mut sum = nalgebra::DMatrix::zeros(p, p);
             let (mut total, mut squares) = (0.0, 0.0);
-            let mut squares = 0.0;
-            for k in from..to {
-                let weight = rate * rate / (rate * rate + (band.omega[k] - centre).powi(2));
-                let line = &whitened[k].0;
             for (omega, (line, _)) in band.omega[from..to].iter().zip(&whitened[from..to]) {
                 let weight = rate * rate / (rate * rate + (omega - centre).powi(2));
                 sum.gerc(weight.into(), line, line, Complex::from(1.0));
@@ -202,8 +176,5 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
         }
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-            let score = eigen.eigenvalues[best] / f64::sqrt(squares);
-            candidates.push(Candidate { pole, score });
-    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
     Some(candidates)
 }

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::lines::PooledLines;
 use super::parameters::{Kernel, Parameters, Span};
-use super::parameters::{Kernel, Parameters};
 use super::spectrum::{Coefficients, Direction, Kernels, directions};
 
 /// Pooled lines that one task works on: sums are added in the same order on any number of cores.
@@ -37,8 +36,6 @@ pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], span: Span) -
     let coefficients = Coefficients::new(parameters);
     let one = |line: &PooledLines| {
         let kernels = coefficients.kernels(line.omega, span);
-pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], duration: f64) -> f64 {
-        let kernels = coefficients.kernels(line.omega, duration);
         let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
         let Some(factor) = positive_factor(spectrum) else { return f64::INFINITY };
         let log_determinant = log_determinant(&factor);
@@ -127,14 +124,12 @@ pub(super) fn gradient(
     parameters: &Parameters,
     lines: &[PooledLines],
     span: Span,
-    duration: f64,
 ) -> Option<DVector<f64>> {
     let coefficients = Coefficients::new(parameters);
     let chunk = |chunk: &[PooledLines]| {
         let mut sums = GradientSums::zero(parameters);
         for line in chunk {
             let kernels = coefficients.kernels(line.omega, span);
-            let kernels = coefficients.kernels(line.omega, duration);
             let variances = noise(parameters, &line.terms);
             let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
             // Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹ for each of the lines.
@@ -237,7 +232,6 @@ pub(super) fn information(
     parameters: &Parameters,
     lines: &[PooledLines],
     span: Span,
-    duration: f64,
 ) -> Option<DMatrix<f64>> {
     let coefficients = Coefficients::new(parameters);
     let directions = directions(parameters);
@@ -246,7 +240,6 @@ pub(super) fn information(
         let mut sum = DMatrix::zeros(len, len);
         for line in chunk {
             let kernels = coefficients.kernels(line.omega, span);
-            let kernels = coefficients.kernels(line.omega, duration);
             let variances = noise(parameters, &line.terms);
             let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
             let task = LineInformation {

@@ -53,13 +53,6 @@ pub(super) const NOISE_TERMS: usize = 3;
 /// Number of neighbours on either side with whose force that of a mode may be correlated.
 pub(super) const CORRELATED_NEIGHBOURS: usize = 4;
 
-/// Gain of the logarithm of the likelihood by a step at which a search ends: it moves the parameters by less
-/// than a twentieth of their standard errors.
-/// Iterations of a search, and of one that only compares starts.
-pub(super) const ITERATIONS: usize = 60;
-pub(super) const SHORT_SEARCH: usize = 8;
-
-/// Gain of the logarithm of the likelihood predicted for the next step at which a search ends: it moves the
 /// Gain of the logarithm of the likelihood by a step at which a search ends: it moves the
 /// parameters by less than a twentieth of their standard errors.
 pub(super) const ENOUGH: f64 = 1e-3;

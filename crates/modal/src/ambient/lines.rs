@@ -19,8 +19,6 @@ pub(super) struct BandLines {
     pub scale: Vec<f64>,
     /// Time axis of the record.
     pub span: Span,
-    /// Length of the record, in s.
-    pub duration: f64,
 }
 
 /// Neighbouring lines with their mean periodogram.
@@ -44,7 +42,6 @@ impl BandLines {
     /// Distance of two lines, in rad/s.
     pub fn spacing(&self) -> f64 {
         std::f64::consts::TAU / self.span.duration
-        std::f64::consts::TAU / self.duration
     }
 
     /// Returns Chebyshev polynomials over the band at `omega`.

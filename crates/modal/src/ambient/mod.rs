@@ -110,14 +110,6 @@ pub fn identify_ambient(
     if let Some(asked) = settings.modes.filter(|asked| *asked > found) {
         return Err(AmbientError::FewerModes { asked, found, from_hz, to_hz });
     }
-    let scale = RecordScale { span: band.span, scale: &band.scale };
-    let scale = RecordScale {
-        duration: band.duration,
-        sample_interval: record.sampling().dt(),
-        scale: &band.scale,
-    };
-    let modes = modes_of(&fit, scale, &sinusoids)?;
-    let factor = fit.parameters.factor();
     let leakage_share = leakage_of(&fit, &band);
     let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
     let modes = modes_of(&fit, &sound, scale, &sinusoids)?;
@@ -167,9 +159,6 @@ fn modes_of(
     };
     let covariance = fit.covariance().ok_or(failed.clone())?;
     let spacing_hz = 1.0 / scale.span.duration;
-    let spacing_hz = 1.0 / scale.duration;
-    let mut modes = Vec::with_capacity(count);
-    for mode in 0..count {
     let mut modes = Vec::with_capacity(sound.len());
     for &mode in sound {
         let mut one = AmbientMode::new(fit, &covariance, mode, scale).ok_or(failed.clone())?;

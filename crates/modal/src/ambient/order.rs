@@ -10,8 +10,6 @@ use super::lines::BandLines;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
 use super::search::{Effort, Fit, search_pooled};
-use super::limits::{DAMPING_SIGNIFICANCE, ITERATIONS, MAX_DAMPING, REFUSALS};
-use super::search::{Fit, search_pooled};
 use crate::stabilisation::Pole;
 
 /// Number of modes wanted.
@@ -57,9 +55,6 @@ pub(super) fn choose(
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
         .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL));
-        .and_then(|start| search_pooled(start, band, ITERATIONS))
-        .map(|fit| choice.pruned(fit));
-    Chosen { fit: fit.filter(|fit| fit.parameters.layout.modes > 0), dropped: choice.dropped }
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }
@@ -158,7 +153,6 @@ impl Choice<'_> {
     fn without(&self, fit: &Fit, mode: usize) -> Option<Fit> {
         let rest: Vec<usize> = (0..fit.parameters.layout.modes).filter(|r| *r != mode).collect();
         search_pooled(fit.parameters.reordered(&rest), self.band, Effort::TEST)
-        search_pooled(fit.parameters.reordered(&rest), self.band, ITERATIONS)
     }
 
     /// Adds modes as long as the likelihood pays for them, and removes those that they replace.
@@ -178,8 +172,6 @@ impl Choice<'_> {
             let Some(candidate) = fresh else { break };
             // The gain that the scan promises is that of one direction at a rough pole.
             let promising = candidate.gain > 0.5 * self.price();
-            // A score of z raises 2 ln L by about z².
-            let promising = candidate.score.powi(2) > 0.5 * self.price();
             if !promising && self.wanted.exactly.is_none() {
                 break;
             }
@@ -219,8 +211,6 @@ impl Choice<'_> {
         match_amplitudes(&mut matched, &pooled, self.band.span, self.band.spacing());
         start.set_shape(added, &matched.shape(added));
         let next = search_pooled(start, self.band, Effort::TEST).ok_or(DropReason::NoMaximum)?;
-        match_amplitudes(&mut matched, &pooled, self.band.duration, self.band.spacing());
-        let next = search_pooled(start, self.band, ITERATIONS).ok_or(DropReason::NoMaximum)?;
         let (gain, needed) = (2.0 * (fit.cost - next.cost), self.price());
         if self.wanted.exactly.is_none() && gain < needed {
             return Err(DropReason::SmallGain { gain, needed });

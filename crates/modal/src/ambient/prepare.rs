@@ -74,7 +74,6 @@ pub(super) fn band_lines(
     let omega = kept.iter().map(|k| data.omega()[*k]).collect();
     let span = Span { duration, sample_interval };
     Ok(BandLines { omega, amplitudes, scale, span })
-    Ok(BandLines { omega, amplitudes, scale, duration })
 }
 
 fn check_copies(amplitudes: &DMatrix<Complex<f64>>) -> Result<(), AmbientError> {

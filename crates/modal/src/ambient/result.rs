@@ -5,7 +5,6 @@ use nalgebra::{Complex, DMatrix};
 use super::harmonics::Harmonic;
 use super::limits::{MAX_LEAKAGE, MIN_DECAY_TIMES};
 use super::parameters::{Parameters, Span};
-use super::parameters::Parameters;
 use super::search::Fit;
 use crate::indicators::{Indicator, ShapeWithCovariance, mpc_with_error};
 use crate::stabilisation::Stabilisation;
@@ -180,7 +179,6 @@ impl AmbientMode {
         let parameters = &fit.parameters;
         let (omega, zeta) = (parameters.omega(mode), parameters.zeta(mode));
         let decay_times = zeta * omega * record.span.duration;
-        let decay_times = zeta * omega * record.duration;
         let layout = &parameters.layout;
         let relative = |index: usize| covariance[(index, index)].max(0.0).sqrt();
         let frequency_hz = omega / std::f64::consts::TAU;
@@ -201,7 +199,6 @@ impl AmbientMode {
                 record.leakage_share,
             ),
             force_power: 2.0 * record.span.sample_interval * largest * largest,
-            force_power: 2.0 * record.sample_interval * largest * largest,
             mpc: mpc_with_error(&shape),
             shape,
             decay_times,
@@ -214,8 +211,6 @@ impl AmbientMode {
 #[derive(Clone, Copy)]
 pub(super) struct RecordScale<'a> {
     pub span: Span,
-    pub duration: f64,
-    pub sample_interval: f64,
     /// Unit of each output of the fit.
     pub scale: &'a [f64],
     /// Mean part of the power of a line that is leakage.

@@ -6,7 +6,6 @@ use super::likelihood::{cost, gradient, information};
 use super::limits::{ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
-use super::parameters::Parameters;
 
 /// Damping of the first step, and factors by which a refused and a successful step change it.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -115,39 +114,6 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     let first =
         search(start.clone(), &band.pooled(&start.poles(), POOLING, terms), band.span, effort)?;
     let pooled = band.pooled(&first.parameters.poles(), POOLING, terms);
-    search(first.parameters, &pooled, band.span, effort)
-    duration: f64,
-    iterations: usize,
-    let mut parameters = start;
-    let mut value = cost(&parameters, lines, duration);
-    if !value.is_finite() {
-    let mut damping = FIRST_DAMPING;
-    let mut matrix = information(&parameters, lines, duration)?;
-    for _ in 0..iterations {
-        let slope = gradient(&parameters, lines, duration)?;
-        let mut improved = false;
-        let mut enough = false;
-        for _ in 0..TRIALS {
-            let Some(step) = damped_step(&matrix, &slope, damping) else {
-                damping *= HARDER;
-                continue;
-            };
-            enough = 0.5 * -step.dot(&slope) < ENOUGH;
-            let candidate = moved(&parameters, &step);
-            let next = cost(&candidate, lines, duration);
-            if next < value {
-                (parameters, value, improved) = (candidate, next, true);
-                damping *= EASIER;
-            if enough {
-            damping *= HARDER;
-        if improved {
-            matrix = information(&parameters, lines, duration)?;
-        if enough || !improved {
-    Some(Fit { parameters, cost: value, information: matrix })
-pub(super) fn search_pooled(start: Parameters, band: &BandLines, iterations: usize) -> Option<Fit> {
-    let first =
-        search(start.clone(), &band.pooled(&start.poles(), terms), band.duration, iterations)?;
-    search(first.parameters, &pooled, band.duration, iterations)
     let mut fit = search(first.parameters, &pooled, band.span, effort)?;
     // Fits are compared on the same lines, however each was pooled.
     fit.cost = cost(&fit.parameters, &band.pooled(&[], 0.0, terms), band.span);

@@ -18,8 +18,6 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::parameters::{Kernel, Parameters, Span};
-//! The second term of k is the leakage of the open record; D is the value of H at high frequency.
-use super::parameters::{Kernel, Parameters};
 
 /// Step of central differences of the coefficients, relative to parameters of unit scale.
 const DIFFERENCE_STEP: f64 = 1e-5;
@@ -69,7 +67,6 @@ impl Coefficients {
         let kernel = parameters.kernel;
         let direct = match kernel {
             Kernel::Static | Kernel::Sampled => DMatrix::zeros(outputs, modes),
-            Kernel::Static => DMatrix::zeros(outputs, modes),
             Kernel::Vanishing => {
                 DMatrix::from_fn(outputs, modes, |i, r| 2.0 * (shapes[(i, r)] / poles[r]).re)
             }
@@ -97,7 +94,6 @@ impl Coefficients {
             let proper = -(self.poles[r] + pole).inv();
             match self.kernel {
                 Kernel::Static | Kernel::Sampled => proper,
-                Kernel::Static => proper,
                 Kernel::Vanishing => proper + pole.inv(),
             }
         };
@@ -121,13 +117,6 @@ impl Coefficients {
             };
             let decay = (pole * span.duration).exp();
             let lost = (Complex::from(1.0) - decay) / span.duration;
-    pub fn kernels(&self, omega: f64, duration: f64) -> Kernels {
-            let inverse = (s - pole).inv();
-            let decay = (pole * duration).exp();
-            let lost = (Complex::from(1.0) - decay) / duration;
-            let square = inverse * inverse;
-            let value = inverse - lost * square;
-            (value, square - lost * square * inverse * 2.0 + decay * square)
             let leakage = lost * square;
             let value = inverse - leakage;
             (value, square - leakage * inverse * 2.0 + decay * square)
@@ -186,7 +175,6 @@ impl Coefficients {
                 let mut x = directions.column_mut(2 * s + part);
                 let gain = match self.kernel {
                     Kernel::Static | Kernel::Sampled => 0.0,
-                    Kernel::Static => 0.0,
                     Kernel::Vanishing => 2.0 * (unit / self.poles[s]).re,
                 };
                 for i in 0..outputs {

@@ -7,7 +7,6 @@ use rand_chacha::ChaCha8Rng;
 use super::likelihood::{cost, gradient, information, noise};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
-use super::parameters::{Kernel, Layout, Parameters};
 use super::spectrum::Coefficients;
 
 const DURATION: f64 = 60.0;
@@ -36,7 +35,6 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
     let amplitudes = DMatrix::zeros(omega.len(), parameters.layout.outputs);
     let scale = vec![1.0; parameters.layout.outputs];
     let band = BandLines { omega, amplitudes, scale, span: SPAN };
-    let band = BandLines { omega, amplitudes, scale, duration: DURATION };
     let coefficients = Coefficients::new(parameters);
     let mut pooled = band.pooled(&[], 0.1, 3);
     pooled = (0..360)
@@ -45,7 +43,6 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
     for line in &mut pooled {
         line.terms = band.noise_terms(line.omega, 3);
         let kernels = coefficients.kernels(line.omega, SPAN);
-        let kernels = coefficients.kernels(line.omega, DURATION);
         let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
         line.periodogram = spectrum * Complex::from(factor);
     }
@@ -58,15 +55,12 @@ fn gradients_are_the_differences_of_the_cost() {
         let parameters = parameters(kernel, 3);
         let lines = expected_lines(&parameters, 1.3);
         let exact = gradient(&parameters, &lines, SPAN).unwrap();
-    for kernel in [Kernel::Static, Kernel::Vanishing] {
-        let exact = gradient(&parameters, &lines, DURATION).unwrap();
         let size = exact.amax();
         for index in 0..parameters.layout.len() {
             let side = |sign: f64| {
                 let mut moved = parameters.clone();
                 moved.values[index] += sign * 1e-5;
                 cost(&moved, &lines, SPAN)
-                cost(&moved, &lines, DURATION)
             };
             let difference = (side(1.0) - side(-1.0)) / 2e-5;
             let gap = (difference - exact[index]).abs();
@@ -83,15 +77,12 @@ fn the_information_is_the_curvature_at_the_expectation() {
         let parameters = parameters(kernel, 2);
         let lines = expected_lines(&parameters, 1.0);
         let exact = information(&parameters, &lines, SPAN).unwrap();
-    for kernel in [Kernel::Static, Kernel::Vanishing] {
-        let exact = information(&parameters, &lines, DURATION).unwrap();
         let scale = exact.diagonal().map(|d| d.sqrt());
         for index in 0..parameters.layout.len() {
             let side = |sign: f64| {
                 let mut moved = parameters.clone();
                 moved.values[index] += sign * 1e-5;
                 gradient(&moved, &lines, SPAN).unwrap()
-                gradient(&moved, &lines, DURATION).unwrap()
             };
             let difference = (side(1.0) - side(-1.0)) / 2e-5;
             for other in 0..parameters.layout.len() {
@@ -150,7 +141,6 @@ fn the_expected_periodogram_is_the_sum_of_the_covariances() {
     for (sum, line) in sums.iter().zip(duration_lines) {
         let omega = std::f64::consts::TAU * f64::from(line) / DURATION;
         let kernels = coefficients.kernels(omega, SPAN);
-        let kernels = coefficients.kernels(omega, DURATION);
         let spectrum = coefficients.spectrum(&kernels, &[0.0; 2]);
         let gap = (sum - &spectrum).norm() / spectrum.norm();
         assert!(gap < 1e-4, "line {line}: {gap:.1e}");

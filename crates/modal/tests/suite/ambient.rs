@@ -8,8 +8,6 @@ use mechid_modal::ambient::{
 };
 use mechid_modal::indicators::mac;
 use mechid_signal::{Record, Sampling};
-    AmbientError, AmbientEstimate, AmbientSettings, Uncertainty, identify_ambient,
-use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, dmatrix};
 
 use crate::ambient_generator::{Quantity, Structure};
