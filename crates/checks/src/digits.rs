@@ -20,6 +20,16 @@ pub(crate) fn three_digits(value: f64) -> String {
     message::number(format!("{value:.2e}").parse().unwrap_or(value)).to_string()
 }
 
+/// Returns a number with at most six significant digits, without zeros at its end.
+pub(crate) fn up_to_six_digits(value: f64) -> String {
+    let text = six_digits(value);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
+}
+
 /// Returns a number with six significant digits.
 pub(crate) fn six_digits(value: f64) -> String {
     let exponent = value.abs().log10().floor();

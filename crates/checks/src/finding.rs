@@ -87,6 +87,10 @@ findings! {
     Coherence in coherence,
     /// Width of the narrowest resonance, in lines of the segments that were averaged.
     Leakage in leakage,
+    /// Text in the header of a column that may be a unit.
+    Unit in unit,
+    /// Time column without a unit whose numbers are hardly seconds.
+    TimeUnit in unit,
     /// A channel was cut off by an amplifier or a converter.
     Clipping in clipping,
     /// A channel has the same value in all samples.

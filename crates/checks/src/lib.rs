@@ -57,6 +57,7 @@ mod spectral_residual;
 mod spike;
 mod symmetry;
 mod unequal_periods;
+mod unit;
 mod unmeasured_force;
 mod weighted_fit;
 mod whiteness;
@@ -108,6 +109,7 @@ pub use spectral_residual::SpectralResidual;
 pub use spike::{Spike, spiked_channels};
 pub use symmetry::{MassSymmetry, mass_symmetry};
 pub use unequal_periods::UnequalPeriods;
+pub use unit::{TimeUnit, Unit};
 pub use unmeasured_force::UnmeasuredForce;
 pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
 pub use whiteness::{NoiseSpan, Residual, Whiteness};
@@ -155,6 +157,8 @@ impl fmt::Display for Verdict {
 pub enum Subject {
     /// Excitation of enough lines for the unknowns.
     Excitation,
+    /// Units of the columns.
+    Unit,
     /// Conditioning of the regressors.
     Conditioning,
     /// Channels that are clipped, constant, coarsely quantised, or hold a spike.
@@ -195,6 +199,7 @@ impl fmt::Display for Subject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Subject::Excitation => "excitation",
+            Subject::Unit => "unit",
             Subject::Conditioning => "conditioning",
             Subject::Range => "range",
             Subject::Kinematics => "kinematics",

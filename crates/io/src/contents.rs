@@ -2,9 +2,7 @@
 
 use std::fmt;
 
-use crate::IoError;
 use crate::limits::{Limit, Limits};
-use crate::limits::Limit;
 use crate::{IoError, Quantity, Unit};
 
 /// Position in a file, counted from 1.

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use mechid::estimate::EstimateError;
-use mechid::io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid::io::{AveragedSegments, CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid::{IdentifyResponses, ResponseQuantity};
 use nalgebra::Complex;

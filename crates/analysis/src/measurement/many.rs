@@ -67,11 +67,9 @@ pub(crate) fn open_all(
     let tables = file.tables(Some(&wanted), records)?.into_iter().zip(records);
     let opened = tables.map(|(table, record)| {
         let reading = Reading { record_id: Some(record.id.clone()), ..reading.clone() };
-        let record = RecordFile::of_table(table).with_memory(file.memory());
+        let mut record = RecordFile::of_table(table).with_memory(file.memory());
+        reading.state_units(&mut record)?;
         Measurement::of_file(record, Some(path), channels, &reading)
-        let mut file = RecordFile::of_table(table);
-        reading.state_units(&mut file)?;
-        Measurement::of_file(file, Some(path), channels, &reading)
     });
     Ok(opened.collect())
 }

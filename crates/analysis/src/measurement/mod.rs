@@ -10,9 +10,8 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_io::{Limits, RecordFile, Unit};
-use mechid_estimate::checks::Finding;
-use mechid_io::{RecordFile, name_without_unit, stated_unit};
+use mechid_checks::Finding;
+use mechid_io::{Limits, RecordFile, name_without_unit, stated_unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;

@@ -1,6 +1,6 @@
 //! Conversion of columns to SI units, and time axes in a doubtful unit.
 
-use mechid_estimate::checks::Finding;
+use mechid_checks::{Finding, TimeUnit};
 use mechid_io::{Evidence, Quantity, StatedUnit, Table, TimeAxis, escaped};
 use mechid_signal::{Sampling, message, quantisation_step};
 
@@ -87,12 +87,14 @@ impl ToSi {
 /// Returns the finding about a text that may be a unit, if there is a doubt.
 pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Option<Finding> {
     let unit = stated.unit.as_ref().filter(|unit| unit.quantity == wanted);
-    (stated.evidence != Evidence::Stated).then(|| Finding::Unit {
-        column: column.into(),
-        text: escaped(&stated.text).to_string(),
-        factor: unit.map(|unit| unit.in_si),
-        used: stated.evidence == Evidence::Likely,
-        si: wanted.si(),
+    (stated.evidence != Evidence::Stated).then(|| {
+        Finding::Unit(mechid_checks::Unit {
+            column: column.into(),
+            text: escaped(&stated.text).to_string(),
+            factor: unit.map(|unit| unit.in_si),
+            used: stated.evidence == Evidence::Likely,
+            si: wanted.si(),
+        })
     })
 }
 
@@ -162,7 +164,7 @@ pub(crate) fn doubtful_time(
     }
     let (unit, factor) = if is_slow { ("ms", 1e-3) } else { ("days", DAY_S) };
     let column = table.label(column);
-    Some(Finding::TimeUnit { column, rate_hz, duration_s, unit, factor })
+    Some(Finding::TimeUnit(TimeUnit { column, rate_hz, duration_s, unit, factor }))
 }
 
 /// Error of a sampling rate by the digits of its time column, relative to the rate, from which frequencies may be known

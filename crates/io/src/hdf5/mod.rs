@@ -14,7 +14,7 @@ use hdf5_pure::{File, Group};
 use self::attributes::Attributes;
 use crate::IoError;
 use crate::contents::{Axis, Column, Contents, Fault, Place};
-use crate::limits::{Budget, Limit, Limits};
+use crate::limits::{Budget, Limits};
 use crate::stated_rates::{step, with_own_times, with_stated_rates};
 
 /// Largest depth of groups in groups; deeper ones are refused as forged, as cycles of links are.
@@ -32,7 +32,7 @@ const MIN_BYTES: u64 = 4096;
 /// Reads the data sets of a file as columns.
 pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
     let is_matlab = bytes.starts_with(b"MATLAB");
-    let budget = Budget::new(limits);
+    let budget = Budget::new(limits, bytes.len());
     // The crate is young: a panic in it is a file that it does not read.
     let read = catch_unwind(AssertUnwindSafe(|| Reader::read(bytes, is_matlab, budget)));
     let read = read.unwrap_or_else(|_| Err(Fault::new(0, "its structure is damaged")));
@@ -182,9 +182,9 @@ fn take_numbers(count: u64, bytes_each: u64, len: u64, budget: &mut Budget) -> R
             format!("a data set of {bytes} bytes in a file of {len}, which cannot hold as many");
         return Err(Fault::new(0, what));
     }
-    let unpacked = budget.unpacked_bytes();
+    let (unpacked, limit) = budget.unpacked_bytes();
     if bytes > unpacked as u64 {
-        return Err(Fault::too_large(0, Limit::UnpackedBytes(unpacked)));
+        return Err(Fault::too_large(0, limit));
     }
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     budget.take_numbers(count).map_err(|limit| Fault::too_large(0, limit))

@@ -20,8 +20,6 @@ use self::element::{COMPRESSED, Elements, Endian, MATRIX};
 use crate::IoError;
 use crate::contents::{Column, Contents, Fault, Place};
 use crate::limits::{Budget, Limit};
-use crate::stated_rates::with_stated_rates;
-use crate::limits::{Budget, Limit, Limits};
 use crate::stated_rates::{with_own_times, with_stated_rates};
 
 /// Number of bytes before the first variable.

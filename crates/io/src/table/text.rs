@@ -50,7 +50,6 @@ impl<'a> TextReader<'a> {
         wanted: Wanted,
     ) -> Result<Self, IoError> {
         let stored = source.stored.clone();
-        let blocks = Blocks::open(source, options)?;
         let mut blocks = Blocks::open(source, options)?;
         let lvm = blocks.take_lvm();
         let (start, terminator) = (blocks.start(), blocks.terminator());
@@ -61,8 +60,8 @@ impl<'a> TextReader<'a> {
         let table = preamble::table(start, terminator)
             .map(|t| Beginning { line: blocks.first_line() - 1 + t.line, ..t });
         let file = blocks.file().to_owned();
-        let rows = Rows::new(file, layout, (options.limits, stored), decimal, wanted.columns);
-        let rows = Rows::new(file, layout, options.limits, decimal, wanted.columns).with_lvm(lvm);
+        let rows = Rows::new(file, layout, (options.limits, stored), decimal, wanted.columns)
+            .with_lvm(lvm);
         Ok(Self { layout, table, blocks, rows })
     }
 

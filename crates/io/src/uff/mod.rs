@@ -16,11 +16,8 @@ mod write;
 use std::collections::BTreeMap;
 
 use self::lines::{Line, Lines, is_mark, number};
-use crate::IoError;
-use crate::contents::{Contents, Fault, Place};
-use crate::limits::Budget;
 use crate::contents::{Column, Contents, Fault, Override, Place};
-use crate::limits::{Budget, Limits};
+use crate::limits::Budget;
 use crate::units::ResponseUnit;
 use crate::{IoError, Quantity, Unit};
 

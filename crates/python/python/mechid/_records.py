@@ -41,13 +41,18 @@ Names: TypeAlias = str | Sequence[str]
 """Columns, one per degree of freedom: names separated by commas, or a sequence of names."""
 
 _KINDS = ("force", "displacement", "velocity", "acceleration")
-_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id", "memory_gb")
+_OF_FILES = (
+    "time",
+    "skip_lines",
+    "detrend",
+    "record_column",
+    "record_id",
+    "unit",
+    "scale",
+    "memory_gb",
+)
 _NAME_BYTES = 4096
 """Longest name of a column or record, in bytes."""
-
-_UNEVEN = 1e-3
-"""Largest deviation of a step between instants from their mean, as a part of it."""
-_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id", "unit", "scale")
 
 
 class Window(TypedDict, total=False):
@@ -68,16 +73,13 @@ class RecordOptions(Window, total=False):
 
     ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table, or
     arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is the
-    sampling rate in Hz, which arrays and tables need. Of files: ``time`` names the time column,
+    sampling rate in Hz, which arrays need, and tables without a column or an index of time. Of files and
+    tables: ``time`` names the time column, ``unit`` states units of columns (``{"acc": "g"}``) and
+    ``scale`` factors that take columns to SI units, whatever their names say. Of files:
     ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
     channel, ``record_column`` names the column that tells the records of a Parquet file apart,
     ``record_id`` the record by its value there, and ``memory_gb`` is the memory in GB that the numbers
     and the work on them may take.
-    sampling rate in Hz, which arrays need, and tables without a column or an index of time. Of files and
-    tables: ``time`` names the time column, ``unit`` states units of columns (``{"acc": "g"}``) and
-    ``scale`` factors that take columns to SI units, whatever their names say. Of files: ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
-    channel, ``record_column`` names the column that tells the records of a Parquet file apart, and
-    ``record_id`` the record by its value there.
     """
 
     force: Names | ArrayLike
@@ -167,8 +169,9 @@ class Measurement:
         """
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         channels = {kind: _names(kind, given) for kind, given in columns.items()}
-        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
-        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, unit, scale)
+        reading = reading_of(
+            fs, time, skip_lines, detrend, record_column, record_id, memory_gb, unit, scale
+        )
         plan = plan_of(path, channels, reading, window)
         return cls(_mechid.Measurement.open(json.dumps(plan)))
 
@@ -265,13 +268,12 @@ class Measurement:
         channels: dict[str, list[str]] = {}
         columns: list[tuple[str, NDArray[np.float64]]] = []
         given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
-        source = _Sep5(table) if isinstance(table, Sequence) else None
-        used = [name for names in given.values() for name in _names("columns", names) if name != "0"]
-        if source is None:
-            _same_labels((name, _column(table, name)) for name in used)
-        else:
-            source.check_starts(used)
         source = _Sep5(table) if isinstance(table, Sequence) else _Frame(table, unit, scale)
+        used = [name for names in given.values() for name in _names("columns", names) if name != "0"]
+        if isinstance(source, _Sep5):
+            source.check_starts(used)
+        else:
+            _same_labels((name, source[name]) for name in used)
         for kind, names in given.items():
             channels[kind] = []
             for column in _names(kind, names):
@@ -430,32 +432,21 @@ class _Sep5:
                     f"the channels begin at different instants ({field}: {told}): cut them to the same one"
                 )
 
-    def fs(self, given: Mapping[str, Names]) -> float:
+    def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
         names = [name for kind, names in given.items() for name in _names(kind, names)]
-        rates = {name: self._rate(name) for name in names if name in self._channels}
-        if not rates:
+        used = [self._channels[name] for name in names if name in self._channels]
+        rates: set[float] = set()
+        for channel in used:
+            rate, instants = channel.get("fs"), channel.get("time")
+            if rate is not None:
+                rates.add(float(rate))  # type: ignore[arg-type]
+            elif instants is not None:
+                rates.add(_rate_of("time", instants))
+        if len(rates) > 1:
+            raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
+        if not used:
             raise TypeError("no column of the channels is named")
-        if len(set(rates.values())) != 1:
-            raise ValueError(
-                f"the channels have several sampling rates: {sorted(set(rates.values()))} Hz"
-            )
-        return next(iter(rates.values()))
-
-    def _rate(self, name: str) -> float:
-        channel = self._channels[name]
-        if channel.get("fs") is not None:
-            return _number("fs", channel["fs"])
-        time = channel.get("time")
-        if time is None:
-            raise TypeError(f"channel {name!r} has neither 'fs' nor 'time': give `fs`, in Hz")
-        instants = np.asarray(time, dtype=np.float64)
-        if instants.ndim != 1 or len(instants) < 2:
-            raise ValueError(f"'time' of channel {name!r} has fewer than two instants")
-        steps = np.diff(instants)
-        step = float(np.mean(steps))
-        if not step > 0 or np.abs(steps - step).max() > _UNEVEN * step:
-            raise ValueError(f"'time' of channel {name!r} has no even step: resample it")
-        return 1 / step
+        return rates.pop() if rates else None
 
 
 def _start(value: object) -> str | None:
@@ -491,21 +482,14 @@ def _labels(values: object) -> Any:
     if isinstance(indexes, Mapping) and isinstance(dims, tuple) and dims:
         return indexes.get(dims[0])
     return None
-    def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
-        used = [self._channels[name] for name in names if name in self._channels]
-        rates: set[float] = set()
-        for channel in used:
-            rate, instants = channel.get("fs"), channel.get("time")
-            if rate is not None:
-                rates.add(float(rate))  # type: ignore[arg-type]
-            elif instants is not None:
-                rates.add(_rate_of("time", instants))
-        if len(rates) > 1:
-            raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
-        return rates.pop() if rates else None
+
+
 _SI = {"force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+
+
 class _Frame:
     """A data frame, an xarray dataset or a mapping of arrays."""
+
     def __init__(
         self, table: Table, unit: Mapping[str, str] | None, scale: Mapping[str, float] | None
     ) -> None:
@@ -514,6 +498,7 @@ class _Frame:
         self._names = {str(name): name for name in table.keys()}  # type: ignore[attr-defined]
         self._unit = {self._find(name): text for name, text in (unit or {}).items()}
         self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
+
     def _find(self, wanted: str) -> str:
         if wanted in self._names:
             return wanted
@@ -524,12 +509,14 @@ class _Frame:
                 # What the table knows and its keys do not list, such as a coordinate.
                 self._table[wanted]
             except Exception:
-                raise _no_column(wanted, names) from None
+                raise no_column(wanted, names) from None
             return wanted
         return names[at]
+
     def __getitem__(self, wanted: str) -> ArrayLike:
         name = self._find(wanted)
         return self._table[self._names.get(name, name)]  # type: ignore[arg-type]
+
     def label(self, wanted: str, kind: str) -> tuple[str, float]:
         """Return the name of a column with its unit, and a factor for its numbers."""
         name = self._find(wanted)
@@ -539,6 +526,7 @@ class _Frame:
             return f"[{self._unit[name]}] {name}", 1.0
         unit = self._stated(name)
         return (f"{name} [{unit}]" if unit else name), 1.0
+
     def _stated(self, name: str) -> str | None:
         """Return the unit among the attributes of a column or of the table."""
         own = getattr(self[name], "attrs", None)
@@ -549,6 +537,7 @@ class _Frame:
         # The column of a data frame has the attributes of the whole.
         stated = own.get("units", own.get("unit")) if isinstance(own, Mapping) else None
         return stated if isinstance(stated, str) else None
+
     def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
         """Return the sampling rate by a time column, or by the index or coordinate of time."""
         if time is not None:
@@ -570,8 +559,13 @@ class _Frame:
         is_time = named is not None and _mechid.time_column([str(named)]) is not None
         if instants is not None and (instants.dtype.kind in "mMf" or is_time):
             return _rate_of(str(named) if is_time else "time", instants)
+        return None
+
+    def _rate(self, name: str) -> float:
         unit = self._unit.get(name) or self._stated(name)
         return _rate_of(f"[{unit}] {name}" if unit else name, self[name])
+
+
 def _rate_of(name: str, instants: object) -> float:
     """Return the sampling rate, in Hz, of numbers in the unit that the name states, or of dates."""
     array = np.asarray(instants)
@@ -901,15 +895,7 @@ def _names(kind: str, given: object) -> list[str]:
     raise TypeError(f"`{kind}` of a file or table is a name of a column, or several, got {given!r}")
 
 
-def _column(table: Table | Sequence[Mapping[str, object]], name: str) -> ArrayLike:
-    try:
-        return table[name]  # type: ignore[call-overload]
-    except KeyError:
-        raise no_column(name, table.keys()) from None  # type: ignore[union-attr]
-
-
 def no_column(name: str, known: object) -> Exception:
-def _no_column(name: str, known: object) -> Exception:
     from ._errors import MechidError
 
     available = ", ".join(str(column) for column in known)  # type: ignore[attr-defined]

@@ -12,7 +12,7 @@ use mechid_model::elements::{
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::RandomTest;
 use mechid_signal::{NoiseLevel, lines, noise};
-use mechid_spectra::{LineData, LineNoise, Transient};
+use mechid_spectra::{FrequencyData, LineData, LineNoise, NoiseSpectrum, Transient};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
 use super::generator::{complex_noise, random_phases, responses};

@@ -1,0 +1,104 @@
+//! Units in the headers of columns.
+
+use std::fmt::{self, Formatter};
+
+use mechid_signal::message;
+
+use super::digits::up_to_six_digits;
+use super::finding::{Check, Names};
+use super::{Subject, Verdict};
+
+/// Text in the header of a column that may be a unit.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Unit {
+    /// The column, in words.
+    pub column: String,
+    /// The text, as it is written.
+    pub text: String,
+    /// Factor that it makes or would make, in SI units per unit of the column; `None` if it is not
+    /// understood.
+    pub factor: Option<f64>,
+    /// Whether the numbers are multiplied by the factor.
+    pub used: bool,
+    /// SI unit in which the numbers are needed.
+    pub si: &'static str,
+}
+
+impl Check for Unit {
+    fn subject(&self) -> Subject {
+        Subject::Unit
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Doubtful
+    }
+
+    fn value(&self) -> f64 {
+        self.factor.unwrap_or(1.0)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { column, text, si, .. } = self;
+        write!(f, "\"{text}\" in the header of column {column} ")?;
+        match (self.factor.map(message::number), self.used) {
+            (Some(factor), true) => write!(
+                f,
+                "is read as a unit: the numbers are multiplied by {factor} to get {si}; if this is \
+                 wrong, state the unit (`unit`) or the factor (`scale`)"
+            ),
+            (Some(factor), false) => write!(
+                f,
+                "may be a unit with the factor {factor}, and the numbers are taken as {si} without it: \
+                 state the unit (`unit`) or the factor (`scale`)"
+            ),
+            (None, _) => write!(
+                f,
+                "is not understood, and the numbers are taken as {si}: state the unit (`unit`) or the \
+                 factor (`scale`)"
+            ),
+        }
+    }
+}
+
+/// Time column without a unit whose numbers are hardly seconds.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct TimeUnit {
+    /// The column, in words.
+    pub column: String,
+    /// Sampling rate of instants in seconds, in Hz.
+    pub rate_hz: f64,
+    /// Duration of the record in seconds, in s.
+    pub duration_s: f64,
+    /// Unit that may be meant.
+    pub unit: &'static str,
+    /// Size of that unit, in s.
+    pub factor: f64,
+}
+
+impl Check for TimeUnit {
+    fn subject(&self) -> Subject {
+        Subject::Unit
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Doubtful
+    }
+
+    fn value(&self) -> f64 {
+        self.rate_hz
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { column, rate_hz, duration_s, unit, factor } = self;
+        write!(
+            f,
+            "the time in column {column} has no unit and is taken as seconds: {} Hz, {} s long; in {unit} \
+             it would be {} Hz: state the unit (`unit`) or `sample_rate`",
+            up_to_six_digits(*rate_hz),
+            up_to_six_digits(*duration_s),
+            up_to_six_digits(rate_hz / factor),
+        )
+    }
+}
