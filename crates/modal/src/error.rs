@@ -9,6 +9,9 @@ pub enum ModalError {
     /// There is no output.
     #[error("no output is given: modes need at least one response")]
     NoOutput,
+    /// There is neither an input nor an open record.
+    #[error("no input and no open record: nothing excites the modes of this data")]
+    NoExcitation,
     /// The lines are fewer than the unknowns of one mode.
     #[error("the band has {lines} lines; one mode of this data needs at least {required}")]
     TooFewLines {

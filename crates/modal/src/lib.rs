@@ -1,4 +1,22 @@
-//! Modes of a structure from any set of sensors and any number of forces.
+//! Modes of a structure from any set of sensors and any number of forces, with intervals.
+//!
+//! [`identify_modes`] takes spectral lines ([`mechid_spectra::LineData`]) of one record or of several: open
+//! records with forces, hits with decays that are cut, free decays without forces, or a table of frequency
+//! responses (unit inputs, one record for each column). It fits the modal model by maximum likelihood, without
+//! a window and without averages.
+//!
+//! | Equation | File |
+//! |---|---|
+//! | kernels of forces and transients, residual powers | `model.rs` |
+//! | least squares of shapes and residual terms for all outputs | `projection.rs` |
+//! | projected Jacobian and normal equations | `normal.rs` |
+//! | damped steps of poles and participations | `search.rs` |
+//! | first poles (subspace method, clusters over orders) | `initial_poles.rs` |
+//! | first participations (free residues) | `residues.rs` |
+//! | sensor noise and unmeasured forces | `noise.rs`, `unmeasured.rs` |
+//! | covariance of poles, participations and shapes | `covariance.rs`, `scores.rs` |
+//! | number of modes: candidates, likelihood, rules | `order.rs`, `rules.rs` |
+//! | prediction of other records | `estimate.rs`, `synthesis.rs` |
 
 pub mod ambient;
 pub mod compare;

@@ -76,3 +76,6 @@ pub const DEAD_CHANNEL: f64 = 1e-26;
 pub const DEPENDENT_INPUTS: f64 = 1e-6;
 /// Half-widths within which two modes may share what they explain: only one of them is taken out at a time.
 pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
+/// Least noise of a sensor, relative to the root-mean-square of its output: what is below it is rounding, and
+/// data without noise would otherwise hold modes without end.
+pub const LEAST_NOISE: f64 = 1e-6;

@@ -120,6 +120,9 @@ impl Lines {
         if self.outputs.is_empty() {
             return Err(ModalError::NoOutput);
         }
+        if self.loads.is_empty() {
+            return Err(ModalError::NoExcitation);
+        }
         let required = 2 * (self.loads.len() + 2);
         if self.len() < required {
             return Err(ModalError::TooFewLines { lines: self.len(), required });

@@ -13,7 +13,7 @@ use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::dense::add_product;
-use crate::limits::{EXPECTATION_STEPS, MIN_NOISE_WINDOW, NOISE_WINDOW_SHARE};
+use crate::limits::{EXPECTATION_STEPS, LEAST_NOISE, MIN_NOISE_WINDOW, NOISE_WINDOW_SHARE};
 use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{Projection, Weights};
@@ -220,7 +220,12 @@ impl Residuals {
 
     fn smooth_power(&self, lines: &Lines, power: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let records = record_rows(lines);
-        power.into_par_iter().map(|power| smooth(&power, &records)).collect()
+        let outputs = power.into_par_iter().zip(&lines.outputs);
+        let of_output = |(power, output): (Vec<f64>, &Vec<C>)| {
+            let level = output.iter().map(|z| z.norm_sqr()).sum::<f64>() / output.len() as f64;
+            smooth(&power, &records, level * LEAST_NOISE * LEAST_NOISE)
+        };
+        outputs.map(of_output).collect()
     }
 }
 
@@ -248,11 +253,9 @@ fn reach(lines: usize) -> usize {
     ((lines as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW)
 }
 
-/// Moving mean within each record, with a window that shrinks at its ends.
-fn smooth(power: &[f64], records: &[Range<usize>]) -> Vec<f64> {
+/// Moving mean within each record, at least `floor`, with a window that shrinks at its ends.
+fn smooth(power: &[f64], records: &[Range<usize>], floor: f64) -> Vec<f64> {
     let mut mean = vec![0.0; power.len()];
-    let total = power.iter().sum::<f64>() / power.len().max(1) as f64;
-    let floor = total * 1e-12 + f64::MIN_POSITIVE;
     for rows in records {
         let (values, count) = (&power[rows.clone()], rows.len());
         let reach = reach(count);

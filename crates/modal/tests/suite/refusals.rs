@@ -53,12 +53,14 @@ fn noise_has_no_modes() {
 
 #[test]
 fn few_lines_and_no_outputs_are_refused() {
-    let one = |outputs: usize| {
+    let one = |inputs: usize, outputs: usize| {
         let values = DMatrix::from_element(3, outputs, C::new(1.0, 0.5));
-        LineData::new(vec![1.0, 2.0, 3.0], DMatrix::zeros(3, 0), values, Transient::None).unwrap()
+        let inputs = DMatrix::from_element(3, inputs, C::new(1.0, 0.0));
+        LineData::new(vec![1.0, 2.0, 3.0], inputs, values, Transient::None).unwrap()
     };
-    assert_eq!(refusal(&one(0)), ModalError::NoOutput);
-    assert!(matches!(refusal(&one(1)), ModalError::TooFewLines { lines: 3, .. }));
+    assert_eq!(refusal(&one(1, 0)), ModalError::NoOutput);
+    assert_eq!(refusal(&one(0, 1)), ModalError::NoExcitation);
+    assert!(matches!(refusal(&one(1, 1)), ModalError::TooFewLines { lines: 3, .. }));
 }
 
 #[test]
@@ -66,4 +68,30 @@ fn settings_out_of_range_are_refused() {
     let none = ModalSettings { modes: Some(0), ..ModalSettings::default() };
     let refused = identify_modes(&pair(8).lines(1), &none);
     assert!(matches!(refused, Err(ModalError::Setting { setting: "modes", .. })));
+}
+
+/// Short records of noise, of any numbers of channels: modes or a reason, but no panic.
+#[test]
+fn any_data_gives_modes_or_a_reason() {
+    let mut normal = Normal::new(11);
+    for (round, lines) in [1, 2, 7, 12, 20, 33, 50, 64].into_iter().enumerate() {
+        for (outputs, inputs) in [(1, 0), (1, 1), (3, 0), (2, 2), (9, 1)] {
+            let mut values = |columns: usize| {
+                DMatrix::from_fn(lines, columns, |_, _| C::new(normal.next(), normal.next()))
+            };
+            let omega = (0..lines).map(|k| 5.0 + 0.3 * k as f64).collect();
+            let transient = if round % 2 == 0 {
+                Transient::None
+            } else {
+                Transient::Open { sample_interval: 0.01 }
+            };
+            let data = LineData::new(omega, values(inputs), values(outputs), transient).unwrap();
+            for data in [data.clone(), data.clone().followed_by(&data).unwrap()] {
+                match identify_modes(&data, &ModalSettings { max_modes: 5, ..Default::default() }) {
+                    Ok(estimate) => assert!(!estimate.modes().is_empty()),
+                    Err(error) => assert!(!error.to_string().is_empty()),
+                }
+            }
+        }
+    }
 }

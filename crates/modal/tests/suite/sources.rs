@@ -83,3 +83,13 @@ fn the_rest_of_a_record_is_predicted() {
         assert!(share < 1.5e-3, "output {output}: {share}");
     }
 }
+
+#[test]
+fn data_without_noise_gives_the_truth() {
+    let case = Case { noise: 0.0, ..pair(8) };
+    let estimate = identify_modes(&case.table(1, 800), &ModalSettings::default()).unwrap();
+    assert_eq!(estimate.modes().len(), case.frequency_hz.len());
+    for (mode, pole) in estimate.modes().iter().zip(case.poles()) {
+        assert!((mode.pole - pole).norm() < 1e-6 * pole.norm(), "{} {pole}", mode.pole);
+    }
+}
