@@ -83,6 +83,34 @@ def ticks(page, figure):
     )
 
 
+def along(page, figure, value):
+    """Place of a value on the abscissa, from the outermost ticks."""
+    labels = page.run(
+        f"[...document.querySelectorAll('{figure} text[text-anchor=middle]')].map(t => {{ const b = t.getBoundingClientRect();"
+        " return [t.textContent, (b.left + b.right) / 2]; })"
+    )
+    known = [(float(text.replace("−", "-")), x) for text, x in labels if re.fullmatch(r"[−0-9.]+", text)]
+    (a, left), (b, right) = min(known), max(known)
+    return left + (value - a) / (b - a) * (right - left)
+
+
+def go_to(page, figure, hz, step):
+    """Move the cursor to a line, by the pointer near it and by the keys to the very line; return what it shows."""
+    left, top, right, bottom = box(page, figure)
+    page.mouse("mouseMoved", along(page, figure, hz), (top + bottom) / 2)
+    seen = " ".join(values(page, figure))
+    found = re.search(r"Frequency ([\d.]+) Hz", seen)
+    assert found and abs(float(found.group(1)) - hz) <= 5 * step, f"cursor near {hz} Hz shows {seen}"
+    steps = round((hz - float(found.group(1))) / step)
+    page.run(f"document.querySelector('{figure} svg').focus()")
+    for _ in range(abs(steps)):
+        name = "ArrowRight" if steps > 0 else "ArrowLeft"
+        page.call("Input.dispatchKeyEvent", type="keyDown", key=name)
+        page.call("Input.dispatchKeyEvent", type="keyUp", key=name)
+    page.settle()
+    return values(page, figure)
+
+
 def path(page, selector):
     return page.run(f"document.querySelector('{selector}').getAttribute('d')")
 
@@ -110,35 +138,9 @@ class Tests:
         page.everything()
         expected = json.loads((self.folder / "expected.json").read_text())
         for known in expected:
-            left, top, right, bottom = box(page, "figure")
-            scale = (right - left) / (256 * 1.0)
-            # The axis ends where the markers have room: from the ticks.
-            at = page.run(
-                "(() => { const t = [...document.querySelectorAll('figure text')].filter(t => t.textContent === '50' || t.textContent === '100');"
-                " const x = {}; t.forEach(e => { const b = e.getBoundingClientRect(); x[e.textContent] = (b.left + b.right) / 2; });"
-                " return x; })()"
-            )
-            if "50" in at and "100" in at:
-                scale = (at["100"] - at["50"]) / 50
-                x = at["100"] + (known["hz"] - 100) * scale
-            else:
-                self.check(False, f"no ticks 50 and 100: {ticks(page, 'figure')}")
-                continue
-            page.mouse("mouseMoved", x, (top + bottom) / 2)
-            seen = values(page, "figure")
-            hz = float(re.search(r"Frequency ([\d.]+) Hz", " ".join(seen)).group(1))
-            self.check(abs(hz - known["hz"]) <= 0.3, f"cursor at {known['hz']} Hz shows {seen}")
-            # With the keys to the very line.
-            steps = round((known["hz"] - hz) / 0.0625)
-            page.run("document.querySelector('figure svg').focus()")
-            for _ in range(abs(steps)):
-                name = "ArrowRight" if steps > 0 else "ArrowLeft"
-                page.call("Input.dispatchKeyEvent", type="keyDown", key=name)
-                page.call("Input.dispatchKeyEvent", type="keyUp", key=name)
-            page.settle()
-            seen = values(page, "figure")
+            seen = go_to(page, "figure", known["hz"], known["step"])
             self.check(any(row.startswith(f"Frequency {known['hz']:g} Hz") for row in seen), f"{seen}")
-            row = next((row for row in seen if "Accelerance, measured" in row), "")
+            row = next((row for row in seen if f"{known['quantity']}, measured" in row), "")
             number = re.search(r"measured ([-\d.e]+)", row)
             value = float(number.group(1)) if number else float("nan")
             # Six digits are shown.
@@ -185,16 +187,14 @@ class Tests:
         """Receptance is accelerance over (iω)²."""
         page = self.page("response")
         page.everything()
-        left, top, right, bottom = box(page, "figure")
         read = {}
+        known = json.loads((self.folder / "expected.json").read_text())[0]
         for order in (2, 0):
             page.run(f"(() => {{ const s = document.querySelectorAll('.tools select')[3]; s.value = {order}; s.onchange(); }})()")
             page.settle()
-            page.mouse("mouseMoved", left + 300, top + 50)
-            page.mouse("mouseMoved", left + 301, top + 50)
-            text = " ".join(values(page, "figure"))
-            hz = float(re.search(r"Frequency ([\d.e-]+) Hz", text).group(1))
+            text = " ".join(go_to(page, "figure", known["hz"], known["step"]))
             read[order] = float(re.search(r"measured ([-\d.e]+)", text).group(1))
+        hz = known["hz"]
         ratio = read[2] / read[0] / (2 * 3.141592653589793 * hz) ** 2
         self.check(abs(ratio - 1) < 2e-5, f"accelerance over receptance at {hz} Hz: {ratio}")
 

@@ -1,4 +1,4 @@
-//! Steps and drifts of a quantity over many records, by the ranks of its values.
+//! Steps and drifts of a quantity over many records: p-values by the ranks of its values.
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -100,14 +100,15 @@ pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
     levels
 }
 
-/// The step or drift that explains most of the ranks of some values, with the share of orders at random that would
-/// explain as much. Both have one size and one beginning, so that the larger share is the likelier.
+/// The step or drift that explains most of some values, with the share of orders at random whose ranks one would explain as
+/// well. Both have one size and one beginning, so that the larger share is the likelier.
 fn largest(values: &[f64]) -> Option<Change> {
     if values.len() < 2 * LEAST {
         return None;
     }
+    // Ranks show whether there is a change, but squeeze its ends; values without single outliers show where.
+    let (kind, begins, _) = best(&running_medians(values), LEAST)?;
     let ranks = ranks(values);
-    let (kind, begins, _) = best(&ranks, LEAST)?;
     let mut shuffled = means_of_neighbours(&ranks);
     let least = (LEAST * shuffled.len()).div_ceil(values.len()).max(1);
     let (_, _, explained) = best(&shuffled, least)?;
@@ -145,6 +146,17 @@ fn ranks(values: &[f64]) -> Vec<f64> {
         below += tied.len();
     }
     ranks
+}
+
+/// Medians of five neighbours, less their mean: a step stays where it is, one or two outliers are gone.
+fn running_medians(values: &[f64]) -> Vec<f64> {
+    let last = values.len() - 1;
+    let of_five = |k: usize| {
+        super::trends::median(values[k.saturating_sub(2)..=(k + 2).min(last)].to_vec())
+    };
+    let medians: Vec<f64> = (0..=last).map(of_five).collect();
+    let middle = medians.iter().sum::<f64>() / medians.len() as f64;
+    medians.into_iter().map(|value| value - middle).collect()
 }
 
 fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
