@@ -78,7 +78,7 @@ fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
     refused(home.path(), "info b.mat");
     let machine = r#"{"system": {"mass": 25, "damping": 188.5, "stiffness": 142122}}"#;
     fs::write(home.path().join("m.json"), machine).unwrap();
-    refused(home.path(), "predict b.mat --force v --system m.json --sample-rate 1000");
+    refused(home.path(), "predict m.json b.mat --force v --sample-rate 1000");
     let allowed = limited(home.path(), "info b.mat --memory-gb 1 --quiet");
     assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
 }
