@@ -254,7 +254,7 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
 
     /// Errors y − G u of every line and output over the outputs, root mean squares per output.
     pub(super) fn relative_errors(&self) -> Option<Vec<f64>> {
-        let (errors, _) = self.residual().errors(&self.minimum.parameters)?;
+        let errors = self.residual().errors(&self.minimum.parameters)?.errors;
         let norm = |of: &DMatrix<Complex<f64>>, at: usize| of.column(at).norm();
         let ratio = |at: usize| norm(&errors, at) / norm(self.data.outputs(), at);
         Some((0..errors.ncols()).map(ratio).collect())

@@ -47,6 +47,14 @@ pub(super) struct Linearisation {
     pub(super) jacobian: DMatrix<f64>,
 }
 
+/// What remains of the outputs at every line.
+pub(super) struct LineErrors {
+    /// y − G u − G_own − A τ, lines × p.
+    pub(super) errors: DMatrix<Complex<f64>>,
+    /// G of each line.
+    pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
+}
+
 /// Residual of the lines of one record.
 struct RecordResidual<L> {
     lines: Vec<(L, WeightedLine)>,
@@ -189,11 +197,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(Linearisation { residual, jacobian })
     }
 
-    /// y − G u − G_own − A τ at every line, lines × p, and G at every line.
-    pub(super) fn errors(
-        &self,
-        parameters: &[f64],
-    ) -> Option<(DMatrix<Complex<f64>>, Vec<DMatrix<Complex<f64>>>)> {
+    /// Errors and receptances of every line at `parameters`; `None` where the response does not exist.
+    pub(super) fn errors(&self, parameters: &[f64]) -> Option<LineErrors> {
         let p = self.outputs();
         let mut errors = DMatrix::zeros(self.data.len(), p);
         let mut receptances = Vec::with_capacity(self.data.len());
@@ -208,7 +213,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
                 receptances.push(line.receptance().clone());
             }
         }
-        Some((errors, receptances))
+        Some(LineErrors { errors, receptances })
     }
 }
 

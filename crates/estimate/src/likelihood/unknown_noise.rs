@@ -8,7 +8,7 @@ use super::LikelihoodError;
 use super::limits::{
     COLOURED_ROUNDS, LEAST_KEPT, LEAST_POWER, NOISE_LEVEL_CHANGE, NOISE_ROUNDS, STEPS,
 };
-use super::residual::{PriorRow, Residual};
+use super::residual::{LineErrors, PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum, minimise};
 use super::weights::Weights;
@@ -93,7 +93,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     fn levels(&self, weights: &Weights, minimum: &Minimum) -> Result<Vec<f64>, LikelihoodError> {
         let residual = self.residual(weights);
         let failed = LikelihoodError::NoResponse { at: "a minimum" };
-        let (errors, receptances) = residual.errors(&minimum.parameters).ok_or(failed)?;
+        let LineErrors { errors, receptances } =
+            residual.errors(&minimum.parameters).ok_or(failed)?;
         let factor = self.taken_up(minimum, &residual);
         let level = |output: usize| {
             let of_line = |row: usize| {
@@ -142,7 +143,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), LikelihoodError> {
         let residual = self.residual(&before.weights);
         let failed = || LikelihoodError::NoResponse { at: "a minimum" };
-        let (errors, receptances) =
+        let LineErrors { errors, receptances } =
             residual.errors(&before.minimum.parameters).ok_or_else(failed)?;
         let kept = self.kept(before).ok_or_else(failed)?;
         let power = DMatrix::from_fn(errors.nrows(), errors.ncols(), |row, output| {
