@@ -1,15 +1,15 @@
-//! Records of the Silverbox, a public benchmark that stands beside the project, not in it.
+//! Records of the Silverbox, a public benchmark that is not part of the project.
 //!
-//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear
-//! system identification", ECC 2013. An electronic circuit that obeys the equation of a mass on a
-//! spring that hardens; force and displacement in volts.
+//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear system
+//! identification", ECC 2013. An electronic circuit with the equation of a mass on a hardening
+//! spring; force and displacement in volts.
 
 use std::path::Path;
 
 use mechid_signal::{Record, Sampling};
 
 /// Force (first channel) and displacement (second) of a whole record, from two columns counted from
-/// 0; `None`, and a word on it, where the file is not.
+/// 0; `None`, with a message, without the file.
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn channels(file: &str, columns: [usize; 2]) -> Option<Record> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/silverbox");
@@ -46,7 +46,7 @@ pub fn start_of(realisation: usize) -> usize {
     8692 * realisation + 337
 }
 
-/// One channel of some samples.
+/// Returns one channel of some samples.
 pub fn part(record: &Record, channel: usize, start: usize, len: usize) -> Record {
     let window = record.window(start, len).unwrap();
     Record::from_channel(window.sampling(), window.channel(channel).to_vec()).unwrap()

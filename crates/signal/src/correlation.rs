@@ -14,8 +14,8 @@ pub struct Correlation {
     pub bound: f64,
     /// Sum of squared coefficients, each over its variance for noise; dimensionless.
     pub statistic: f64,
-    /// Probability that noise has a larger statistic. Below 0.01 or so the residual is hardly noise:
-    /// the model is incomplete.
+    /// Probability that noise has a larger statistic. Below 0.01 or so the residual is hardly
+    /// noise: the model is incomplete.
     pub p_value: f64,
 }
 
@@ -38,20 +38,19 @@ pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, SignalErr
     whiteness_beyond(residual, 0, lags)
 }
 
-/// Autocorrelation of a residual (one value per sample, any unit) at the lags `span + 1` … `span +
-/// lags`, where noise that is
-/// correlated over `span` lags and no more has none: the difference of two noisy samples that
-/// follow one another has a span of 1.
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags `span + 1` …
+/// `span + lags`. Noise that is correlated over at most `span` lags has none there: the difference
+/// of two successive noisy samples has a span of 1.
 ///
-/// The correlation within the span, taken from the residual itself, makes the coefficients beyond
-/// it scatter more, and together; the statistic is judged with that.
+/// The correlation within the span, estimated from the residual itself, increases the scatter of
+/// the coefficients beyond it and correlates them; the statistic accounts for this.
 ///
 /// # Errors
-/// As [`whiteness`], with `span` samples more.
+/// The errors of [`whiteness`], with `span` samples more.
 ///
 /// # Source
-/// Bartlett (1946), Supplement to the JRSS 8, 27–41, for the scatter of the coefficients; Box (1954),
-/// Annals of Mathematical Statistics 25, 290–302, for the distribution of their squares.
+/// Bartlett (1946), Supplement to the JRSS 8, 27–41, for the scatter of the coefficients; Box
+/// (1954), Annals of Mathematical Statistics 25, 290–302, for the distribution of their squares.
 pub fn whiteness_beyond(
     residual: &[f64],
     span: usize,
@@ -73,11 +72,11 @@ pub fn whiteness_beyond(
 /// `lags`, in that order; at a positive lag the input comes first. With negative lags it shows
 /// feedback from output to input.
 ///
-/// The statistic takes the residual as white, the input as it is: coefficients of a coloured input
-/// go together.
+/// The statistic assumes a white residual and allows for a coloured input, whose coefficients are
+/// correlated.
 ///
 /// # Errors
-/// As [`whiteness`], and [`SignalError::PairLength`] if the two differ in length.
+/// The errors of [`whiteness`], and [`SignalError::PairLength`] if the two differ in length.
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), section 16.6; Box (1954),
@@ -90,15 +89,15 @@ pub fn cross_correlation(
     cross_correlation_of_coloured(residual, input, lags, &[1.0])
 }
 
-/// Returns the correlation with an input of a residual that is correlated itself: `colour` has its coefficients
-/// at the lags 0, 1 … as far as they count.
-/// Residual and input have one value per sample, in any units; coefficients are pure numbers.
+/// Returns the correlation with an input of a residual that is correlated itself: `colour` has its
+/// coefficients at the lags 0, 1 …, up to the last significant one. Residual and input have one
+/// value per sample, in any units; coefficients are pure numbers.
 ///
 /// # Errors
-/// As [`cross_correlation`].
+/// The errors of [`cross_correlation`].
 ///
 /// # Source
-/// As [`cross_correlation`].
+/// The source of [`cross_correlation`].
 pub fn cross_correlation_of_coloured(
     residual: &[f64],
     input: &[f64],
@@ -118,14 +117,14 @@ pub fn cross_correlation_of_coloured(
     let covariance = correlated(colour, &input, coefficients.len());
     let weight = |at: usize| count * count / (count - at.abs_diff(lags) as f64);
     let squares = coefficients.iter().enumerate().map(|(at, c)| c * c * weight(at));
-    // The input is given: the coefficients are normal numbers.
+    // The input is fixed: the coefficients are normal numbers.
     Ok(Correlation::tested(squares.sum(), &covariance, 0.0, coefficients, count))
 }
 
 impl Correlation {
-    /// Test of a sum of squares of coefficients whose covariance, times the number of samples, depends
-    /// on the lag between them alone: `covariance` at the lags 0, 1 …; half of the variance of the sum is
-    /// `shared` more than that of normal numbers.
+    /// Tests a sum of squares of coefficients whose covariance, times the number of samples,
+    /// depends only on their distance in lags: `covariance` at the lags 0, 1 …; half of the
+    /// variance of the sum exceeds that for normal numbers by `shared`.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -141,11 +140,11 @@ impl Correlation {
     }
 }
 
-/// Probability that the sum of squares of `terms` normal numbers of mean zero is above `sum`, where
-/// the covariance of two depends on their distance alone: `covariance` at 0, 1 …, zero beyond; `shared` as
-/// for [`Correlation::tested`].
+/// Returns the probability that the sum of squares of `terms` normal numbers of mean zero exceeds
+/// `sum`. Their covariance depends only on their distance: `covariance` at 0, 1 …, zero beyond;
+/// `shared` as for [`Correlation::tested`].
 ///
-/// The sum has nearly the distribution of g χ²(h) with its own mean and variance.
+/// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     let squares = covariance.iter().enumerate().take(terms).map(|(distance, c)| {
         let pairs = if distance == 0 { terms } else { 2 * (terms - distance) };
@@ -154,8 +153,8 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     share_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
 }
 
-/// Returns the probability that a sum of squares of normal numbers is above `sum`, where their covariance has
-/// the trace `mean` and its square the trace `square`.
+/// Returns the probability that a sum of squares of normal numbers is above `sum`, where their
+/// covariance has the trace `mean` and its square the trace `square`.
 ///
 /// # Source
 /// Box (1954), Annals of Mathematical Statistics 25, 290–302.
@@ -164,7 +163,7 @@ pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {
         Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
-        // Nothing scatters.
+        // Numbers without variance exceed no sum.
         _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
 }
@@ -190,8 +189,7 @@ pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     (0..=lags).map(at).collect()
 }
 
-/// Returns values less their mean, in units of a power of two.
-/// One value per sample.
+/// Returns values minus their mean, in units of a power of two. One value per sample.
 ///
 /// # Errors
 /// [`SignalError::TooShort`] unless there are `lags + span + 2` values, [`SignalError::NotFinite`].
@@ -207,7 +205,7 @@ pub fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, Sig
         return Err(SignalError::NotFinite { sample, channel: 0, value: values[sample] });
     }
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    // In units of a power of two, which changes no coefficient: fourth powers stay finite.
+    // A power of two as the unit changes no coefficient: fourth powers stay finite.
     let unit = power_of_two(peak(values));
     Ok(values.iter().map(|v| (v - mean) / unit).collect())
 }
