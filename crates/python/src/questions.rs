@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mechid::analysis::sweep::{SweepSettings, sweep_record};
 use mechid::analysis::{InspectSettings, RecordPlan};
-use mechid::{DecaySettings, FrfSettings};
+use mechid::{DecaySettings, FrfSettings, ModesSettings};
 use pyo3::prelude::*;
 
 use crate::answer::Answer;
@@ -42,6 +42,21 @@ pub fn decay(
     let how: DecaySettings = failure::settings(py, settings)?;
     let record = record.0.clone();
     work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::of)
+}
+
+/// Finds the modes of a test with forces, or of an ambient record; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (records, settings, threads))]
+pub fn modes(
+    py: Python<'_>,
+    records: Vec<PyRef<'_, Measurement>>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: ModesSettings = failure::settings(py, settings)?;
+    let records: Vec<mechid::Measurement> = records.iter().map(|record| record.0.clone()).collect();
+    let find = move || mechid::modes(&records, &how);
+    work::watched(py, threads, || Ok(()), find).map(Answer::of)
 }
 
 /// Inspects the file of a saved plan; plan and settings are JSON.

@@ -130,10 +130,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .collect();
     let diagram = ("Stabilisation".to_owned(), stabilisation("", &poles, (&hz, &sum)));
     fs::write(folder.join("shapes.html"), figure_page("Frame", vec![diagram], Some(&frame()?))?)?;
-    let expected = [
-        known(1599),
-        known(127),
-    ];
+    let expected = [known(1599), known(127)];
     fs::write(folder.join("expected.json"), serde_json::to_string(&expected)?)?;
     Ok(())
 }

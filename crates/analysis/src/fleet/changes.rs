@@ -151,9 +151,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 /// Medians of five neighbours, less their mean: a step stays where it is, one or two outliers are gone.
 fn running_medians(values: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
-    let of_five = |k: usize| {
-        super::trends::median(values[k.saturating_sub(2)..=(k + 2).min(last)].to_vec())
-    };
+    let of_five =
+        |k: usize| super::trends::median(values[k.saturating_sub(2)..=(k + 2).min(last)].to_vec());
     let medians: Vec<f64> = (0..=last).map(of_five).collect();
     let middle = medians.iter().sum::<f64>() / medians.len() as f64;
     medians.into_iter().map(|value| value - middle).collect()

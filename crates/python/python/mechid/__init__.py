@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ._doors import identify_responses as identify_responses
     from ._doors import inspect as inspect
     from ._doors import integrate as integrate
+    from ._doors import modes as modes
     from ._doors import multisine as multisine
     from ._doors import predict as predict
     from ._doors import reconstruct as reconstruct
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from ._results import Inspected as Inspected
     from ._results import Machine as Machine
     from ._results import Mode as Mode
+    from ._results import Modes as Modes
     from ._results import Multisine as Multisine
     from ._results import Parameter as Parameter
     from ._results import Predicted as Predicted
@@ -62,6 +64,7 @@ _HOMES = {
     "identify_responses": "_doors",
     "inspect": "_doors",
     "integrate": "_doors",
+    "modes": "_doors",
     "multisine": "_doors",
     "predict": "_doors",
     "reconstruct": "_doors",
@@ -81,6 +84,7 @@ _HOMES = {
     "Inspected": "_results",
     "Machine": "_results",
     "Mode": "_results",
+    "Modes": "_results",
     "Multisine": "_results",
     "Parameter": "_results",
     "Predicted": "_results",
@@ -105,6 +109,7 @@ __all__ = [
     "Measurement",
     "MechidError",
     "Mode",
+    "Modes",
     "Multisine",
     "Parameter",
     "Predicted",
@@ -124,6 +129,7 @@ __all__ = [
     "identify_responses",
     "inspect",
     "integrate",
+    "modes",
     "multisine",
     "predict",
     "reconstruct",

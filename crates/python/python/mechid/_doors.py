@@ -32,6 +32,7 @@ from ._results import (
     IdentifiedResponses,
     Inspected,
     Machine,
+    Modes,
     Multisine,
     Reconstructed,
     SelectedModes,
@@ -546,6 +547,87 @@ def decay(
 
 
 @careful
+def modes(
+    *sources: object,
+    band_hz: tuple[float, float] | None = None,
+    modes: int | None = None,
+    max_modes: int | None = None,
+    near_hz: Sequence[float] = (),
+    force_at: Sequence[str | int] = (),
+    response_at: Sequence[str | int] = (),
+    hits: bool | Mapping[str, Any] = False,
+    ambient: bool = False,
+    without_hz: Sequence[float] = (),
+    without_harmonics: bool = False,
+    validate: float = 0.0,
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> Modes:
+    """Find the modes of a test with forces, with any number of forces and responses, or of an ambient record.
+
+    Parameters
+    ----------
+    *sources, **record
+        One or several records, fitted together, as in `identify`; forces and responses need not belong
+        to the same degrees of freedom.
+    band_hz : (float, float), optional
+        Frequencies to use, in Hz; those that the forces drive, without.
+    modes, max_modes : int, optional
+        Number of modes, or the largest one; as many as the record shows, without.
+    near_hz : sequence of float
+        Frequencies, in Hz, near which a mode is looked for whatever the start shows.
+    force_at, response_at : sequence of str or int
+        Places of the force and response columns; where one force column of several records is that of a
+        hammer, the place that it strikes in each of them.
+    hits : bool or dict, optional
+        Cut the records into the good hits of a hammer, as in `identify`.
+    ambient : bool
+        Whether forces act that are not measured, such as wind or traffic.
+    without_hz : sequence of float
+        Frequencies of machines near an ambient record, in Hz, whose lines are left out.
+    without_harmonics : bool
+        Whether the harmonics that an ambient record shows are left out, too.
+    validate : float
+        Share of each record, at its end, that a second fit leaves out and predicts; none, without.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    MechidError
+        If the record cannot be read, or shows no mode in the band.
+    """
+    records = [measured._inner for measured in measurements(sources, "modes", record)]
+    if settings is None:
+        if ambient:
+            excluded = [float(hz) for hz in without_hz]
+            test: dict[str, Any] = {
+                "ambient": {"without_hz": excluded, "without_harmonics": bool(without_harmonics)}
+            }
+        else:
+            test = {"forced": {"hits": json.loads(_hits(hits) or "null")}}
+        settings = {
+            "test": test,
+            "band_hz": None if band_hz is None else [float(hz) for hz in band_hz],
+            "modes": None if modes is None else _index("modes", modes),
+            "max_modes": None if max_modes is None else _index("max_modes", max_modes),
+            "near_hz": [float(hz) for hz in near_hz],
+            "places": {
+                "forces": [str(place) for place in force_at],
+                "responses": [str(place) for place in response_at],
+            },
+            "validate": float(validate),
+        }
+    return Modes(_mechid.modes(records, json.dumps(settings), threads))
+
+
 def reconstruct(
     machine: Machine | Identified | IdentifiedResponses | str | os.PathLike[str],
     *sources: object,

@@ -36,6 +36,7 @@ __all__ = [
     "identify_responses",
     "inspect",
     "integrate",
+    "modes",
     "multisine",
     "predict",
     "predict_record",
@@ -208,6 +209,7 @@ class Predicted:
 
 def predict_record(record: Measurement, machine: Machine, settings: str) -> Predicted: ...
 def frf(records: Sequence[Measurement], settings: str, threads: int | None) -> Answer: ...
+def modes(records: Sequence[Measurement], settings: str, threads: int | None) -> Answer: ...
 def decay(record: Measurement, settings: str, threads: int | None) -> Answer: ...
 def bearing(
     tests: Sequence[Measurement], baseline: Sequence[Measurement], settings: str, threads: int | None

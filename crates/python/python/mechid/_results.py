@@ -1039,6 +1039,58 @@ class Decayed(Drawn):
 
 
 @final
+class Modes(Drawn):
+    """Modes of a test with forces, or of an ambient record."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes by rising frequency; the entries of a shape are the responses."""
+        return tuple(_mode(row) for row in self._told["modes"])
+
+    @property
+    def participations(self) -> NDArray[np.complex128]:
+        """Participation of each mode (rows) at each force; the largest of a mode is 1."""
+        rows = [[complex(*e["value"]) for e in row["participation"]] for row in self._told["modes"]]
+        return np.array(rows, dtype=np.complex128)
+
+    @property
+    def driven_shares(self) -> NDArray[np.float64]:
+        """Share of the motion of each mode that the measured forces drive; NaN without forces."""
+        shares = [row["driven_share"] for row in self._told["modes"]]
+        return np.array([np.nan if share is None else share for share in shares], dtype=np.float64)
+
+    @property
+    def mac(self) -> NDArray[np.float64]:
+        """Modal assurance criterion of every pair of shapes."""
+        return np.array(self._told["mac"], dtype=np.float64)
+
+    @property
+    def explained(self) -> NDArray[np.float64]:
+        """Share of the variance of each response that the model explains; NaN without forces."""
+        shares = [row.get("variance_explained", np.nan) for row in self._told["outputs"]]
+        return np.array(shares, dtype=np.float64)
+
+    @property
+    def dropped(self) -> tuple[Mapping[str, Any], ...]:
+        """Candidates that are no modes: ``frequency_hz``, ``damping_ratio`` and ``reason`` of each."""
+        return tuple(MappingProxyType(row) for row in self._told["dropped"])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know of the numbers."""
+        return tuple(self._told["notes"])
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{mode.natural_frequency_hz.value:.5g} Hz" for mode in self.modes)
+        return f"<Modes: {frequencies}>"
+
+
+@final
 class Sweep(Drawn):
     """Estimates and errors at many sampling steps."""
 
