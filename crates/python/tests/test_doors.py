@@ -69,6 +69,27 @@ def test_a_free_decay_is_that_of_the_program(program: Callable[..., str], option
     assert found.energy_shares.sum() == pytest.approx(1)
 
 
+def test_modes_of_a_roving_hammer_are_those_of_the_program(program: Callable[..., str]) -> None:
+    files = ["examples/hammer-1.csv", "examples/hammer-2.csv"]
+    words_of_program = "--force force --force-at 1,2 --acceleration a1 --response-at 1 --hits --band-hz 2:100"
+    told = program("modes", *files, *words_of_program.split(), "--json")
+    found = mechid.modes(
+        *files,
+        force="force",
+        acceleration="a1",
+        force_at=[1, 2],
+        response_at=[1],
+        hits=True,
+        band_hz=(2, 100),
+    )
+    assert found.to_json() + "\n" == told
+    first, second = (mode.natural_frequency_hz.value for mode in found.modes)
+    # The modes of the machine behind the example, in closed form.
+    assert first == pytest.approx(12, rel=1e-4) and second == pytest.approx(31, rel=1e-4)
+    assert found.participations.shape == (2, 2) and found.explained[0] > 0.99
+    assert np.all(found.driven_shares > 0.98) and found.mac.shape == (2, 2)
+
+
 def test_a_free_decay_of_arrays_is_found() -> None:
     t = np.arange(800) / 200
     omega, zeta = 2 * np.pi * 7, 0.01

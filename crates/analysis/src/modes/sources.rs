@@ -1,7 +1,7 @@
 //! Spectral lines of modal tests: records as a whole, hits of a hammer, a struck point per record.
 
 use mechid_model::ResponseQuantity;
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
@@ -9,7 +9,6 @@ use super::settings::Places;
 use crate::AnalysisError;
 use crate::hits::{self, HitRow};
 use crate::measurement::{Block, Channels, Measurement};
-use mechid_signal::HitRule;
 
 /// Number of lines whose mean power decides whether a force drives them.
 const BAND_LINES: usize = 16;
@@ -158,12 +157,13 @@ impl Columns {
         }
         if !stated.is_empty() && stated.len() != count {
             let why = format!(
-                "{} places for {count} force columns in {} records: name one for each column, or, of \
+                "{} places for {} in {}: name one for each column, or, of \
                  a hammer that roves, one for each record",
                 stated.len(),
-                measurements.len()
+                message::count(count, "force column"),
+                message::count(measurements.len(), "record"),
             );
-            return Err(AnalysisError::Setting { setting: "force_places", why });
+            return Err(AnalysisError::Setting { setting: "force_at", why });
         }
         let names = measurements[0].source().names.force.clone();
         let places = (0..count).map(|at| stated.get(at).cloned()).collect();
@@ -197,7 +197,7 @@ impl Places {
         }
         if self.responses.len() != outputs {
             let why = format!("{} places for {outputs} responses", self.responses.len());
-            return Err(AnalysisError::Setting { setting: "response_places", why });
+            return Err(AnalysisError::Setting { setting: "response_at", why });
         }
         Ok(self.responses.iter().cloned().map(Some).collect())
     }

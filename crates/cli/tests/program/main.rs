@@ -11,6 +11,7 @@ mod large;
 mod limits;
 mod lines;
 mod modal;
+mod modes;
 mod pictures;
 mod records;
 mod reference;

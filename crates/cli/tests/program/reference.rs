@@ -97,6 +97,10 @@ fn every_field_of_every_report_is_in_the_reference() {
          100e-6 --diameter 0.1 --length 0.05 --viscosity 0.02"
             .into(),
         "modes decay.csv --acceleration a1,a2,a3".into(),
+        "modes hammer-1.csv hammer-2.csv --force force --force-at 1,2 --acceleration a1 --response-at 1 \
+         --hits --band-hz 2:100 --validate-percent 30"
+            .into(),
+        "modes hammer-1.csv --force force --acceleration a1,a2 --band-hz 2:100 --near-hz 12,31".into(),
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
         "modes found.json".into(),
