@@ -57,7 +57,13 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
         return in_brackets;
     }
     let outside = without_spans(name, brackets.into_iter().map(|one| one.span));
-    let after_stroke = if in_brackets.is_none() { of_stroke(&outside) } else { None };
+    // The stroke of `velmm/s` is one of the unit, and no unit of time follows it.
+    let is_of_unit = |found: &StatedUnit| {
+        let is_time = found.unit.as_ref().is_some_and(|unit| unit.quantity == Quantity::Time);
+        is_time && wanted.is_some_and(|wanted| wanted != Quantity::Time)
+    };
+    let of_stroke = || of_stroke(&outside).filter(|found| !is_of_unit(found));
+    let after_stroke = if in_brackets.is_none() { of_stroke() } else { None };
     let of_text = || {
         let notes: Vec<&str> = notes_of(unit).collect();
         // Several words that hold no unit describe the channel.
@@ -71,7 +77,7 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
         .or_else(|| of_text().filter(used))
         .or_else(of_words)
         .or(in_brackets)
-        .or_else(|| of_stroke(&outside))
+        .or_else(of_stroke)
         .or_else(of_text)
 }
 
