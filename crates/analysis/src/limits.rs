@@ -9,7 +9,7 @@ use crate::measurement::Reading;
 
 /// Bytes that an inspection takes for each number of a record: the column, its spectrum and its
 /// lags, of several columns at a time.
-pub const INSPECT_BYTES: usize = 64;
+pub const INSPECT_BYTES: usize = 96;
 
 /// Bytes that work on a stretch of a record takes for each number of it: the identification from
 /// spectra, sample by sample, and frequency responses.
