@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -152,7 +153,8 @@ class Browser:
         while not is_done():
             if time.monotonic() > end:
                 raise TimeoutError("the browser does not answer")
-            self._read()
+            if select.select([self.from_browser], [], [], max(0.0, end - time.monotonic()))[0]:
+                self._read()
 
     def _read(self):
         part = os.read(self.from_browser, 1 << 20)

@@ -152,7 +152,8 @@ impl Canvas {
     pub(crate) fn dots(&mut self, centers: &[Point], diameter: f64, color: Color) {
         let mut path = String::with_capacity(centers.len() * 12);
         for (x, y) in centers {
-            let _ = write!(path, "M{} {}h0", num(*x), num(*y));
+            // A line of no length at all has no ends in some renderers.
+            let _ = write!(path, "M{} {}h.01", num(*x), num(*y));
         }
         let (width, color) = (num(diameter), color.0);
         let _ = writeln!(

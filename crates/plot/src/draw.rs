@@ -120,6 +120,9 @@ fn draw_curve(
     if curve.has_markers() && (curve.kind != Kind::Stems || radius > LEAST_RADIUS) {
         let markers = trace::thin_markers(points.clone(), layout.size.0, radius);
         match style.marker {
+            Marker::Circle if markers.len() > MANY => {
+                sheet.dots(&markers, 2.0 * radius, style.color);
+            }
             Marker::Circle => sheet.discs(&markers, radius, style.color),
             shape => markers
                 .into_iter()
@@ -132,6 +135,9 @@ fn draw_curve(
         sheet.polyline(&line, stroke);
     }
 }
+
+/// Number of markers above which they are one path, a third as long as circles.
+const MANY: usize = 400;
 
 /// Number of standard errors that a band reaches to either side.
 const ERRORS: f64 = 2.0;

@@ -42,8 +42,8 @@ const ticks = ({g, s}, [low, high], wanted) => {
         if (major.length > 2) return {major, minor: stride > 1 ? [] : minor, factor: ""};
         major.length = 0;
     }
-    const rough = (high - low) / wanted, decade = 10 ** floor(log10(rough)), count = (high - low) / s;
-    const step = count >= 2 && count <= 1.6 * wanted ? s : decade * ([1, 2, 5].find(m => rough / decade <= m * 1.000001) ?? 10);
+    const rough = (high - low) / wanted, decade = 10 ** floor(log10(rough)), fixed = [s, 2 * s, 4 * s].find(v => within((high - low) / v, 2, 1.6 * wanted) === (high - low) / v);
+    const step = fixed ?? decade * ([1, 2, 5].find(m => rough / decade <= m * 1.000001) ?? 10);
     let power = floor(log10(max(abs(low), abs(high))));
     power = power >= -2 && power < 5 ? 0 : 3 * floor(power / 3);
     const unit = 10 ** power, decimals = within(-floor(log10(step / unit) + 1e-9), 0, 12);

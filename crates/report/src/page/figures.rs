@@ -31,6 +31,9 @@ const WIDE: f64 = 760.0;
 /// Height of a panel with its labels, px, the first of a figure and any other.
 const PANEL: [f64; 2] = [190.0, 150.0];
 
+/// The same of a figure that has a row to itself.
+const WIDE_PANEL: [f64; 2] = [300.0, 180.0];
+
 /// Number of figures of a set above which the set has a row to itself.
 pub(super) const BESIDE: usize = 4;
 
@@ -59,7 +62,7 @@ pub(super) fn drawn_set(
         let panels = figure.panels();
         // Many curves have a legend of several rows.
         let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
-        let [first, other] = PANEL;
+        let [first, other] = if width > WIDTH { WIDE_PANEL } else { PANEL };
         let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
         let title = if is_alone { "" } else { name.as_str() };
         let figure = figure.titled(title).size(width, height);
