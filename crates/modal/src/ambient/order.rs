@@ -85,7 +85,7 @@ impl Choice<'_> {
         });
     }
 
-    /// Separates modes from poles that only explain lines.
+    /// Separates modes from poles that only explain lines, and keeps the number asked for.
     fn judged(&mut self, fit: Fit) -> Chosen {
         let mut sound = Vec::new();
         for mode in 0..fit.parameters.layout.modes {
@@ -93,6 +93,17 @@ impl Choice<'_> {
                 Some(reason) => self.drop_mode(&fit.parameters, mode, reason),
                 None => sound.push(mode),
             }
+        }
+        let number = self.wanted.exactly.unwrap_or(self.wanted.most);
+        let covariance = fit.covariance();
+        while sound.len() > number {
+            let evidence =
+                |mode: &usize| covariance.as_ref().map_or(0.0, |c| wald(&fit.parameters, c, *mode));
+            let weakest = (0..sound.len())
+                .min_by(|a, b| evidence(&sound[*a]).total_cmp(&evidence(&sound[*b])))
+                .unwrap_or(0);
+            let mode = sound.remove(weakest);
+            self.drop_mode(&fit.parameters, mode, DropReason::NumberReached { number });
         }
         Chosen { fit, sound }
     }
