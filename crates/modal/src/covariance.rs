@@ -1,7 +1,8 @@
-//! Covariance of poles, participations and shapes under the whole noise: sensors and unmeasured forces.
+//! Covariance of poles, participations and shapes under the whole noise: sensors and unmeasured
+//! forces.
 //!
-//! The fit weighs all outputs alike; its parameters have covariance G⁻¹ M G⁻¹, where M is the variance of the
-//! score under the noise as it is.
+//! The fit weighs all outputs alike; its parameters have covariance G⁻¹ M G⁻¹, where M is the
+//! variance of the score under the noise as it is.
 //!
 //! # Source
 //! White, Econometrica 50 (1982) 1, with the variance of the score from the noise model.
@@ -33,7 +34,8 @@ pub(crate) struct Covariance {
     pub(crate) degrees_of_freedom: usize,
     /// Response of the linear unknowns of modes to the derivatives: A⁺ C, `2m × parameters`.
     followed: DMatrix<f64>,
-    /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened units.
+    /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened
+    /// units.
     own: Vec<DMatrix<f64>>,
     /// What the unmeasured force of each mode does to the unknowns of its own shape.
     process: Vec<ProcessEffect>,
@@ -85,7 +87,8 @@ impl Covariance {
         })
     }
 
-    /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.
+    /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened
+    /// units.
     fn response_of_unknowns(&self, mode: usize, output: usize) -> DMatrix<f64> {
         let outputs = self.own.len();
         let part = |row: usize| self.shapes[row * outputs + output];
@@ -104,7 +107,8 @@ impl Covariance {
 
     /// Returns the covariance of real and imaginary part of a shape over its entry `reference`.
     ///
-    /// Unmeasured forces on the mode itself change all its entries alike and cancel in the quotient.
+    /// Unmeasured forces on the mode itself change all its entries alike and cancel in the
+    /// quotient.
     pub(crate) fn of_normalised_shape(
         &self,
         mode: usize,
@@ -130,7 +134,8 @@ impl Covariance {
         &by_reference * sum * by_reference.transpose()
     }
 
-    /// Returns the covariance of real and imaginary part of a participation times the shape's entry `reference`.
+    /// Returns the covariance of real and imaginary part of a participation times the shape's entry
+    /// `reference`.
     pub(crate) fn of_participation(
         &self,
         fit: &Fit<'_>,
@@ -210,7 +215,8 @@ fn followed(
     (sum, rows)
 }
 
-/// Returns the variance of the score, and of the unknowns of each output, from the noise of the sensors.
+/// Returns the variance of the score, and of the unknowns of each output, from the noise of the
+/// sensors.
 fn sensor_variance(
     fit: &Fit<'_>,
     noise: &Noise,
@@ -236,7 +242,8 @@ fn sensor_variance(
     (meat, own)
 }
 
-/// Returns the variance of each output's sensor noise over that of the fit's weights, averaged over a block.
+/// Returns the variance of each output's sensor noise over that of the fit's weights, averaged over
+/// a block.
 fn noise_ratios(fit: &Fit<'_>, noise: &Noise, block: &Block) -> Vec<f64> {
     let ratio = |(sensor, level): (&Vec<f64>, &f64)| {
         let rows: Range<usize> = block.rows.clone();

@@ -6,7 +6,8 @@ use faer::{Accum, MatMut, MatRef, Par};
 
 use crate::limits::DEPENDENT_COLUMN;
 
-/// Replaces the columns of a matrix by those of its triangular factor; below it the reflections remain.
+/// Replaces the columns of a matrix by those of its triangular factor; below it the reflections
+/// remain.
 pub(crate) fn triangularise(columns: &mut [f64], rows: usize) {
     let count = columns.len() / rows.max(1);
     let size = rows.min(count);
@@ -91,7 +92,8 @@ pub(crate) fn add_product(
     );
 }
 
-/// Upper triangular factor R of a least-squares problem; a dependent column has an infinite diagonal.
+/// Upper triangular factor R of a least-squares problem; a dependent column has an infinite
+/// diagonal.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Triangle {
     pub(crate) size: usize,

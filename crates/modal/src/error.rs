@@ -77,7 +77,8 @@ pub enum ModalError {
     },
     /// Line data of other sizes than those of the estimate.
     #[error(
-        "the data has {inputs} inputs and {outputs} outputs, the modes {model_inputs} and {model_outputs}"
+        "the data has {inputs} inputs and {outputs} outputs, the modes {model_inputs} and \
+         {model_outputs}"
     )]
     Size {
         /// Inputs of the data.

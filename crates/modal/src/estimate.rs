@@ -90,7 +90,8 @@ impl ModalEstimate {
         self.explained.clone()
     }
 
-    /// Returns the root-mean-square of each sensor's own noise on a line, in the unit of the output.
+    /// Returns the root-mean-square of each sensor's own noise on a line, in the unit of the
+    /// output.
     pub fn noise_levels(&self) -> &[f64] {
         &self.noise_level
     }
@@ -130,8 +131,9 @@ impl ModalEstimate {
         })
     }
 
-    /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its open records
-    /// are estimated from its outputs, one load of the modes per record and residual terms per output.
+    /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its
+    /// open records are estimated from its outputs, one load of the modes per record and residual
+    /// terms per output.
     ///
     /// # Errors
     /// [`ModalError::Size`] if the numbers of inputs or outputs differ.

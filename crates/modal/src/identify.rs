@@ -25,8 +25,8 @@ use crate::search::Fit;
 pub struct ModalSettings {
     /// Number of modes; `None` chooses it by the likelihood.
     pub modes: Option<usize>,
-    /// Frequencies (Hz), each of a mode that is to be reported (within 2 %) however weak it is; other modes
-    /// are part of the model, but not reported. Empty: all modes are reported.
+    /// Frequencies (Hz), each of a mode that is to be reported (within 2 %) however weak it is;
+    /// other modes are part of the model, but not reported. Empty: all modes are reported.
     pub near_hz: Vec<f64>,
     /// Largest number of modes that is tried.
     pub max_modes: usize,
@@ -50,16 +50,16 @@ impl Default for ModalSettings {
 
 /// Identifies the modes in the band of the data.
 ///
-/// Maximum likelihood without a window: poles and participations are searched, shapes and residual terms
-/// are linear; the ends of each open record are one more load that all outputs share.
+/// Maximum likelihood without a window: poles and participations are searched, shapes and residual
+/// terms are linear; the ends of each open record are one more load that all outputs share.
 ///
 /// # Errors
 /// [`ModalError`] if the data cannot carry a mode, or if no mode is significant.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 9
-/// and 12; El-Kafafy, Peeters, Guillaume & De Troyer, Mechanical Systems and Signal Processing 70 (2016) 1034
-/// (maximum likelihood of the modal model).
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapters 9 and 12; El-Kafafy, Peeters, Guillaume & De Troyer, Mechanical Systems and Signal
+/// Processing 70 (2016) 1034 (maximum likelihood of the modal model).
 pub fn identify_modes(
     data: &LineData,
     settings: &ModalSettings,
@@ -263,7 +263,8 @@ impl<'a> Identification<'a> {
         self.fit.search_roughly();
     }
 
-    /// Chooses the residual powers by Akaike's criterion: bias of the poles is worse than a few unknowns more.
+    /// Chooses the residual powers by Akaike's criterion: bias of the poles is worse than a few
+    /// unknowns more.
     fn choose_powers(&mut self) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;

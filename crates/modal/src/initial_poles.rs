@@ -1,13 +1,14 @@
-//! First estimate of the poles: subspace method on the lines, and clusters of its roots over the orders.
+//! First estimate of the poles: subspace method on the lines, and clusters of its roots over the
+//! orders.
 //!
-//! The band is mapped to most of the unit circle, z = e^{j(ω − ω_a)Δ}; block rows are the lines times
-//! powers of z. Their products depend on differences of powers alone: one correlation per lag gives all.
-//! Past inputs and outputs are the instruments; future inputs and the transient of each record are
-//! projected out.
+//! The band is mapped to most of the unit circle, z = e^{j(ω − ω_a)Δ}; block rows are the lines
+//! times powers of z. Their products depend on differences of powers alone: one correlation per lag
+//! gives all. Past inputs and outputs are the instruments; future inputs and the transient of each
+//! record are projected out.
 //!
 //! # Source
-//! McKelvey, Akçay & Ljung, IEEE Trans. Automatic Control 41 (1996) 960 (subspace on spectral lines);
-//! Verhaegen, Automatica 30 (1994) 61 (past inputs and outputs as instruments).
+//! McKelvey, Akçay & Ljung, IEEE Trans. Automatic Control 41 (1996) 960 (subspace on spectral
+//! lines); Verhaegen, Automatica 30 (1994) 61 (past inputs and outputs as instruments).
 
 use std::f64::consts::TAU;
 

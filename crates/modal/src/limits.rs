@@ -1,17 +1,17 @@
 //! Numbers that decide something, each with what happens on either side of it.
 
-/// Number of lines in a block of the parallel sums: blocks bound the memory of a sum and fix its order,
-/// so that a result does not depend on the number of processors.
+/// Number of lines in a block of the parallel sums: blocks bound the memory of a sum and fix its
+/// order, so that a result does not depend on the number of processors.
 pub const BLOCK_LINES: usize = 256;
-/// Largest ratio of a column's rest to its length, after the columns before it, that counts as dependent:
-/// a dependent column gets no coefficient.
+/// Largest ratio of a column's rest to its length, after the columns before it, that counts as
+/// dependent: a dependent column gets no coefficient.
 pub const DEPENDENT_COLUMN: f64 = 1e-11;
 /// Largest number of damped steps of one search.
 pub const MAX_STEPS: usize = 40;
 /// Largest number of damping increases within a step before the search ends.
 pub const MAX_DAMPING_INCREASES: usize = 14;
-/// Decrease of −2 log L in a step below which the last search has converged: the estimates are then within a
-/// few hundredths of their standard errors of the optimum.
+/// Decrease of −2 log L in a step below which the last search has converged: the estimates are then
+/// within a few hundredths of their standard errors of the optimum.
 pub const COST_TOLERANCE: f64 = 1e-3;
 /// Decrease of −2 log L in a step below which a search between two changes of the model ends.
 pub const ROUGH_COST_TOLERANCE: f64 = 0.5;
@@ -32,21 +32,26 @@ pub const NOISE_WINDOW_SHARE: f64 = 1.0 / 16.0;
 pub const MIN_NOISE_WINDOW: usize = 15;
 /// Number of expectation-maximisation steps for unmeasured forces.
 pub const EXPECTATION_STEPS: usize = 12;
-/// Response of a mode to a unit force over its largest, squared, above which a line bears on its unmeasured force.
+/// Response of a mode to a unit force over its largest, squared, above which a line bears on its
+/// unmeasured force.
 pub const NEAR_RESONANCE: f64 = 1e-2;
-/// Power of an unmeasured force beside the sensors' noise on a line below which the line leaves it to the latter.
+/// Power of an unmeasured force beside the sensors' noise on a line below which the line leaves it
+/// to the latter.
 pub const NEAR_PROCESS_POWER: f64 = 0.1;
-/// Contribution of an unmeasured force to the noise power of a line below which the line says nothing of it.
+/// Contribution of an unmeasured force to the noise power of a line below which the line says
+/// nothing of it.
 pub const NEGLIGIBLE_PROCESS_POWER: f64 = 1e-3;
 /// Damping ratio above which a root of the first estimate counts as no mode.
 pub const MAX_INITIAL_DAMPING: f64 = 0.1;
-/// Damping ratio above which a root counts as no mode but as the response of what lies outside the band.
+/// Damping ratio above which a root counts as no mode but as the response of what lies outside the
+/// band.
 pub const MAX_DAMPING: f64 = 0.3;
 /// Largest number of leading components of the outputs that the first estimate uses.
 pub const MAX_COMPONENTS: usize = 8;
 /// Number of shifts of the block rows of the first estimate.
 pub const SUBSPACE_SHIFTS: usize = 24;
-/// Share of the unit circle that the band is mapped to in the first estimate; the gap joins the band's two edges.
+/// Share of the unit circle that the band is mapped to in the first estimate; the gap joins the
+/// band's two edges.
 pub const CIRCLE_SHARE: f64 = 0.9;
 /// Share of the orders in which a root must appear to start a mode.
 pub const MIN_ORDER_SHARE: f64 = 0.4;
@@ -72,10 +77,12 @@ pub const EDGE_HALF_WIDTHS: f64 = 3.0;
 pub const DIFFERENCE_PROBABILITY: f64 = 1e-3;
 /// Ratio of the power of a channel to that of the strongest below which the channel is dead.
 pub const DEAD_CHANNEL: f64 = 1e-26;
-/// Ratio of the least to the largest singular value of scaled inputs below which two inputs are one.
+/// Part of an input that the inputs before it cannot follow, relative to the input, at or below which
+/// their responses cannot be separated.
 pub const DEPENDENT_INPUTS: f64 = 1e-6;
-/// Half-widths within which two modes may share what they explain: only one of them is taken out at a time.
+/// Half-widths within which two modes may share what they explain: only one of them is taken out at
+/// a time.
 pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
-/// Least noise of a sensor, relative to the root-mean-square of its output: what is below it is rounding, and
-/// data without noise would otherwise hold modes without end.
+/// Least noise of a sensor, relative to the root-mean-square of its output: what is below it is
+/// rounding, and data without noise would otherwise hold modes without end.
 pub const LEAST_NOISE: f64 = 1e-6;

@@ -16,16 +16,18 @@ pub struct IdentifiedMode {
     pub frequency_damping_covariance: f64,
     /// Shape at the outputs; its largest entry is 1.
     pub shape: Vec<Complex<f64>>,
-    /// Standard errors of the real and imaginary part of each entry of `shape`, as real and imaginary part.
+    /// Standard errors of the real and imaginary part of each entry of `shape`, as real and
+    /// imaginary part.
     pub shape_standard_error: Vec<Complex<f64>>,
-    /// Participation of each input, such that the residue of output i and input j is shape_i participation_j.
+    /// Participation of each input, such that the residue of output i and input j is shape_i
+    /// participation_j.
     pub participation: Vec<Complex<f64>>,
     /// Standard errors of the real and imaginary part of each participation.
     pub participation_standard_error: Vec<Complex<f64>>,
     /// Share of this mode's motion that the measured forces drive; `None` without measured forces.
     pub driven_share: Option<f64>,
-    /// Ratio of unmeasured to measured force of this mode (root-mean-square, modal); `None` without measured
-    /// forces.
+    /// Ratio of unmeasured to measured force of this mode (root-mean-square, modal); `None` without
+    /// measured forces.
     pub unmeasured_ratio: Option<f64>,
     /// Decrease of −2 log L that this mode brings.
     pub gain: f64,
@@ -39,11 +41,13 @@ impl IdentifiedMode {
         self.shape[output] * self.participation[input]
     }
 
-    /// Returns the shape at the inputs, largest entry 1: where the inputs are forces at points of one
-    /// structure (roving hammer), reciprocity makes the participations its shape at these points.
+    /// Returns the shape at the inputs, largest entry 1: where the inputs are forces at points of
+    /// one structure (roving hammer), reciprocity makes the participations its shape at these
+    /// points.
     ///
     /// # Source
-    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 3.5 (a row of a response matrix is as good as a column).
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 3.5 (a row of a response matrix is as good
+    /// as a column).
     pub fn shape_at_inputs(&self) -> Vec<Complex<f64>> {
         let norm = |z: &&Complex<f64>| z.norm();
         let largest = self.participation.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)));
@@ -54,9 +58,9 @@ impl IdentifiedMode {
     /// Returns the modal mass for the shape as it is scaled here, if `output` measures the
     /// `derivative`-th time derivative of the displacement at which `input` acts as a force.
     ///
-    /// With mass-normalised shapes ψ the residue of a displacement is ψ_i ψ_j/(2jω_d) for light, proportional
-    /// damping; the mass of a shape scaled to `shape` is shape_i²/ψ_i². It is in kg if the input is in N and
-    /// the output in m, m/s or m/s².
+    /// With mass-normalised shapes ψ the residue of a displacement is ψ_i ψ_j/(2jω_d) for light,
+    /// proportional damping; the mass of a shape scaled to `shape` is shape_i²/ψ_i². It is in kg if
+    /// the input is in N and the output in m, m/s or m/s².
     pub fn modal_mass(&self, output: usize, input: usize, derivative: i32) -> Complex<f64> {
         let residue = self.residue(output, input) / self.pole.powi(derivative);
         let squared = residue * Complex::new(0.0, 2.0 * self.pole.im);

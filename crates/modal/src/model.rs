@@ -1,12 +1,12 @@
 //! Kernels of the modal model: what a pole does to a load on a line, and its derivative.
 //!
-//! Output i at ω is Σ_r [φ_ir g_r(ω) + φ_ir* g̃_r(ω)] + Σ_e E_e Σ_n c_ien (jω)ⁿ with
-//! g_r = Σ_e L_re E_e h_re, where h is 1/(jω − λ_r) for a force and Δt/(1 − e^{(λ_r − jω)Δt}), the exact
-//! transform of a sampled decay, for the transient of a record; g̃ has λ*, L* in their place.
+//! Output i at ω is Σ_r [φ_ir g_r(ω) + φ_ir* g̃_r(ω)] + Σ_e E_e Σ_n c_ien (jω)ⁿ with g_r = Σ_e L_re
+//! E_e h_re, where h is 1/(jω − λ_r) for a force and Δt/(1 − e^{(λ_r − jω)Δt}), the exact transform
+//! of a sampled decay, for the transient of a record; g̃ has λ*, L* in their place.
 //!
 //! # Source
-//! Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 6.3;
-//! Golub & Pereyra, Inverse Problems 19 (2003) R1 (variable projection).
+//! Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+//! section 6.3; Golub & Pereyra, Inverse Problems 19 (2003) R1 (variable projection).
 
 use std::ops::Range;
 
@@ -33,7 +33,8 @@ impl ResidualPowers {
     }
 }
 
-/// Poles, participations and residual powers: all that the search moves, and the layout of what it does not.
+/// Poles, participations and residual powers: all that the search moves, and the layout of what it
+/// does not.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     pub(crate) poles: Vec<Complex<f64>>,
@@ -128,7 +129,8 @@ impl Model {
         (0..2 * self.modes()).chain(active).collect()
     }
 
-    /// Returns the index of the pair of parameters of a participation that is not the gauge of its mode.
+    /// Returns the index of the pair of parameters of a participation that is not the gauge of its
+    /// mode.
     pub(crate) fn pair_of(&self, mode: usize, load: usize, loads: usize) -> usize {
         let before = load - usize::from(load > self.gauge[mode]);
         self.modes() + mode * (loads - 1) + before
@@ -144,7 +146,8 @@ impl Model {
         poles.chain(free).collect()
     }
 
-    /// Writes the columns of a block, each of 2n rows (real parts above imaginary parts), whitened by `weight`.
+    /// Writes the columns of a block, each of 2n rows (real parts above imaginary parts), whitened
+    /// by `weight`.
     pub(crate) fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]) {
         let n = block.len();
         let (modes, rest) = columns.split_at_mut(4 * n * self.modes());
@@ -191,8 +194,8 @@ impl Model {
 
     /// Writes the derivatives of a block: a pair of columns for each pair of parameters in `pairs`.
     ///
-    /// With a = ∂g/∂λ (or ∂g/∂L) and b that of the conjugate mode, the pair is a + b and j(a − b); the
-    /// derivative of output i is this pair turned by its shape φ_i.
+    /// With a = ∂g/∂λ (or ∂g/∂L) and b that of the conjugate mode, the pair is a + b and j(a − b);
+    /// the derivative of output i is this pair turned by its shape φ_i.
     pub(crate) fn fill_derivatives(
         &self,
         lines: &Lines,

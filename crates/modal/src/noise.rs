@@ -1,11 +1,12 @@
 //! Noise of the outputs: a smooth spectrum per sensor, and unmeasured forces through the modes.
 //!
-//! e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with E|w_r|² = S_r and E|n_i|² = D_i(ω) smooth. A resonance is
-//! a few lines wide, so that no smooth spectrum can follow the first term.
+//! e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with E|w_r|² = S_r and E|n_i|² = D_i(ω) smooth. A
+//! resonance is a few lines wide, so that no smooth spectrum can follow the first term.
 //!
 //! # Source
-//! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal responses);
-//! Zhou, Hu, Zhou & Lange, J. Computational and Graphical Statistics 28 (2019) 350 (variance components).
+//! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal
+//! responses); Zhou, Hu, Zhou & Lange, J. Computational and Graphical Statistics 28 (2019) 350
+//! (variance components).
 
 use std::ops::Range;
 
@@ -32,7 +33,8 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Estimates the noise from the residuals of a fit; `process` are first variances of the unmeasured forces,
+    /// Estimates the noise from the residuals of a fit; `process` are first variances of the
+    /// unmeasured forces,
     /// `None` leaves these out.
     pub(crate) fn from_fit(fit: &Fit<'_>, process: Option<Vec<f64>>) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
@@ -97,8 +99,9 @@ impl Noise {
         }
     }
 
-    /// Takes out the unmeasured forces that the likelihood gains too little by (Akaike's criterion, one parameter
-    /// each): a variance cannot be negative, so that one that is estimated from noise alone is too large on average.
+    /// Takes out the unmeasured forces that the likelihood gains too little by (Akaike's criterion,
+    /// one parameter each): a variance cannot be negative, so that one that is estimated from noise
+    /// alone is too large on average.
     fn drop_insignificant_process(&mut self, sums: &[ForceSums]) {
         const REQUIRED: f64 = 2.0;
         for (process, sum) in self.process.iter_mut().zip(sums) {
@@ -135,8 +138,8 @@ impl Noise {
         all
     }
 
-    /// Returns first variances of the unmeasured forces: the power of the residuals along each shape near its
-    /// resonance.
+    /// Returns first variances of the unmeasured forces: the power of the residuals along each
+    /// shape near its resonance.
     fn first_process(
         &self,
         lines: &Lines,

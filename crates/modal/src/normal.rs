@@ -1,8 +1,8 @@
 //! Normal equations of poles and participations, with the linear unknowns projected out (Kaufman).
 //!
 //! The derivative of output i with respect to a pair of parameters is one pair of columns for all
-//! outputs, turned by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one product CᵀC,
-//! whatever the number of outputs.
+//! outputs, turned by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one
+//! product CᵀC, whatever the number of outputs.
 //!
 //! # Source
 //! Kaufman, BIT 15 (1975) 49.
@@ -41,7 +41,8 @@ struct Lane {
     turned: Vec<f64>,
 }
 
-/// Outputs' shapes in whitened units: real parts in row 2r, imaginary parts in row 2r + 1, as columns over outputs.
+/// Outputs' shapes in whitened units: real parts in row 2r, imaginary parts in row 2r + 1, as
+/// columns over outputs.
 pub(crate) fn whitened_shapes(projection: &Projection, modes: usize) -> Vec<f64> {
     let columns = projection.triangle.size.max(1);
     let outputs = projection.unknowns.len() / columns;
@@ -118,7 +119,8 @@ pub(crate) fn parameter_scale(pairs: &[(usize, Option<usize>)], model: &Model) -
     pairs.iter().flat_map(scale).collect()
 }
 
-/// Sums over outputs of the products of two modes' shapes, real with real (xx), real with imaginary (xy) and so on.
+/// Sums over outputs of the products of two modes' shapes, real with real (xx), real with imaginary
+/// (xy) and so on.
 pub(crate) struct ShapeProducts {
     modes: usize,
     sums: Vec<f64>,
@@ -267,7 +269,8 @@ mod tests {
     use crate::projection::Weights;
     use crate::search::Fit;
 
-    /// Two records of two inputs and three outputs: one open record, and one whose second input is zero.
+    /// Two records of two inputs and three outputs: one open record, and one whose second input is
+    /// zero.
     fn lines() -> Lines {
         let value = |k: usize| ((k * k + 3 * k) as f64 * 0.7).sin();
         let data = |shift: usize, silent: bool, transient| {
@@ -302,7 +305,8 @@ mod tests {
         Fit::new(lines, model, Weights { shape, level: vec![1.0, 0.7, 1.3] })
     }
 
-    /// The projected cost is differentiated by central differences: independent of every formula above.
+    /// The projected cost is differentiated by central differences: independent of every formula
+    /// above.
     #[test]
     fn descent_is_the_derivative_of_half_the_cost() {
         let lines = lines();

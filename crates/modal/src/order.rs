@@ -26,8 +26,8 @@ pub(crate) struct Candidate {
     pub(crate) gain: f64,
 }
 
-/// Returns the decrease of −2 log L that one more mode must bring: its parameters times the logarithm of
-/// the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
+/// Returns the decrease of −2 log L that one more mode must bring: its parameters times the
+/// logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
 pub(crate) fn required_gain(lines: &Lines) -> f64 {
     let parameters = 2 * (lines.outputs.len() + lines.loads.len() - 1) + 2;
     parameters as f64 * ((2 * lines.len()) as f64).ln()
@@ -154,8 +154,8 @@ impl Residual {
     }
 }
 
-/// Returns the leading participations and the gain of the best rank-one coefficient of a least-squares
-/// problem with products `square` (loads × loads) and `cross` (loads × outputs).
+/// Returns the leading participations and the gain of the best rank-one coefficient of a
+/// least-squares problem with products `square` (loads × loads) and `cross` (loads × outputs).
 fn rank_one(
     square: &mut [C],
     cross: &mut [C],
@@ -203,8 +203,8 @@ fn rank_one(
     gain.is_finite().then_some((direction, gain))
 }
 
-/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns those that
-/// were tried, with their gains.
+/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns
+/// those that were tried, with their gains.
 pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candidate>> {
     let mut tried: Vec<Candidate> = Vec::new();
     for candidate in scan(fit) {

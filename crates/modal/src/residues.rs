@@ -56,7 +56,8 @@ impl Design for FreeResidues<'_> {
     }
 }
 
-/// Returns a model at given poles whose participations are the leading directions of the free residues.
+/// Returns a model at given poles whose participations are the leading directions of the free
+/// residues.
 pub(crate) fn with_participations(
     lines: &Lines,
     poles: Vec<Complex<f64>>,

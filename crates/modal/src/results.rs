@@ -13,7 +13,8 @@ use crate::model::Model;
 use crate::noise::{Noise, modal_gain};
 use crate::search::Fit;
 
-/// Returns natural frequency (Hz), damping ratio and their covariance, from those of ln(−Re λ) and ln Im λ.
+/// Returns natural frequency (Hz), damping ratio and their covariance, from those of ln(−Re λ) and
+/// ln Im λ.
 pub(crate) fn natural_frequency_and_damping(
     pole: Complex<f64>,
     mode: usize,
@@ -57,7 +58,8 @@ fn powers(lines: &Lines, model: &Model, noise: &Noise, mode: usize) -> (f64, f64
     (measured, unmeasured)
 }
 
-/// Returns the ratio of the unmeasured to the measured modal force, or `None` without measured forces.
+/// Returns the ratio of the unmeasured to the measured modal force, or `None` without measured
+/// forces.
 pub(crate) fn unmeasured_ratio(
     lines: &Lines,
     model: &Model,

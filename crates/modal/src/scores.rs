@@ -1,4 +1,5 @@
-//! Scores of the search: projected derivatives block by block, and what an unmeasured force does to them.
+//! Scores of the search: projected derivatives block by block, and what an unmeasured force does to
+//! them.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -80,8 +81,8 @@ pub(crate) struct Scores<'a> {
 }
 
 impl Scores<'_> {
-    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its effect on the
-    /// shape of the mode.
+    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its
+    /// effect on the shape of the mode.
     pub(crate) fn add_process(
         &self,
         fit: &Fit<'_>,
@@ -139,7 +140,8 @@ impl Scores<'_> {
         effect
     }
 
-    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven mode, and Σ |α_i|².
+    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven
+    /// mode, and Σ |α_i|².
     fn along(&self, mode: usize, outputs: usize) -> (Vec<(C, C)>, f64) {
         let column = |row: usize| &self.shapes[row * outputs..(row + 1) * outputs];
         let product = |a: usize, b: usize| -> f64 {

@@ -9,8 +9,8 @@ use crate::model::{growth, kernels};
 
 type C = Complex<f64>;
 
-/// Adds to `predicted` the transients of open records, fitted to what remains of the outputs: one complex
-/// load of each mode per record, and real residual terms of each output.
+/// Adds to `predicted` the transients of open records, fitted to what remains of the outputs: one
+/// complex load of each mode per record, and real residual terms of each output.
 pub(crate) fn add_transients(
     lines: &Lines,
     modes: &[&IdentifiedMode],
@@ -85,8 +85,8 @@ impl Record<'_> {
         C::i().powi(power) * (omega / self.reference).powi(power)
     }
 
-    /// Returns the triangular factor of an output's columns, residual terms first so that they can be projected
-    /// out of the loads that all outputs share, and the number of rows.
+    /// Returns the triangular factor of an output's columns, residual terms first so that they can
+    /// be projected out of the loads that all outputs share, and the number of rows.
     fn reduced(
         &self,
         lines: &Lines,

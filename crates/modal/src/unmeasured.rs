@@ -31,7 +31,8 @@ pub(crate) struct Posterior {
 }
 
 impl Posterior {
-    /// Returns what the residuals of a line say of the unmeasured forces of the modes near it; `None` if none is near.
+    /// Returns what the residuals of a line say of the unmeasured forces of the modes near it;
+    /// `None` if none is near.
     pub(crate) fn new(
         noise: &Noise,
         lines: &Lines,
@@ -118,13 +119,15 @@ impl Posterior {
             let sum = &mut sums[*mode];
             sum.seen += seen;
             sum.expected += expected;
-            // With a = b_rᴴV⁻¹b_r before this force is added, 1/(1 + S a) is 1 − S times that after it.
+            // With a = b_rᴴV⁻¹b_r before this force is added, 1/(1 + S a) is 1 − S times that after
+            // it.
             let ratio = 1.0 / (1.0 - self.process[a] * expected).max(f64::MIN_POSITIVE);
             sum.gain += 2.0 * (self.process[a] * seen * ratio - ratio.ln());
         }
     }
 
-    /// Returns the expected power of what remains of an error when the unmeasured forces are taken off.
+    /// Returns the expected power of what remains of an error when the unmeasured forces are taken
+    /// off.
     pub(crate) fn remaining_power(
         &self,
         shapes: &[Vec<C>],

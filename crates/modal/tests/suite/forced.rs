@@ -3,7 +3,8 @@
 use crate::generator::{Case, hammer, one_by_one, pair};
 use crate::score::Score;
 
-/// Identifies a few records of a case: every mode, no other, and intervals that hold about as often as stated.
+/// Identifies a few records of a case: every mode, no other, and intervals that hold about as often
+/// as stated.
 fn check(case: &Case, seeds: u64) {
     let score = Score::of(case, 0..seeds);
     assert_eq!(score.found_share(), 100.0, "{}", case.name);

@@ -1,7 +1,8 @@
-//! Records of a known modal structure: a window cut out of a long, exactly band-limited steady state.
+//! Records of a known modal structure: a window cut out of a long, exactly band-limited steady
+//! state.
 //!
-//! Nothing of the estimator is used: the response is the closed modal sum on the lines of a period four
-//! times as long, so that the record is open and leaks as a measured one does.
+//! Nothing of the estimator is used: the response is the closed modal sum on the lines of a period
+//! four times as long, so that the record is open and leaks as a measured one does.
 #![allow(dead_code, reason = "the study and the tests use different cases")]
 
 use std::f64::consts::TAU;

@@ -1,10 +1,12 @@
-//! Other sources than a record with forces: tables, free decays, roving hammers, and what they have in common.
+//! Other sources than a record with forces: tables, free decays, roving hammers, and what they have
+//! in common.
 
 use mechid_modal::{ModalEstimate, ModalSettings, identify_modes};
 
 use crate::generator::{Case, pair, roving};
 
-/// Compares frequency and damping with the truth, in standard errors, and returns the largest deviation.
+/// Compares frequency and damping with the truth, in standard errors, and returns the largest
+/// deviation.
 fn largest_deviation(case: &Case, estimate: &ModalEstimate) -> f64 {
     let modes = case.in_band();
     assert_eq!(estimate.modes().len(), modes.len(), "{:?}", estimate.dropped());
@@ -79,7 +81,8 @@ fn the_rest_of_a_record_is_predicted() {
     for output in 0..8 {
         let share = difference.column(output).norm_squared()
             / other.outputs().column(output).norm_squared();
-        // Noise of 2 % is 4e-4 of the power over all frequencies; coloured noise has more in the band.
+        // Noise of 2 % is 4e-4 of the power over all frequencies; coloured noise has more in the
+        // band.
         assert!(share < 1.5e-3, "output {output}: {share}");
     }
 }

@@ -1,4 +1,5 @@
-//! Steel subframe with two shakers (DaISy 96-013), a public record that stands beside the project, not in it.
+//! Steel subframe with two shakers (DaISy 96-013), a public record that stands beside the project,
+//! not in it.
 
 use std::path::Path;
 
@@ -8,7 +9,8 @@ use mechid_spectra::LineData;
 use nalgebra::DMatrix;
 
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
-/// Forces and accelerations of a part of the record; `None`, and a word on it, where the file is not.
+/// Forces and accelerations of a part of the record; `None`, and a word on it, where the file is
+/// not.
 fn record(from: f64, to: f64) -> Option<LineData> {
     let file =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/subframe/subframe.csv");
