@@ -59,8 +59,6 @@ impl Noise {
                 break;
             }
         }
-        let sums = noise.force_sums(lines, model, &shapes, &residuals);
-        noise.drop_insignificant_process(&sums);
         noise
     }
 
@@ -99,18 +97,6 @@ impl Noise {
         }
     }
 
-    /// Takes out the unmeasured forces that the likelihood gains too little by (Akaike's criterion,
-    /// one parameter each): a variance cannot be negative, so that one that is estimated from noise
-    /// alone is too large on average.
-    fn drop_insignificant_process(&mut self, sums: &[ForceSums]) {
-        const REQUIRED: f64 = 2.0;
-        for (process, sum) in self.process.iter_mut().zip(sums) {
-            if sum.gain < REQUIRED {
-                *process = 0.0;
-            }
-        }
-    }
-
     /// Sums over the lines what they say of each unmeasured force.
     fn force_sums(
         &self,
@@ -133,7 +119,6 @@ impl Noise {
         for (mode, part) in parts.iter().flat_map(|part| part.iter().enumerate()) {
             all[mode].seen += part.seen;
             all[mode].expected += part.expected;
-            all[mode].gain += part.gain;
         }
         all
     }

@@ -16,8 +16,6 @@ pub(crate) struct ForceSums {
     pub(crate) seen: f64,
     /// Σ b_rᴴV⁻¹b_r, what the first is on average.
     pub(crate) expected: f64,
-    /// Decrease of −2 log L by this force.
-    pub(crate) gain: f64,
 }
 
 /// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line.
@@ -119,10 +117,6 @@ impl Posterior {
             let sum = &mut sums[*mode];
             sum.seen += seen;
             sum.expected += expected;
-            // With a = b_rᴴV⁻¹b_r before this force is added, 1/(1 + S a) is 1 − S times that after
-            // it.
-            let ratio = 1.0 / (1.0 - self.process[a] * expected).max(f64::MIN_POSITIVE);
-            sum.gain += 2.0 * (self.process[a] * seen * ratio - ratio.ln());
         }
     }
 
