@@ -291,7 +291,7 @@ fn instruments_need_two_periods() {
 #[test]
 fn files_that_cannot_be_written() {
     let common = "identify a.csv --force force --displacement x --mass 1 --plot";
-    refused(&good(), &format!("{common} out.pdf"), &["must end in .svg or .png"]);
+    refused(&good(), &format!("{common} out.pdf"), &["must end in .svg, .png or .html"]);
     refused(&good(), &format!("{common} no/such/folder/out.svg"), &["cannot write no/such/folder"]);
 }
 

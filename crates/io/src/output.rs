@@ -161,7 +161,7 @@ impl BegunFile {
             return Ok((tempfile::tempfile()?, Stage::StandardOutput));
         }
         // Through a symbolic link, so that the link stays one.
-        let destination = resolved(path);
+        let destination = resolved(path)?;
         let permissions = match fs::metadata(&destination) {
             Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
             Ok(metadata) if !metadata.is_file() => {
@@ -231,28 +231,30 @@ impl Stage {
 /// Number of links to links that are followed, as the system does.
 const MOST_LINKS: usize = 40;
 
-/// A path without symbolic links, whether a file stands there or not.
-fn resolved(path: &Path) -> PathBuf {
+/// A path without symbolic links, whether a file stands there or not; links in a ring are an error.
+fn resolved(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
         if let Ok(resolved) = fs::canonicalize(&path) {
-            return resolved;
+            return Ok(resolved);
         }
         let folder = match path.parent() {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // A link to a file that is not there yet.
-        if let Ok(target) = fs::read_link(&path) {
+        // A link to a file that is not there yet; that to a pipe has no path, and is opened as it is.
+        if fs::metadata(&path).is_err()
+            && let Ok(target) = fs::read_link(&path)
+        {
             path = folder.join(target);
             continue;
         }
-        return match (fs::canonicalize(folder), path.file_name()) {
+        return Ok(match (fs::canonicalize(folder), path.file_name()) {
             (Ok(folder), Some(name)) => folder.join(name),
             _ => path,
-        };
+        });
     }
-    path
+    Err(io::Error::other("it is a symbolic link in a ring of links"))
 }
 
 /// Creates the file that is to become `destination`.

@@ -143,8 +143,13 @@ impl ModesArgs {
     /// Reads what there is, finds the modes, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let channels = self.channels.channels();
-        if channels.first_response().is_none() && channels.force.is_empty() {
-            return self.of_machine(&self.input.record);
+        if channels.first_response().is_none() {
+            let path = &self.input.record;
+            let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+            if !channels.force.is_empty() || !(is_json || is_standard_input(path)) {
+                return Err(AnalysisError::NoMotion.into());
+            }
+            return self.of_machine(path);
         }
         if channels.force.is_empty() && !self.unmeasured.ambient {
             self.refuse("a free decay", &self.of_forces())?;

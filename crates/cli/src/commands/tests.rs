@@ -7,7 +7,8 @@ use clap::{Arg, CommandFactory as _, Parser as _};
 use super::Cli;
 
 /// Units by the name of an option's value.
-const UNITS: [(&str, &str); 7] = [
+const UNITS: [(&str, &str); 8] = [
+    ("GB", "GB"),
     ("HZ", "Hz"),
     ("N", "N"),
     ("DB", "dB"),

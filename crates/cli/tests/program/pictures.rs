@@ -267,9 +267,9 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
     write("time.csv", "time\n0\n1\n2\n3\n");
     let before = fs::read_dir(folder.path()).unwrap().count();
     for (arguments, words) in [
-        ("modes one.json --plot x.txt", "must end in .svg or .png"),
-        ("simulate one.json --output y.csv --plot x.txt", "must end in .svg or .png"),
-        ("info time.csv --plot x.txt", "must end in .svg or .png"),
+        ("modes one.json --plot x.txt", "must end in .svg, .png or .html"),
+        ("simulate one.json --output y.csv --plot x.txt", "must end in .svg, .png or .html"),
+        ("info time.csv --plot x.txt", "must end in .svg, .png or .html"),
         ("modes free.json --plot x.svg", "free.json: nothing to plot: the machine has no natural"),
         ("info time.csv --plot x.svg", "time.csv: nothing to plot: no column other than time"),
         ("simulate one.json --output y.csv --plot missing/x.svg", "missing/x.svg"),

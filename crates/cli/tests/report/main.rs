@@ -81,10 +81,10 @@ fn closed(page: &str) -> String {
     let script = format!("<script>{}</script>", mechid::plot::script());
     assert_eq!(page.matches(&script).count(), 1);
     let page = page.replacen(&script, "", 1);
-    let mut parts = page.split("<meta");
+    let mut parts = page.split("<meta ");
     let mut text = parts.next().unwrap().to_owned();
     for part in parts {
-        text += &format!("<meta{}", part.replacen('>', "/>", 1));
+        text += &format!("<meta {}", part.replacen('>', "/>", 1));
     }
     text
 }

@@ -5,7 +5,6 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
-use mechid_numerics::NumericsError;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use mechid_spectra::SpectraError;
 use mechid_spectra::{FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods};
@@ -300,7 +299,8 @@ fn noise_that_cannot_weigh_is_refused() {
     )
     .unwrap();
     let e = instrumental_variables(&short, &periods.mean().unwrap(), &unknowns).unwrap_err();
-    assert!(matches!(e, EstimateError::Numerics(NumericsError::Size { expected: 1, got: 40, .. })));
+    let told = format!("{e:?}");
+    assert!(told.contains("Size") && told.contains("expected: 1, got: 40"), "{told}");
 }
 
 /// Judge: the lines of the seven periods taken as one record, between those of one period.
