@@ -435,16 +435,16 @@ pub enum AnalysisError {
         file: String,
         /// Numbers that the work holds.
         numbers: usize,
-        /// Estimate of the memory that it takes, in GB.
+        /// Estimate of the memory that it takes, in units of GB.
         needed_gb: f64,
-        /// The limit, in GB.
+        /// The limit, in units of GB.
         allowed_gb: f64,
     },
     /// A record of a fleet took more memory than it may.
     #[error("the record took more than {gb} GB of memory, and the process that worked on it was ended; `record_memory_gb` sets the limit",
         gb = message::number(*gb))]
     RecordMemory {
-        /// The limit, in GB.
+        /// The limit, in units of GB.
         gb: f64,
     },
     /// A record of a fleet took more time than it may.
@@ -457,7 +457,7 @@ pub enum AnalysisError {
     /// The process that worked on a record of a fleet has ended.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {
-        /// How it ended, and what it said.
+        /// Way in which it ended, and what it said.
         how: String,
     },
     /// A setting cannot be understood.

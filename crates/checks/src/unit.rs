@@ -19,7 +19,7 @@ pub struct Unit {
     /// Factor that it makes or would make, in SI units per unit of the column; `None` if it is not
     /// understood.
     pub factor: Option<f64>,
-    /// Whether the numbers are multiplied by the factor.
+    /// `true` if the numbers are multiplied by the factor.
     pub used: bool,
     /// SI unit in which the numbers are needed.
     pub si: &'static str,

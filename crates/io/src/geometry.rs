@@ -180,8 +180,12 @@ impl Geometry {
         geometry
     }
 
-    /// Returns the displacement of each point of a shape whose entries have these names, such as `1+Z`; an entry
-    /// whose name has no axis moves its point along z. `None` if an entry has no point.
+    /// Returns the displacement along x, y, z of each point of a shape (real and imaginary parts,
+    /// pure numbers) whose entries have these names, such as `1+Z`; an entry whose name has no axis
+    /// moves its point along z. `None` if an entry has no point.
+    ///
+    /// # Source
+    /// Ours.
     pub fn displacement(&self, names: &[String], shape: &[[f64; 2]]) -> Option<Vec<[[f64; 2]; 3]>> {
         let mut moved = vec![[[0.0; 2]; 3]; self.points.len()];
         for (name, [re, im]) in names.iter().zip(shape) {

@@ -10,7 +10,7 @@ use crate::triangular::TriangularFactor;
 /// Overdetermined linear equations A θ ≈ B gathered block by block; memory does not grow with rows.
 ///
 /// ```
-/// use mechid_numerics::LeastSquares;
+/// use mechid_numerics::least_squares::LeastSquares;
 /// use nalgebra::DMatrix;
 ///
 /// // A straight line 2 + 3 t through a million points, a thousand at a time.

@@ -40,7 +40,7 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// carried along is the difference to I, so that a matrix close to I keeps its relative accuracy.
 ///
 /// ```
-/// use mechid_numerics::logarithm;
+/// use mechid_numerics::logarithm::logarithm;
 /// use nalgebra::dmatrix;
 ///
 /// // A quarter turn: its logarithm is the generator of rotations times π/2.

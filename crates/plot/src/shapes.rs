@@ -199,7 +199,8 @@ impl View {
 /// Number of modes above which a matrix has no numbers in its squares: they would not fit.
 const NUMBERED: usize = 20;
 
-/// Draws a square matrix of numbers from 0 to 1, row by row, as squares, darker for more, with the numbers in them.
+/// Draws a square matrix of pure numbers from 0 to 1, row by row, as squares, darker for more, with
+/// the numbers in them.
 pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     const EDGE: f64 = 34.0;
     let side = (440.0 / values.len().max(1) as f64).clamp(14.0, 46.0);

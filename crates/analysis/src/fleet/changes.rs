@@ -31,9 +31,9 @@ const SLOPES: usize = 400;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChangeKind {
-    /// From one level to another, between two records.
+    /// Change from one level to another, between two records.
     Step,
-    /// By the same amount from record to record, from one record on.
+    /// Change by the same amount from record to record, from one record on.
     Drift,
 }
 

@@ -36,16 +36,17 @@ const POLL: Duration = Duration::from_millis(5);
 /// Words with which an allocation that fails ends a process.
 const OUT_OF_MEMORY: &str = "memory allocation of";
 
-/// How records are kept apart: the program that identifies them, and what each may take.
+/// Separation of records: the program that identifies them, and what each may take.
 ///
 /// The program reads its orders from standard input and ends with [`serve`](super::serve).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Isolation {
     /// The program.
     pub program: PathBuf,
-    /// Its arguments.
+    /// Arguments of the program.
     pub arguments: Vec<OsString>,
-    /// Memory that a record may take, in GB, with what the program itself takes; Linux alone limits it.
+    /// Memory that a record may take, in units of GB, with what the program itself takes; Linux
+    /// alone limits it.
     pub record_memory_gb: f64,
     /// Time that a record may take, in s.
     pub record_seconds: f64,

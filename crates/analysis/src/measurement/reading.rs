@@ -39,8 +39,8 @@ pub struct Reading {
     /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
     /// `None`: 1.
     pub limits_factor: Option<usize>,
-    /// Memory that the numbers of a file and the work on them may take, in GB; `None`: 0.27 GB and 512
-    /// bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
+    /// Memory that the numbers of a file and the work on them may take, in units of GB; `None`:
+    /// 0.27 GB and 512 bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_gb: Option<f64>,
 }

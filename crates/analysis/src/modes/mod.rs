@@ -36,13 +36,13 @@ pub struct Modes {
 /// own RMS in the band.
 #[derive(Debug, Clone, Default)]
 pub struct ModesSpectrum {
-    /// Frequencies of the first record or force, in Hz.
+    /// Frequencies of the lines of the first record or force, in Hz.
     pub frequency_hz: Vec<f64>,
-    /// Measured, a ratio.
+    /// Measured, a ratio, one for each frequency.
     pub measured: Vec<f64>,
-    /// Explained by modes and residual terms, a ratio.
+    /// Explained by modes and residual terms, a ratio, one for each frequency.
     pub modelled: Vec<f64>,
-    /// Difference of the two, a ratio.
+    /// Difference of the two, a ratio, one for each frequency.
     pub residual: Vec<f64>,
 }
 

@@ -20,7 +20,8 @@ pub struct ModesSettings {
     pub modes: Option<usize>,
     /// Largest number of modes where the number is not given.
     pub max_modes: Option<usize>,
-    /// Frequencies, in Hz, near which a mode is looked for whatever the start shows.
+    /// Frequencies, in Hz, near which a mode is looked for whatever the start shows; a list of any
+    /// length.
     pub near_hz: Vec<f64>,
     /// Places of the forces, one each (of a roving hammer one per record), and of the responses, by
     /// which a driving point is known; empty: not stated.

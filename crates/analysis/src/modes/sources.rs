@@ -72,7 +72,7 @@ impl Recorded {
                 None => vec![measurement.whole_block()?],
                 Some(rule) => {
                     let cut = hits::cut(&[measurement.hold_any()?], rule)?;
-                    hits.extend(cut.rows);
+                    hits.extend(cut.rows.into_iter().map(|row| columns.placed(at, row)));
                     cut.hits.into_iter().map(|hit| hit.into_held()).collect()
                 }
             };
@@ -177,6 +177,12 @@ impl Columns {
             data.column_mut(*input).copy_from_slice(block.force.channel(column));
         }
         Ok(Record::new(block.force.sampling(), data)?)
+    }
+
+    /// A hit of a record, with the input that it belongs to.
+    fn placed(&self, record: usize, hit: HitRow) -> HitRow {
+        let force = self.input[record].get(hit.force - 1).map_or(hit.force, |input| input + 1);
+        HitRow { force, ..hit }
     }
 
     /// Pairs of an input and an output at the same place.

@@ -92,7 +92,8 @@ pub struct ModalModeRow {
     pub mode: ShapedMode,
     /// One entry per force; the largest is 1. Empty without forces.
     pub participation: Vec<ShapeEntry>,
-    /// Modal phase collinearity of the shape: 1 if all entries have one phase or its opposite.
+    /// Modal phase collinearity of the shape, a pure number: 1 if all entries have one phase or its
+    /// opposite.
     pub phase_collinearity: f64,
     /// Share of the motion of this mode that the measured forces drive; the rest answers forces that
     /// were not measured. `None` without measured forces.
@@ -101,7 +102,7 @@ pub struct ModalModeRow {
     /// place of a response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_mass: Option<f64>,
-    /// Length of the record in decay times of the mode, ζωT, of ambient records.
+    /// Length of the record in decay times of the mode, ζωT, a pure number, of ambient records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_times: Option<f64>,
 }
@@ -109,7 +110,7 @@ pub struct ModalModeRow {
 /// A sinusoid in an ambient record.
 #[derive(Debug, Clone, Serialize)]
 pub struct HarmonicRow {
-    /// Its frequency, in Hz.
+    /// Frequency, in Hz.
     pub frequency_hz: f64,
     /// Probability of such a line without a sinusoid.
     pub p_value: f64,
@@ -118,9 +119,9 @@ pub struct HarmonicRow {
 /// A candidate that did not become a mode.
 #[derive(Debug, Clone, Serialize)]
 pub struct DroppedRow {
-    /// Its frequency, in Hz.
+    /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Its damping ratio, a pure number.
+    /// Damping ratio, a pure number.
     pub damping_ratio: f64,
     /// Reason, in a sentence.
     pub reason: String,
@@ -172,23 +173,14 @@ impl ModesSummary {
             count => message::count(count, "force"),
         };
         text + &format!(
-            "{forces}, {}; maximum likelihood, {} lines, {low} to {high} Hz\n",
+            "{forces}, {}; maximum likelihood, {} lines, {low} to {high} Hz; ± is one standard error\n",
             message::count(self.outputs.len(), "response"),
             self.lines
         )
     }
 
     fn mode_table(&self) -> String {
-        let header = [
-            "mode",
-            "frequency (Hz)",
-            "±",
-            "95 % interval",
-            "damping ratio (%)",
-            "±",
-            "95 % interval",
-            "driven (%)",
-        ];
+        let header = ["mode", "frequency (Hz)", "±", "damping ratio (%)", "±", "driven (%)"];
         let columns = if self.inputs.is_empty() { header.len() - 1 } else { header.len() };
         let mut rows = vec![header[..columns].iter().map(|cell| cell.to_string()).collect()];
         for (number, mode) in (1..).zip(&self.modes) {
@@ -279,12 +271,13 @@ impl fmt::Display for ModesSummary {
     }
 }
 
-/// Value, standard error and interval; dashes where the record is too short for an interval.
-fn cells(value: &Uncertain) -> [String; 3] {
+/// Value and standard error; a dash where the record is too short for an interval.
+fn cells(value: &Uncertain) -> [String; 2] {
     if value.standard_error.is_none() {
-        return [significant(value.value, 4), "–".into(), "–".into()];
+        return [significant(value.value, 4), "–".into()];
     }
-    value.cells()
+    let [value, error, _] = value.cells();
+    [value, error]
 }
 
 /// Level of the intervals of this result.

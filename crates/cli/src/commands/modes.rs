@@ -145,8 +145,9 @@ impl ModesArgs {
         let channels = self.channels.channels();
         if channels.first_response().is_none() {
             let path = &self.input.record;
-            let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-            if !channels.force.is_empty() || !(is_json || is_standard_input(path)) {
+            let is_json =
+                path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+            if !channels.force.is_empty() || !(is_json || path == Path::new("-")) {
                 return Err(AnalysisError::NoMotion.into());
             }
             return self.of_machine(path);

@@ -13,7 +13,7 @@ pub enum LikelihoodError {
     /// Two things that belong together have different sizes.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// What was counted.
+        /// Things that were counted.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -27,13 +27,13 @@ pub enum LikelihoodError {
         name: &'static str,
         /// Requirement that it does not meet.
         requirement: &'static str,
-        /// Value given.
+        /// Value given, in the unit of the setting.
         value: f64,
     },
-    /// Nothing is unknown.
+    /// Every coefficient is known.
     #[error("every coefficient is known: there is nothing to identify")]
     NoParameter,
-    /// There are not more numbers than unknowns.
+    /// The measured numbers are not more than the unknowns.
     #[error(
         "{} cannot determine {}",
         message::count(*numbers, "measured number"),
@@ -66,7 +66,7 @@ pub enum LikelihoodError {
     /// The receptance does not exist.
     #[error("the machine has no finite response at {at}")]
     NoResponse {
-        /// Where in the search.
+        /// Place in the search.
         at: &'static str,
     },
     /// Open records need the motion of all degrees of freedom on every line.
@@ -88,7 +88,7 @@ pub enum LikelihoodError {
     /// A matrix decomposition failed.
     #[error("numbers overflow in {what}")]
     Overflow {
-        /// What was computed.
+        /// Quantity that was computed.
         what: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! What a fit says: parameters with intervals, priors, minima, and what is not determined.
+//! Results of a fit: parameters with intervals, priors, minima, and what is not determined.
 
 use std::fmt;
 
@@ -10,22 +10,23 @@ use super::limits::WEAK;
 use super::profile;
 use super::response_model::ResponseModel;
 
-/// How an interval was found.
+/// Way in which an interval was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum IntervalKind {
     /// Value ± quantile × standard error.
     Wald,
-    /// Where the profile of the likelihood has fallen: of a weakly determined parameter, or near a bound.
+    /// Points where the profile of the likelihood has fallen: of a weakly determined parameter, or
+    /// near a bound.
     Profile,
-    /// From the bound at which the estimate lies to the one-sided limit of the profile.
+    /// Range from the bound at which the estimate lies to the one-sided limit of the profile.
     OneSided,
     /// The data leave the parameter open: everything between its bounds.
     Open,
 }
 
-/// What a prior contributed to a parameter.
+/// Contribution of a prior to a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PriorReport {
@@ -46,15 +47,15 @@ pub struct PriorReport {
 pub struct ParameterEstimate {
     /// Name.
     pub name: String,
-    /// Most likely value.
+    /// Most likely value, in the unit of the parameter.
     pub value: f64,
-    /// Standard error; `None` if it is at a bound or not determined.
+    /// Standard error, in the unit of the parameter; `None` if it is at a bound or not determined.
     pub standard_error: Option<f64>,
-    /// Interval of the confidence asked for.
+    /// Interval of the confidence asked for, in the unit of the parameter.
     pub interval: [f64; 2],
-    /// How the interval was found.
+    /// Way in which the interval was found.
     pub interval_kind: IntervalKind,
-    /// Whether the estimate lies at a bound beyond which the data would have it.
+    /// `true` if the estimate lies at a bound beyond which the data would have it.
     pub at_bound: bool,
     /// Prior, if there is one.
     pub prior: Option<PriorReport>,
@@ -66,10 +67,10 @@ pub struct ParameterEstimate {
 pub struct Combination {
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Their values, any that agree with the combinations.
+    /// Values, one for each parameter, in its unit; any that agree with the combinations.
     pub values: Vec<f64>,
-    /// Coefficients of the parameters in the change of each combination that is determined; the largest
-    /// is 1.
+    /// Coefficients of the parameters in the change of each combination that is determined, in
+    /// the unit of the parameter with the largest, which is 1, per unit of each parameter.
     pub determined: Vec<Vec<f64>>,
 }
 
@@ -119,10 +120,10 @@ impl Combination {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FoundMinimum {
-    /// Values of the parameters.
+    /// Values of the parameters, one for each, in its unit.
     pub parameters: Vec<f64>,
-    /// Sum of squares, those of the priors included: minus twice the logarithm of the likelihood, up to a
-    /// constant.
+    /// Sum of squares, a pure number, those of the priors included: minus twice the logarithm of
+    /// the likelihood, up to a constant.
     pub sum_of_squares: f64,
     /// Number of searches that ended here.
     pub searches: usize,
@@ -136,10 +137,11 @@ pub struct FoundMinimum {
 pub struct LikelihoodEstimate {
     /// Unknowns, in the order of the model.
     pub parameters: Vec<ParameterEstimate>,
-    /// Covariance of the parameters; 0 for those at a bound, without what is not determined.
+    /// Covariance of the parameters, one row and one column for each, in the product of their
+    /// units; 0 for those at a bound, without what is not determined.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub covariance: DMatrix<f64>,
-    /// Logarithm of the likelihood.
+    /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
     /// Sum of squares in units of the noise over its expectation: 1 for a right model; `None` where the
     /// noise comes from the residual.
@@ -149,9 +151,9 @@ pub struct LikelihoodEstimate {
     /// Factor by which standard errors and intervals are larger than the noise alone makes them, because model
     /// and data disagree beyond it; 1 where they do not.
     pub error_scale: f64,
-    /// Whether the noise of all outputs was found white; `None` where it is stated.
+    /// `true` if the noise of all outputs was found white; `None` where it is stated.
     pub white_noise: Option<bool>,
-    /// Root mean square of the residual over that of the output, per output.
+    /// Ratio of the root mean square of the residual to that of the output, per output.
     pub relative_residual: Vec<f64>,
     /// Minima found, the lowest first.
     pub minima: Vec<FoundMinimum>,
@@ -171,7 +173,7 @@ impl LikelihoodEstimate {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Returns the values of the parameters.
+    /// Returns the values of the parameters, one for each, in its unit.
     pub fn values(&self) -> Vec<f64> {
         self.parameters.iter().map(|parameter| parameter.value).collect()
     }

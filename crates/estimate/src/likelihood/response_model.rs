@@ -1,4 +1,4 @@
-//! What the likelihood asks of a model.
+//! Requirements of the likelihood on a model.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -32,11 +32,13 @@ pub trait ResponseModel: Sync {
     /// Returns the angular frequency (rad/s) of each line that the model was prepared for.
     fn omega(&self) -> &[f64];
 
-    /// Returns the response at a line, `None` where it does not exist.
+    /// Returns the response at a line with parameters in their own units, `None` where it does not
+    /// exist.
     fn at(&self, parameters: &[f64], row: usize) -> Option<Self::Line<'_>>;
 
-    /// Adds the uncertainty of the model itself to the covariance of the outputs (p × p), at a line with
-    /// the response `line` under `input`; a model that is exact adds nothing.
+    /// Adds the uncertainty of the model itself to the covariance of the outputs (p × p, in the
+    /// products of their units), at a line with the response `line` under `input` (q, in the units
+    /// of the inputs); a model that is exact adds nothing.
     fn add_covariance(
         &self,
         _row: usize,
@@ -49,17 +51,19 @@ pub trait ResponseModel: Sync {
 
 /// Response of a model at one line, and what its derivatives need.
 pub trait LineResponse {
-    /// Returns G, p × q.
+    /// Returns G, p × q, in units of the outputs per unit of the inputs.
     fn receptance(&self) -> &DMatrix<Complex<f64>>;
 
-    /// Returns the response (p) to loads of the model itself, such as an unknown unbalance.
+    /// Returns the response (p entries, in the units of the outputs) to loads of the model itself,
+    /// such as an unknown unbalance.
     fn own_response(&self) -> Option<&DVector<Complex<f64>>>;
 
     /// Returns the response to a unit of each state load, p × states.
     fn state_response(&self) -> Option<&DMatrix<Complex<f64>>>;
 
     /// Writes the derivative of the response to `input` (q), to the model's own loads and to `states`
-    /// (amplitudes of the state loads, which may be empty) with respect to each parameter, p × parameters.
+    /// (amplitudes of the state loads, which may be empty) with respect to each parameter,
+    /// p × parameters, in units of the outputs per unit of the parameters.
     fn sensitivity(
         &self,
         parameters: &[f64],

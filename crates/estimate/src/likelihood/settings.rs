@@ -2,7 +2,7 @@
 
 use super::LikelihoodError;
 
-/// Where the noise of the outputs is known from.
+/// Source from which the noise of the outputs is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -21,7 +21,7 @@ pub enum NoiseSource {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Settings {
-    /// Where the noise of the outputs is known from.
+    /// Source from which the noise of the outputs is known.
     pub noise: NoiseSource,
     /// Maximum number of searches: one from the given values, the others from random ones.
     pub starts: usize,

@@ -260,8 +260,8 @@ impl Table {
         self.stated_unit(column, None)?.used().cloned()
     }
 
-    /// What a column states about its unit, by its index counted from 0, where it should hold a quantity: the unit, or a
-    /// text that may be one and is not understood.
+    /// Returns what a column states about its unit, by its index counted from 0, where it should
+    /// hold a quantity: the unit, or a text that may be one and is not understood.
     ///
     /// # Panics
     /// If there is no such column.

@@ -11,11 +11,11 @@ use crate::{Matrix, ModelError, SecondOrderSystem};
 pub struct MachineParameter {
     /// Name: that of the shared parameter, or of the element and the coefficient.
     pub name: String,
-    /// First value of the search.
+    /// First value of the search, in the unit of the parameter.
     pub start: f64,
-    /// Lower bound; −∞ without one.
+    /// Lower bound, in the unit of the parameter; −∞ without one.
     pub min: f64,
-    /// Upper bound; ∞ without one.
+    /// Upper bound, in the unit of the parameter; ∞ without one.
     pub max: f64,
     /// Knowledge from elsewhere.
     pub prior: Option<Prior>,
@@ -140,7 +140,7 @@ impl Assembly {
         &self.measured
     }
 
-    /// Returns the first values of the search.
+    /// Returns the first values of the search, one for each parameter, in its unit.
     pub fn start(&self) -> Vec<f64> {
         self.parameters.iter().map(|parameter| parameter.start).collect()
     }
@@ -159,8 +159,11 @@ impl Assembly {
         self.loads.iter().map(load).collect()
     }
 
-    /// Returns D(ω) (n × n, N/m) and the column D_g of the support as the last one, n × (n + 1), summed over
-    /// the terms that `included` accepts.
+    /// Returns D(ω) (n × n, N/m) and the column D_g of the support as the last one, n × (n + 1),
+    /// summed over the terms that `included` accepts.
+    ///
+    /// # Source
+    /// Bathe (1982), the direct stiffness method.
     pub fn dynamic_stiffness(
         &self,
         parameters: &[f64],
@@ -176,10 +179,14 @@ impl Assembly {
         sum
     }
 
-    /// Returns M, C + Ω G and K at a speed (rad/s) of the rotor; hysteresis has no place in them.
+    /// Returns M, C + Ω G and K, n × n each, at a speed (rad/s) of the rotor; hysteresis has no
+    /// place in them.
     ///
     /// # Errors
     /// [`ModelError::SingularMass`] and whatever else [`SecondOrderSystem::new`] refuses.
+    ///
+    /// # Source
+    /// Bathe (1982), the direct stiffness method.
     pub fn system(&self, parameters: &[f64], speed: f64) -> Result<SecondOrderSystem, ModelError> {
         let n = self.dof();
         let mut sums = Matrix::ALL.map(|_| DMatrix::zeros(n, n + 1));

@@ -1,4 +1,4 @@
-//! From the description of a machine to its terms.
+//! Steps from the description of a machine to its terms.
 
 use std::collections::HashMap;
 

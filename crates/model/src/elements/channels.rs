@@ -6,7 +6,7 @@ use super::build::Builder;
 use super::{Input, MachineError, Sensor, Speed};
 use crate::ResponseQuantity;
 
-/// What a sensor reads: a sum of motions; index n is the support.
+/// Reading of a sensor: a sum of motions; index n is the support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorRow {
     /// Name of the channel.
@@ -17,7 +17,7 @@ pub struct SensorRow {
     pub quantity: ResponseQuantity,
 }
 
-/// What an input does.
+/// Action of an input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InputColumn {
     /// Forces on degrees of freedom, per unit of the input.

@@ -1,4 +1,4 @@
-//! What is known of a coefficient of an element beforehand.
+//! Knowledge of a coefficient of an element beforehand.
 
 use super::MachineError;
 
@@ -18,13 +18,14 @@ pub struct Prior {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct FreeCoefficient {
-    /// First value of the search; without one the mean of the prior, or a value between the bounds.
+    /// First value of the search, in the unit of the coefficient; without one the mean of the
+    /// prior, or a value between the bounds.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub start: Option<f64>,
-    /// Lower bound.
+    /// Lower bound, in the unit of the coefficient.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub min: Option<f64>,
-    /// Upper bound.
+    /// Upper bound, in the unit of the coefficient.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub max: Option<f64>,
     /// Mean and standard deviation known from elsewhere.

@@ -63,13 +63,13 @@ pub struct Bearing {
 pub struct MatrixElement {
     /// Degrees of freedom of the rows and columns.
     pub dofs: Vec<String>,
-    /// M, in kg, and its factor.
+    /// M, d × d, in kg, and its factor.
     pub mass: Option<(DMatrix<f64>, Coefficient)>,
-    /// C, in N·s/m, and its factor.
+    /// C, d × d, in N·s/m, and its factor.
     pub damping: Option<(DMatrix<f64>, Coefficient)>,
-    /// K, in N/m, and its factor.
+    /// K, d × d, in N/m, and its factor.
     pub stiffness: Option<(DMatrix<f64>, Coefficient)>,
-    /// G of the gyroscopic force Ω G ẋ, in kg·m² (kg), and its factor.
+    /// G of the gyroscopic force Ω G ẋ, d × d, in kg·m² (kg), and its factor.
     pub gyroscopic: Option<(DMatrix<f64>, Coefficient)>,
 }
 

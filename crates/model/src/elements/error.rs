@@ -50,7 +50,7 @@ pub enum MachineError {
     Element {
         /// Name of the element.
         name: String,
-        /// What does not fit.
+        /// Fault, in words.
         problem: String,
     },
     /// A coefficient refers to a parameter that is not described.
@@ -72,7 +72,7 @@ pub enum MachineError {
     NotFinite {
         /// Name of the coefficient, sensor or matrix.
         name: String,
-        /// Value given.
+        /// Value given, in its own unit.
         value: f64,
     },
     /// The lower bound is not below the upper one.
@@ -84,9 +84,9 @@ pub enum MachineError {
     Bounds {
         /// Name of the coefficient.
         name: String,
-        /// Lower bound.
+        /// Lower bound, in the unit of the coefficient.
         min: f64,
-        /// Upper bound.
+        /// Upper bound, in the unit of the coefficient.
         max: f64,
     },
     /// The search would start outside the bounds.
@@ -99,11 +99,11 @@ pub enum MachineError {
     StartOutside {
         /// Name of the coefficient.
         name: String,
-        /// First value.
+        /// First value, in the unit of the coefficient.
         start: f64,
-        /// Lower bound.
+        /// Lower bound, in the unit of the coefficient.
         min: f64,
-        /// Upper bound.
+        /// Upper bound, in the unit of the coefficient.
         max: f64,
     },
     /// An unknown has no value from which the search could start.
@@ -120,7 +120,7 @@ pub enum MachineError {
     PriorDeviation {
         /// Name of the coefficient.
         name: String,
-        /// Standard deviation given.
+        /// Standard deviation given, in the unit of the coefficient.
         standard_deviation: f64,
     },
     /// A degree of freedom has no mass.
@@ -140,7 +140,7 @@ pub enum MachineError {
         /// Degree of freedom.
         dof: String,
     },
-    /// There is no sensor.
+    /// The machine has no sensor or no input.
     #[error("the machine has no {what}")]
     NoInstrument {
         /// `"sensors"` or `"inputs"`.

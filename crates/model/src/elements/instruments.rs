@@ -60,7 +60,7 @@ pub enum Input {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Speed {
-    /// Nothing turns.
+    /// No part turns.
     #[default]
     None,
     /// The same on all lines, in rad/s.

@@ -47,9 +47,9 @@ impl Power {
 pub enum Pattern {
     /// a bᵀ, by the non-zero entries of a and b.
     Dyad {
-        /// Entries of a.
+        /// Entries of a, pure numbers.
         left: Vec<(usize, f64)>,
-        /// Entries of b.
+        /// Entries of b, pure numbers.
         right: Vec<(usize, f64)>,
     },
     /// A d × d matrix over some degrees of freedom.
@@ -77,12 +77,13 @@ pub struct Term {
 }
 
 impl Term {
-    /// Returns scale × product of parameters.
+    /// Returns scale × product of parameters, which are in their own units.
     pub fn value(&self, parameters: &[f64]) -> f64 {
         self.parameters.iter().fold(self.scale, |product, at| product * parameters[*at])
     }
 
-    /// Returns each parameter with the derivative of [`Term::value`] with respect to it.
+    /// Returns each parameter with the derivative of [`Term::value`] with respect to it, in the
+    /// unit of the value over the unit of the parameter.
     pub fn derivatives<'a>(
         &'a self,
         parameters: &'a [f64],

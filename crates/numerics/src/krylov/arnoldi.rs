@@ -113,7 +113,7 @@ pub struct Dominant {
     pub value: Complex<f64>,
     /// Residual ‖Φ u − μ u‖, in the unit of Φ.
     pub residual: f64,
-    /// Eigenvector u, n entries, of norm 1.
+    /// Eigenvector u, n entries, pure numbers, of norm 1.
     pub vector: DVector<Complex<f64>>,
 }
 

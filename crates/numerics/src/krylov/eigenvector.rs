@@ -6,9 +6,10 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::krylov::start_vector::numbered_start_vector;
 
-/// Returns the eigenvector of norm 1 of a square `matrix` to its eigenvalue `value`, by inverse
-/// iteration; `None` if numbers overflow. The matrix has at most `below` diagonals under the main
-/// one; for a multiple eigenvalue each `number` gives another eigenvector.
+/// Returns the eigenvector of norm 1 (pure numbers) of a square `matrix` to its eigenvalue `value`,
+/// in the unit of the matrix, by inverse iteration; `None` if numbers overflow. The matrix has at
+/// most `below` diagonals under the main one; for a multiple eigenvalue each `number` gives another
+/// eigenvector.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1.

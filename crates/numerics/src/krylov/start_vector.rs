@@ -2,12 +2,13 @@
 
 use nalgebra::DVector;
 
-/// Returns a pseudo-random vector of `len` entries and norm 1, the same on every run.
+/// Returns a pseudo-random vector of `len` entries, pure numbers, and norm 1, the same on every
+/// run.
 pub fn start_vector(len: usize) -> DVector<f64> {
     numbered_start_vector(len, 0)
 }
 
-/// Returns one of many such vectors, by its `number`.
+/// Returns one of many such vectors of `len` entries, pure numbers, by its `number`.
 pub fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
     let vector = DVector::from_iterator(len, pseudo_random(number).take(len));
     vector.normalize()

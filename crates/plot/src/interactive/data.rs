@@ -1,4 +1,4 @@
-//! What the script reads: axes, curves and numbers of figures, as JSON.
+//! Data that the script reads: axes, curves and numbers of figures, as JSON.
 
 use serde::Serialize;
 

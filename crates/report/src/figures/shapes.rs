@@ -74,7 +74,8 @@ impl ModeShapes {
         drawing.draw(label)
     }
 
-    /// Returns the modal assurance criterion of each pair of modes: 1 for the same shape, 0 for orthogonal ones.
+    /// Returns the modal assurance criterion of each pair of modes, a square matrix of pure
+    /// numbers: 1 for the same shape, 0 for orthogonal ones.
     ///
     /// # Source
     /// R. J. Allemang and D. L. Brown, "A correlation coefficient for modal vector analysis", IMAC 1 (1982).
@@ -94,8 +95,13 @@ impl ModeShapes {
     }
 }
 
-/// Draws the poles of models of rising order over the sum of the responses, which is scaled to the height of the
-/// diagram: its logarithm from the smallest to the largest value. `sum` has frequencies, in Hz, and magnitudes.
+/// Draws the poles of models of rising order over the sum of the responses, which is scaled to the
+/// height of the diagram: its logarithm from the smallest to the largest value. `sum` has
+/// frequencies, in Hz, and magnitudes, one for each frequency.
+///
+/// # Source
+/// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
+/// Analysis Conference (stabilisation diagram).
 pub fn stabilisation(title: &str, poles: &[StabilisationPole], sum: (&[f64], &[f64])) -> Figure {
     let highest = poles.iter().map(|pole| pole.order).max().unwrap_or(1) as f64;
     let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Order", ""));

@@ -69,8 +69,8 @@ impl Trace {
         })
     }
 
-    /// Returns the curve with standard errors of its magnitudes, one for each drawn point; without them in
-    /// decibels, and where one is not a number.
+    /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
+    /// unit of the magnitudes; without them in decibels, and where one is not a number.
     pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
         let is_whole = errors.len() == self.magnitude.len();
         let is_known = is_whole && errors.iter().all(|error| error.is_finite());
@@ -80,7 +80,7 @@ impl Trace {
         self
     }
 
-    /// Returns whether a style draws a response at an angular frequency.
+    /// Returns whether a style draws a response, in any unit, at an angular frequency (rad/s).
     pub fn is_drawn(style: FigureStyle, omega: f64, h: Complex<f64>) -> bool {
         let positive = style.frequency == Some(FrequencyScale::Logarithmic);
         h.norm() > 0.0 && (!positive || omega > 0.0)

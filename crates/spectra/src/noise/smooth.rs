@@ -84,9 +84,9 @@ fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
 #[derive(Debug, Clone)]
 pub struct Smooth {
     pub(crate) form: Form,
-    /// Orthonormal columns that span the log powers of the form, lines × terms.
+    /// Orthonormal columns, pure numbers, that span the log powers of the form, lines × terms.
     pub basis: DMatrix<f64>,
-    /// Logarithm of the power, lines × channels.
+    /// Logarithm of the power in the unit of the variances, lines × channels.
     pub log_power: DMatrix<f64>,
     /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
     pub(crate) misfit: f64,

@@ -1,4 +1,4 @@
-//! Where another sensor or another force would say most.
+//! Places where another sensor or another force would say most.
 
 use mechid_model::elements::{Input, InputColumn, Instruments, Machine, Sensor};
 use mechid_spectra::LineData;
@@ -16,7 +16,7 @@ pub enum Candidate {
     Force(Input),
 }
 
-/// What a [`Candidate`] would bring.
+/// Gain that a [`Candidate`] would bring.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CandidateGain {
@@ -27,7 +27,8 @@ pub struct CandidateGain {
     pub information_gain: f64,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
-    /// Standard errors with the candidate, in the order of the parameters; `None` of what stays open.
+    /// Standard errors with the candidate, one for each parameter in their order and in its unit;
+    /// `None` of what stays open.
     pub standard_errors: Vec<Option<f64>>,
 }
 

@@ -143,8 +143,7 @@ fn open_records() {
     // Each channel has noise of its own level.
     let level = |at| 0.01 * response.data().column(at).norm() / (response.len() as f64).sqrt();
     let levels = [0, 1].map(level);
-    let spectrum =
-        NoiseSpectrum::white(rig.sampling, &band, quantity, &levels, &[0.0; 2]).unwrap();
+    let spectrum = NoiseSpectrum::white(rig.sampling, &band, quantity, &levels, &[0.0; 2]).unwrap();
     let omega = old.omega().to_vec();
     let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
         old.displacement()[(row, at)] * quantity.per_displacement(omega[row])
