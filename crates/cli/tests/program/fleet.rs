@@ -161,7 +161,7 @@ fn records_that_end_their_process_become_rows() {
         "reading": {"limits_factor": 1000, "memory_gb": 100}, "window": {"period": 256}}"#;
     fs::write(home.path().join("analysis.json"), analysis).unwrap();
     let run = "fleet day --analysis analysis.json --output results --json --part-records 2 \
-               --record-memory-gb 0.7 --record-seconds 4";
+               --record-memory-gb 0.5 --record-seconds 10";
     let done = program(home.path(), run);
     assert_eq!(done.status.code(), Some(1), "{}", String::from_utf8_lossy(&done.stderr));
     let report: Value = serde_json::from_slice(&done.stdout).unwrap();
