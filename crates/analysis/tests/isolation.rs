@@ -26,7 +26,6 @@ fn main() {
     records_beyond_the_limits_make_rows();
     #[cfg(target_os = "linux")]
     the_record_that_ends_the_process_has_the_error();
-    println!("the records of fleets are kept apart");
 }
 
 fn analysis() -> SavedAnalysis {

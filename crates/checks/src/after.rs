@@ -19,7 +19,7 @@ use super::whiteness::{NoiseSpan, Residual, Whiteness};
 /// `fitted` is the signal that the residual was left of, on the same time axis; a residual of rounding
 /// passes whatever its colour. `noise_span` is the number of lags over which noise on the response
 /// correlates the residual: 0 where each sample of it holds the noise of one sample, 1 where it holds
-/// that of two consecutive ones ([`missing_force`](crate::missing_force())), the window less one after
+/// that of two consecutive ones ([`missing_force`](mechid_estimate::missing_force())), the window less one after
 /// a sliding polynomial. A residual correlated over that span and no further is reported as such. The
 /// correlation with a force is judged with the colour that the residual has.
 ///
@@ -28,7 +28,7 @@ use super::whiteness::{NoiseSpan, Residual, Whiteness};
 /// do not belong together.
 ///
 /// # Source
-/// Those of [`whiteness_beyond`] and [`cross_correlation`](super::cross_correlation).
+/// Those of [`whiteness_beyond`] and the cross-correlation.
 pub fn after_fit(
     residual: &Record,
     fitted: &Record,

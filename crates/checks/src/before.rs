@@ -17,7 +17,7 @@ use super::{highest_mode, persistent_excitation};
 ///
 /// # Errors
 /// [`EstimateError::NoDof`] without a record; as [`Transitions::push`], and
-/// [`NumericsError::TooFewRows`].
+/// [`NumericsError::TooFewRows`](mechid_numerics::NumericsError::TooFewRows).
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 13 (persistence of

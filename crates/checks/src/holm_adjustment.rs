@@ -8,7 +8,7 @@ use super::p_value::PValue;
 /// those of maximum likelihood, and the test for growth, apart from the tests of data and residual.
 ///
 /// If nothing but noise speaks against the fit, the probability that any finding of a group becomes a
-/// warning is at most [`SIGNIFICANCE`](super::thresholds::SIGNIFICANCE), three times that for all together,
+/// warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE), three times that for all together,
 /// however the tests depend on one another.
 ///
 /// # Source

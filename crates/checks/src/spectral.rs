@@ -17,7 +17,7 @@ use super::unequal_periods::unequal_periods;
 /// experiments that are fitted together, since one shaker at a time excites one degree of freedom each.
 ///
 /// # Errors
-/// As [`equation_error`](crate::frequency_domain::equation_error).
+/// As [`equation_error`](mechid_estimate::frequency_domain::equation_error).
 ///
 /// # Source
 /// As [`before_fit`](super::before_fit).

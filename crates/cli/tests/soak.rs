@@ -126,5 +126,5 @@ fn what_disturbs_a_fleet_leaves_nothing_half_doubled_or_different() {
         fs::remove_dir_all(home.join("results")).unwrap();
         rounds += 1;
     }
-    println!("{rounds} rounds");
+    assert!(rounds > 0);
 }

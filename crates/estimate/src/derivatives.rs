@@ -118,7 +118,7 @@ impl SavitzkyGolay {
     /// its unit per s^`times`.
     ///
     /// # Errors
-    /// [`SignalError::TooShort`](mechid_signal::SignalError::TooShort) if the record is shorter than the window,
+    /// [`SignalError::TooShort`] if the record is shorter than the window,
     /// [`EstimateError::Window`] if the polynomial has no such derivative.
     pub fn differentiate(&self, record: &Record, times: usize) -> Result<Record, EstimateError> {
         let window = self.window();

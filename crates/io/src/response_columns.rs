@@ -255,11 +255,14 @@ pub(crate) fn add_functions(
     Ok(())
 }
 
+/// Finds the column of the same response whose part passes a test.
+type OtherPart<'a> = dyn Fn(&dyn Fn(Part) -> bool) -> Option<&'a Heading> + 'a;
+
 /// Reads one response.
 fn function<'a>(
     table: &Table,
     first: &Heading,
-    other: &dyn Fn(&dyn Fn(Part) -> bool) -> Option<&'a Heading>,
+    other: &OtherPart<'a>,
 ) -> Result<ResponseFunction, IoError> {
     let missing = |what: &str| IoError::Description {
         file: table.file().into(),

@@ -50,7 +50,7 @@ impl StateTransition {
     ///
     /// # Errors
     /// [`ModelError::ForceChannels`] if B has not one row per degree of freedom;
-    /// [`ModelError::ExponentialOverflow`] if the step is so long that Φ overflows.
+    /// [`ModelError::Numerics`] if the step is so long that Φ overflows.
     ///
     /// # Source
     /// Van Loan (1978), IEEE Trans. Automatic Control 23(3), 395–404.

@@ -42,7 +42,7 @@ pub struct EquationErrorOptions {
 /// A line with a mean force is used if a term is a constant force (`x1^0`).
 ///
 /// Noise on the response biases the parameters, as it does that of the linear
-/// [`equation_error`](crate::frequency_domain::equation_error): use it on the mean of several periods,
+/// [`equation_error`](mechid_estimate::frequency_domain::equation_error): use it on the mean of several periods,
 /// or as the start of [`output_error`](super::output_error).
 ///
 /// # Errors

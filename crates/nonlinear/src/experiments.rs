@@ -16,7 +16,7 @@ use crate::limits::EXPERIMENT_FINER;
 /// Forces and responses in the steady state under periodic excitation, one mean period of each
 /// experiment.
 ///
-/// Unlike [`FrequencyData`](crate::frequency_domain::FrequencyData) it keeps all lines of the period:
+/// Unlike [`FrequencyData`](mechid_spectra::FrequencyData) it keeps all lines of the period:
 /// a power of the response needs all of them, and the response of a nonlinear system to a few lines
 /// of force has all of them. The equation of motion is fitted on the `lines`, those without force
 /// included.

@@ -20,7 +20,7 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// [`output_error`](super::output_error). Forces may be noisy too.
 ///
 /// `first` and `second` must come from different periods (see
-/// [`RepeatedPeriods::halves`](super::RepeatedPeriods::halves)). The standard errors allow for
+/// [`RepeatedPeriods::halves`](mechid_spectra::RepeatedPeriods::halves)). The standard errors allow for
 /// an equation error of unequal size over the lines.
 ///
 /// # Errors

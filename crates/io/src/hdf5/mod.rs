@@ -93,14 +93,14 @@ impl Reader {
             self.contents.scalars.push((name, value));
         }
         let mut names = group.datasets().map_err(damaged)?;
-        names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        names.sort_by_key(|a| natural(a));
         for name in names {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
             self.add_dataset(group, &name, at, &attributes)?;
         }
         let mut names = group.groups().map_err(damaged)?;
-        names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        names.sort_by_key(|a| natural(a));
         for name in names.into_iter().filter(|name| !name.starts_with('#')) {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);

@@ -222,7 +222,8 @@ fn units_of_axes_and_responses_are_read() {
     const G: f64 = 9.80665;
     let (hz, values) = accelerance();
     let acceleration = Some(ResponseQuantity::Acceleration);
-    let cases: [(&str, Box<dyn Fn(f64, Complex<f64>) -> Vec<f64>>, Option<ResponseQuantity>); 14] = [
+    type Row = Box<dyn Fn(f64, Complex<f64>) -> Vec<f64>>;
+    let cases: [(&str, Row, Option<ResponseQuantity>); 14] = [
         ("frequency (rad/s),real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),
         ("omega_rad_s,real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),
         ("w,real,imaginary", Box::new(|f, z| vec![TAU * f, z.re, z.im]), None),

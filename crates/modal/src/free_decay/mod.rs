@@ -73,7 +73,7 @@ impl Default for FreeDecay {
 /// ```
 ///
 /// # Errors
-/// [`FreeDecayError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`](mechid_signal::SignalError::TooShort),
+/// [`FreeDecayError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`],
 /// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than can be fitted,
 /// [`FreeDecayError::NoDecay`] if no oscillation stands out of the noise, [`FreeDecayError::Grows`] if most of
 /// the response grows, [`FreeDecayError::NotConverged`] if so many modes cannot be told apart.

@@ -79,6 +79,8 @@ pub fn fit(seed: u64, settings: &Settings) -> Option<LikelihoodEstimate> {
 fn intervals_of_springs_and_dampers_hold() {
     let judged = judge(&truth(), 20, |seed| fit(seed, &Settings::default()));
     assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
+    // Of 20 experiments 14 intervals or fewer hold with a probability of 3e-4.
+    assert!(judged.worst >= 0.7 && judged.worst_scatter < 1.6, "{judged:?}");
     assert!((0.85..1.15).contains(&judged.scatter), "{judged:?}");
 }
 

@@ -8,8 +8,12 @@ use rayon::prelude::*;
 pub struct Judged {
     /// Share of the intervals that contain the truth, over all parameters.
     pub held: f64,
+    /// The same of the worst parameter.
+    pub worst: f64,
     /// Root mean square error over root mean square standard error, over all parameters.
     pub scatter: f64,
+    /// The same of the worst parameter.
+    pub worst_scatter: f64,
     /// Number of experiments whose search failed.
     pub failed: usize,
 }
@@ -39,7 +43,9 @@ pub fn judge(
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
     Judged {
         held: mean(&held),
+        worst: held.iter().copied().fold(1.0, f64::min),
         scatter: mean(&scatter.iter().map(|s| s * s).collect::<Vec<_>>()).sqrt(),
+        worst_scatter: scatter.iter().copied().fold(0.0, f64::max),
         failed,
     }
 }
