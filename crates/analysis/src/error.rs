@@ -520,7 +520,20 @@ impl AnalysisError {
                 None => break,
             }
         }
-        names[names.len() - 2..].iter().map(|name| kebab(name)).collect::<Vec<_>>().join(".")
+        let [part, name] = [names[names.len() - 2], names[names.len() - 1]];
+        format!("{}.{}", kebab(part_of_library(part, name)), kebab(name))
+    }
+}
+
+/// Returns the part of the library that the code of a failure names: codes stay when a failure moves to
+/// a crate of its own.
+fn part_of_library<'a>(part: &'a str, name: &str) -> &'a str {
+    match (part, name) {
+        ("Numerics", "EntryNotFinite" | "ExponentialOverflow" | "NotConverged" | "NotSquare") => {
+            "Model"
+        }
+        ("Numerics" | "Spectra" | "FreeDecay", _) | ("Signal", "TooShort") => "Estimate",
+        _ => part,
     }
 }
 

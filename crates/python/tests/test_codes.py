@@ -38,16 +38,28 @@ VARIANTS = re.compile(
 def failures() -> dict[str, str]:
     """Codes of all failures of the library and what they are, from its sources."""
     found: dict[str, str] = {}
-    for path in [*ROOT.glob("crates/*/src/error.rs"), ROOT / "crates/mechid/src/simulation/error.rs"]:
+    others = ["mechid/src/simulation", "modal/src/free_decay", "modal/src/ambient"]
+    paths = [*ROOT.glob("crates/*/src/error.rs"), *(ROOT / f"crates/{at}/error.rs" for at in others)]
+    for path in paths:
         for kind, body in ENUMS.findall(path.read_text(encoding="utf-8")):
             # The package calls nothing that fails so.
             if kind in ("Bearing", "Cli", "Problem"):
                 continue
             for variant in VARIANTS.finditer(body):
                 if variant["told"] != "transparent":
-                    code = f"{kind.lower()}.{_kebab(variant['name'])}"
+                    code = f"{part(kind, variant['name'])}.{_kebab(variant['name'])}"
                     found[code] = summary(variant["about"])
     return found
+
+
+def part(kind: str, name: str) -> str:
+    """The part of the library that a code names, which stays when a failure moves to a crate of its own."""
+    of_model = ("EntryNotFinite", "ExponentialOverflow", "NotConverged", "NotSquare")
+    if kind == "Numerics" and name in of_model:
+        return "model"
+    if kind in ("Numerics", "Spectra", "FreeDecay") or (kind, name) == ("Signal", "TooShort"):
+        return "estimate"
+    return _kebab(kind)
 
 
 def summary(docs: str) -> str:

@@ -37,7 +37,7 @@ def test_the_message_is_that_of_the_program(program: Callable[..., str]) -> None
     ("call", "code"),
     [
         (lambda: mechid.identify("missing.csv", force="f", displacement="x"), "io.read"),
-        (lambda: mechid.identify(FILE, force="Force", displacement="displacement"), "io.missing-column"),
+        (lambda: mechid.identify(FILE, force="load", displacement="displacement"), "io.missing-column"),
         (lambda: mechid.identify(ONE, ONE * np.nan, fs=1), "signal.not-finite"),
         (lambda: mechid.identify(ONE, ONE[:3], fs=1), "analysis.array-shape"),
         (lambda: mechid.identify(ONE, ONE, fs=-1), "signal.not-positive"),

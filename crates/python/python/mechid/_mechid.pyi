@@ -27,6 +27,7 @@ __all__ = [
     "find_column",
     "fleet_begin",
     "fleet_part",
+    "fleet_record_column",
     "fleet_rows",
     "fleet_simulate",
     "fleet_summary",

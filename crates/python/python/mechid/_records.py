@@ -515,7 +515,7 @@ class _Frame:
 
     def __getitem__(self, wanted: str) -> ArrayLike:
         name = self._find(wanted)
-        return self._table[self._names.get(name, name)]  # type: ignore[arg-type]
+        return self._table[self._names.get(name, name)]
 
     def label(self, wanted: str, kind: str) -> tuple[str, float]:
         """Return the name of a column with its unit, and a factor for its numbers."""

@@ -19,7 +19,7 @@ from ._records import Measurement, RecordOptions, Window, measurements
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-    from pandas import DataFrame
+    from pandas import DataFrame  # type: ignore[import-untyped]
     from xarray import Dataset
 
 
@@ -592,7 +592,8 @@ class Identified(Estimated):
         """
         _labelled = labelled()
 
-        return _labelled.identified(self)
+        dataset: Dataset = _labelled.identified(self)
+        return dataset
 
     def __repr__(self) -> str:
         return f"<Identified {self._told['file']!r}: {self._values()}>"
@@ -962,7 +963,8 @@ class FrequencyResponses(Drawn):
         """
         _labelled = labelled()
 
-        return _labelled.frequency_responses(self)
+        dataset: Dataset = _labelled.frequency_responses(self)
+        return dataset
 
     def __repr__(self) -> str:
         told = self._told
@@ -1130,7 +1132,8 @@ class Sweep(Drawn):
         """
         _labelled = labelled()
 
-        return _labelled.sweep(self)
+        dataset: Dataset = _labelled.sweep(self)
+        return dataset
 
     def __repr__(self) -> str:
         return f"<Sweep {self._told['file']!r}: best at {self.best:g} of {len(self.values)} settings>"
@@ -1175,7 +1178,8 @@ class Reconstructed(Drawn):
         """
         _labelled = labelled()
 
-        return _labelled.reconstructed(self)
+        dataset: Dataset = _labelled.reconstructed(self)
+        return dataset
 
     def __repr__(self) -> str:
         told = self._told
@@ -1291,7 +1295,8 @@ class Simulation:
         """
         _labelled = labelled()
 
-        return _labelled.simulation(self)
+        dataset: Dataset = _labelled.simulation(self)
+        return dataset
 
     def __repr__(self) -> str:
         return f"<Simulation: {len(self.force)} samples at {self.fs:g} Hz, {self.scheme}>"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from ._errors import MechidError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
 # What the compiled results answer without a question, by the names of their methods and properties.
 _ANSWERS = (
@@ -75,9 +75,9 @@ def stored(held: Mapping[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def restored(kind: Callable[..., Any], kept: Mapping[str, Any]) -> Any:
+def restored(kind: type[Any], kept: Mapping[str, Any]) -> Any:
     """Return a result that was pickled."""
-    result = kind.__new__(kind)  # type: ignore[call-overload]
+    result: Any = object.__new__(kind)
     result.__dict__.update({name: value for name, value in kept.items() if name != "_inner"})
     if "_inner" in kept:
         result.__dict__["_inner"] = Stored(kept["_inner"])
