@@ -97,12 +97,12 @@ def make(program, pages, folder):
     trends(program, folder)
     cubic(folder)
     names = ("--force", "F", "--displacement", "x", "--velocity", "v", "--acceleration", "a")
-    mechid(program, folder, "report", "cubic.csv", *names, "--domain", "time", "--nonlinear", "k3: x1^3",
+    mechid(program, folder, "report", "cubic.csv", *names[:4], "--period", 512, "--nonlinear", "k3: x1^3",
            "--output", "nonlinear.html", "--quiet")
     examples = ROOT / "examples"
     mechid(program, folder, "bearing", examples / "bearing-rig.csv", "--force", "fx,fy", "--acceleration", "ax,ay",
            "--displacement", "dx,dy", "--stator-mass", 20, "--rotation-hz", 50, "--period", 256, "--plot", "bearing.html")
-    mechid(program, folder, "decay", examples / "decay.csv", "--acceleration", "a1,a2,a3", "--plot", "decay.html",
+    mechid(program, folder, "modes", examples / "decay.csv", "--acceleration", "a1,a2,a3", "--plot", "decay.html",
            "--shapes", "decay.unv")
     mechid(program, folder, "frf", examples / "hammer-1.csv", "--force", "force,0", "--acceleration", "a1,a2", "--hits",
            "--exponential-percent", 1, "--band-hz", "2:100", "--plot", "frf.html")
