@@ -125,6 +125,11 @@ class Tests:
             self.failures.append(what)
             print("FAILED", what, flush=True)
 
+    def goal(self, is_reached, what):
+        """Tell of a goal that is not reached; what must not grow beyond today's figure is a check of its own."""
+        if not is_reached:
+            print("GOAL MISSED", what, flush=True)
+
     def page(self, name, width=1280, **more):
         return Page(self.browser, width, **more).open(self.folder / f"{name}.html")
 
@@ -201,8 +206,9 @@ class Tests:
     def matrix(self):
         size = (self.folder / "matrix.html").stat().st_size
         self.numbers["28 × 2 × 4096: bytes"] = size
-        # Three mebibytes.
-        self.check(size <= 3 << 20, f"28 × 2 responses take {size} bytes")
+        self.goal(size <= 3_000_000, f"28 × 2 responses take {size} bytes")
+        # No goal: today's figure, which must not grow.
+        self.check(size <= 3_020_000, f"28 × 2 responses take {size} bytes")
         page = self.page("matrix")
         page.settle()
         paint = page.run("performance.getEntriesByType('paint')[0]?.startTime ?? NaN")
@@ -294,13 +300,14 @@ class Tests:
         self.check(page.run("document.scripts.length") == 1, "one script")
 
     def print(self):
-        # The goal for three degrees of freedom is 6; 9 is what they take today, and no more.
-        for name, most in (("three", 9), ("one", 6), ("matrix", 3)):
+        # Three degrees of freedom take 9 pages today, which must not become more.
+        for name, goal, most in (("three", 6, 9), ("one", 6, 6), ("matrix", 3, 3)):
             page = self.page(name)
             page.everything()
             pdf = page.print()
             pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
             self.numbers[f"{name}: printed pages"] = pages
+            self.goal(pages <= goal, f"{name}: {pages} printed pages")
             self.check(0 < pages <= most, f"{name}: {pages} printed pages")
             if self.pictures:
                 (self.pictures / f"{name}.pdf").write_bytes(pdf)
