@@ -55,7 +55,7 @@ def trends(program, folder):
     analysis = {
         "channels": {"force": ["force"], "displacement": ["displacement"]},
         "window": {"period": 128},
-        "identify": {"fit": {"domain": "spectra", "method": "maximum-likelihood"}},
+        "identify": {"method": "maximum-likelihood"},
     }
     (folder / "analysis.json").write_text(json.dumps(analysis))
     mechid(program, folder, "fleet", "day", "--analysis", "analysis.json", "--output", "results")

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use mechid_analysis::identify::{Fit, KnownMass, Method, ResponseFit, SampleFit};
+use mechid_analysis::identify::{KnownMass, Method, SampleFit, Source};
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{exact_harmonic_periodic, exact_zoh_periodic, random_stable};
@@ -142,7 +142,8 @@ impl Case {
         let channels: Vec<Vec<f64>> = (0..dof).map(channel).collect::<Outcome<_>>()?;
         let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
         let force = Record::from_channels(sampling(), &channels)?;
-        let held = matches!(&self.how.fit, Fit::Samples(how) if how.between_samples.is_some());
+        let held =
+            matches!(&self.how.source, Source::Samples(how) if how.between_samples.is_some());
         let noisy = |record: &Record, level: f64, stream: u64| -> Outcome<Record> {
             let all = record.repeated(if held { 1 } else { self.periods })?;
             if level == 0.0 {
@@ -165,7 +166,7 @@ impl Case {
         let measured: Vec<_> = measured.iter().map(|(kind, record)| (*kind, record)).collect();
         let test = Measurement::from_records(&force, &measured)?;
         let test =
-            if matches!(self.how.fit, Fit::Samples(_)) { test } else { test.period(PERIOD)? };
+            if matches!(self.how.source, Source::Samples(_)) { test } else { test.period(PERIOD)? };
         let found = identify(&[test], &self.how)?;
         let warned = found.checks().iter().filter(|check| check.is_conspicuous());
         let mut subjects: Vec<String> = warned.map(|check| check.subject.to_string()).collect();
@@ -231,15 +232,15 @@ fn cases() -> Vec<Case> {
     };
     let biased = |base: Case| Case { truth: Truth::Biased, ..base };
     let wrong = |machine, base: Case| Case { machine, truth: Truth::Wrong, ..base };
-    let half = Identify { lines: "1:20".parse().expect("lines"), ..ml.clone() };
+    let half = ml.clone().lines("1:20".parse().expect("lines"));
     let heavy = Identify { mass: KnownMass { values: vec![Some(11.0)] }, ..ml.clone() };
-    let samples = Identify { fit: Fit::Samples(SampleFit::default()), ..Identify::default() };
+    let samples = Identify::samples();
     let held = SampleFit {
         between_samples: Some(mechid_model::Discretisation::ZeroOrderHold),
         ..SampleFit::default()
     };
-    let steps = Identify { fit: Fit::Samples(held), ..Identify::default() };
-    let responses = Identify { fit: Fit::Responses(ResponseFit::default()), ..Identify::default() };
+    let steps = Identify::from(Source::Samples(held));
+    let responses = Identify::responses(Default::default(), Default::default());
     let timed = |name, noise, how: &Identify| Case { responses: XVA, ..case(name, 4, noise, how) };
     vec![
         case("least squares, exact", 4, [0.0, 0.0], &ls),

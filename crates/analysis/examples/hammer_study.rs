@@ -152,7 +152,7 @@ fn fit(rig: &HammerTest, noise: f64, points: usize, seed: u64) -> Option<Run> {
         })
         .collect();
     // Where the hammer has a force to speak of.
-    let how = Identify::default().hits(HitRule::default()).lines(LineChoice::Band(BAND));
+    let how = Identify::hits(HitRule::default()).lines(LineChoice::Band(BAND));
     compare(&identify(&tests?, &how).ok()?, rig)
 }
 

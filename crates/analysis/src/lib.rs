@@ -64,6 +64,7 @@ pub mod reconstruct;
 pub mod review;
 pub mod sweep;
 pub mod text;
+pub mod words;
 
 pub use batch::{ResultRow, SavedAnalysis};
 pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};

@@ -48,15 +48,6 @@ pub enum CliError {
         /// Reason why it does not belong there.
         why: &'static str,
     },
-    /// Which samples are to be predicted is open.
-    #[error(
-        "--validate-samples {samples} of which record? Name another one with --validate, or the first \
-         sample of this one with --validate-start"
-    )]
-    ValidationStart {
-        /// Samples asked for.
-        samples: usize,
-    },
     /// A time-stepping scheme refuses.
     #[error(transparent)]
     Integrate(#[from] mechid::integrate::IntegrateError),

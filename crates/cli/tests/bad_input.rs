@@ -172,7 +172,7 @@ fn json_for_a_record() {
 fn nonlinear_terms_that_cannot_be() {
     identify(&good(), "--nonlinear k3", &["`name: expression`"]);
     identify(&good(), "--nonlinear k3:x2^3", &["k3: x2^3", "degrees of freedom"]);
-    let misplaced = ["--nonlinear belongs to --domain frequency"];
+    let misplaced = ["--nonlinear: it belongs to nonlinear terms, not to --domain time"];
     identify(&good(), "--nonlinear k3:x^3 --domain time", &misplaced);
     let not_periods = ["--nonlinear: nonlinear terms are fitted to spectra of whole periods"];
     identify(&good(), "--nonlinear k3:x^3 --from-frf h1 --segment 16", &not_periods);

@@ -26,7 +26,7 @@ measured = motion + rng.normal(0.0, 1e-3 * motion.std(), len(motion))
 # %% The blows are the segments, with equal weights: each begins and ends at rest.
 record = mechid.Measurement.from_arrays(force, measured, fs=FS)
 table = mechid.frf(
-    record, segment=SAMPLES, segment_window="rectangular", segment_overlap=0.0, band_hz=(5.0, 60.0)
+    record, segment=f"{SAMPLES}:0:rectangular", band_hz=(5.0, 60.0)
 )
 print(table)
 judge = machine.receptance(table.frequency_hz)[:, 0, 0]
@@ -35,7 +35,7 @@ assert apart.max() < 0.02, apart.max()
 
 # %% The machine behind them.
 found = mechid.identify(
-    record, from_frf="h1", segment=SAMPLES, segment_window="rectangular", segment_overlap=0.0,
+    record, from_frf="h1", segment=f"{SAMPLES}:0:rectangular",
     band_hz=(5.0, 60.0),
 )
 print(found)

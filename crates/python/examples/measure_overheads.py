@@ -51,7 +51,7 @@ def call() -> None:
     work = least(lambda: _mechid.identify([inner], told, None, None), 1000)
     copy = least(lambda: mechid.Measurement.from_arrays(force, x, fs=128.0), 5000)
     hop = least(lambda: record.force, 5000)
-    lines = json.dumps({"fit": {"domain": "spectra", "method": "least-squares"}, "lines": {"lines": "999"}})
+    lines = json.dumps({"method": "least-squares", "lines": "999"})
     with_keywords = least(
         lambda: refused(lambda: mechid.identify(record, lines="999", method="least-squares")), 5000
     )

@@ -59,7 +59,7 @@ def options(draw: st.DrawFn) -> dict[str, Any]:
         "mass": st.one_of(st.floats(), st.lists(st.one_of(st.none(), st.floats()), max_size=5)),
         "from_frf": st.sampled_from(["h1", "h2", "hv"]),
         "segment": st.integers(-1, 50),
-        "segment_overlap": st.floats(),
+        "refine": st.sampled_from(["8:linear", "0:linear", 3, {"factor": 2}]),
         "domain": st.sampled_from(["time", "frequency"]),
         "between_samples": st.sampled_from(["euler", "held", "linear"]),
         "extent": st.sampled_from(["open", "period"]),

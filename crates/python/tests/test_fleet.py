@@ -22,7 +22,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 ANALYSIS = {
     "channels": {"force": ["force"], "displacement": ["displacement"]},
     "window": {"period": 256},
-    "identify": {"fit": {"domain": "spectra", "method": "maximum-likelihood"}},
+    "identify": {"method": "maximum-likelihood"},
 }
 
 

@@ -51,7 +51,7 @@ def test_the_lock_is_released_during_the_work() -> None:
 
     def work() -> None:
         mechid.identify(f, x, velocity=v, fs=1000.0, domain="time", between_samples="euler",
-                        refine=20, interpolation="spline")
+                        refine="20:spline")
         done.set()
 
     thread = threading.Thread(target=work)

@@ -11,6 +11,7 @@ pub enum Extent {
     Open,
     /// One whole period in steady state: the first sample follows the last again, N samples have N
     /// steps.
+    #[cfg_attr(feature = "serde", serde(rename = "period"))]
     WholePeriod,
 }
 

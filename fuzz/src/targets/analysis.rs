@@ -5,7 +5,8 @@ use std::fmt::Display;
 use mechid_analysis::bearing::Coefficients;
 use mechid_analysis::frf::{Estimator, Weight};
 use mechid_analysis::identify::{
-    Band, Between, Derivatives, Fit, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
+    Band, Between, Derivatives, HitFit, Method, Nonlinear, OpenFit, OpenNoise, PeriodEstimator,
+    PeriodFit, Refinement, SampleFit, SegmentFit, Source, SpectralFit, TermEstimator, TermFit,
     ValidationWindow,
 };
 use mechid_analysis::reconstruct::Method as ForceMethod;
@@ -125,27 +126,52 @@ fn samples(d: &mut Draw) -> SampleFit {
 
 const LINES: [&str; 7] = ["all", "odd", "1,2,3", "2..5", "1:2:9", "0", "99999999999999999999"];
 
+fn open_noise(d: &mut Draw) -> OpenNoise {
+    // JSON, which settings are saved in, has finite numbers only.
+    let force = d.one_in(4).then(|| {
+        let mut levels = d.numbers(3);
+        levels.retain(|level| level.is_finite());
+        levels
+    });
+    OpenNoise { response: pooling(d), force }
+}
+
 fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
-    let fit = match d.below(6) {
-        0 => Fit::Samples(samples(d)),
-        1 => Fit::Responses(ResponseFit {
+    let mut how = Identify::from(match d.below(8) {
+        0 => Source::Samples(samples(d)),
+        1 => Source::Segments(SegmentFit {
             estimator: d.of(&[Estimator::H1, Estimator::H2, Estimator::Hv]),
             segments: segmentation(d),
             method: method(d),
+            ..SegmentFit::default()
         }),
-        _ => Fit::Spectra {
-            method: method(d),
-            noise: pooling(d),
-            extent: if d.one_in(3) { Some(d.extent()) } else { None },
-            // JSON, which settings are saved in, has finite numbers only.
-            force_noise: d.one_in(4).then(|| {
-                let mut levels = d.numbers(3);
-                levels.retain(|level| level.is_finite());
-                levels
-            }),
-        },
-    };
-    let mut how = Identify { fit, ..Identify::default() };
+        2 => Source::Open(OpenFit { noise: open_noise(d), ..OpenFit::default() }),
+        3 => Source::Hits(HitFit { noise: open_noise(d), ..HitFit::default() }),
+        4 => {
+            const TERMS: [&str; 5] = [
+                "k3: x1^3",
+                "c2: |v1| v1",
+                "k2: x1^2, k3: x2^3",
+                "k3: (x1-x2)^3",
+                "c3: sat(v1; b=1)",
+            ];
+            let Some(terms) = written::<Nonlinear>(d, &TERMS)? else { return Ok(None) };
+            let estimator = d.of(&[TermEstimator::EquationError, TermEstimator::OutputError]);
+            Source::Terms(TermFit { terms, estimator, ..TermFit::default() })
+        }
+        5 => {
+            let likelihood = d.one_in(2).then(|| pooling(d));
+            Source::Spectra(SpectralFit { likelihood, ..SpectralFit::default() })
+        }
+        _ => {
+            let estimator = method(d).map(|method| match method {
+                Method::LeastSquares => PeriodEstimator::LeastSquares,
+                Method::Instrumental => PeriodEstimator::Instrumental,
+                Method::MaximumLikelihood => PeriodEstimator::MaximumLikelihood(pooling(d)),
+            });
+            Source::Periods(PeriodFit { estimator, ..PeriodFit::default() })
+        }
+    });
     if d.one_in(3) {
         let Some(lines) = written(d, &LINES)? else { return Ok(None) };
         how = how.lines(lines);
@@ -155,12 +181,6 @@ fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
             return Ok(None);
         };
         how = how.mass(mass);
-    }
-    if d.one_in(6) {
-        const TERMS: [&str; 5] =
-            ["k3: x1^3", "c2: |v1| v1", "k2: x1^2, k3: x2^3", "k3: (x1-x2)^3", "c3: sat(v1; b=1)"];
-        let Some(terms) = written::<Nonlinear>(d, &TERMS)? else { return Ok(None) };
-        how = how.nonlinear(terms);
     }
     Ok(Some(how))
 }

@@ -5,14 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mechid_analysis::fleet::{Fleet, TrendAxis, Trends};
-use mechid_analysis::identify::{Fit, Method, Nonlinear, SampleFit};
+use mechid_analysis::identify::{Method, Nonlinear};
 use mechid_analysis::{
     AnalysisError, BearingData, Channels, DecaySettings, FrfSettings, Identify, IdentifyBearing,
     InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading, ResponseQuantity,
     SavedAnalysis, Window, decay, frf, identify, identify_bearing, inspect, predict,
 };
 use mechid_io::{RecordFile, escaped};
-use mechid_spectra::Pooling;
 
 use crate::depth::{Depth, reached};
 use crate::{Input, Target};
@@ -139,22 +138,12 @@ impl Record {
     }
 
     fn settings(&self) -> Identify {
-        let fit = match self.choice % 5 {
-            0 => Fit::Samples(SampleFit::default()),
-            1 => spectra(Method::MaximumLikelihood),
-            2 => spectra(Method::Instrumental),
-            _ => return Identify::default(),
-        };
-        Identify { fit, ..Identify::default() }
-    }
-}
-
-fn spectra(method: Method) -> Fit {
-    Fit::Spectra {
-        method: Some(method),
-        noise: Pooling::Automatic,
-        extent: None,
-        force_noise: None,
+        match self.choice % 5 {
+            0 => Identify::samples(),
+            1 => Identify::spectra(Method::MaximumLikelihood),
+            2 => Identify::spectra(Method::Instrumental),
+            _ => Identify::default(),
+        }
     }
 }
 
@@ -233,7 +222,7 @@ fn terms(bytes: &[u8]) -> Result<(), String> {
     let opened = Measurement::open(rig, &channels).and_then(|record| record.period(128));
     let measurement = opened.map_err(|error| error.to_string())?;
     reached(Depth::Reached);
-    match passed(identify(&[measurement], &Identify::default().nonlinear(terms)))? {
+    match passed(identify(&[measurement], &Identify::nonlinear(terms)))? {
         Some(found) => printed(&found),
         None => Ok(()),
     }

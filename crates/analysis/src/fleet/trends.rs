@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mechid_numerics::Uncertain;
 use mechid_signal::message;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::changes::{self, Change, ChangeKind};
 use super::failures::FailureCount;
@@ -27,7 +27,7 @@ const NORMAL_OVER_MAD: f64 = 1.482_602_218_505_602;
 const LISTED: usize = 10;
 
 /// Order of the records in a trend.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrendAxis {
     /// The records one after the other, by their names, counted from 1.

@@ -6,6 +6,8 @@ mod segment_length;
 pub mod table;
 mod whole;
 
+use std::str::FromStr;
+
 use mechid_signal::Window;
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::Lines;
@@ -19,6 +21,7 @@ use crate::identify::left_out::{LeftOut, LineRule};
 use crate::identify::lines::LineChoice;
 use crate::measurement::{Hold, Measurement, Windowed};
 use crate::text::significant;
+use crate::words;
 
 /// Settings of an estimate of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -31,9 +34,13 @@ pub struct FrfSettings {
     /// Spectral lines to leave out of these.
     pub without: LeftOut,
     /// Segments that are averaged.
+    #[serde(deserialize_with = "words::written::one")]
     pub segments: Segmentation,
     /// Rule by which the record of a hammer test is cut into hits, which are averaged instead of segments.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "words::written::optional"
+    )]
     pub hits: Option<HitRule>,
     /// Weight at the end of a hit of an exponential window on force and response, in per cent of that at its
     /// beginning; `None`: no window.
@@ -228,6 +235,36 @@ pub struct Segmentation {
 impl Default for Segmentation {
     fn default() -> Self {
         Self { segment: None, window: Weight::Hann, overlap_percent: 50.0 }
+    }
+}
+
+impl FromStr for Segmentation {
+    type Err = String;
+
+    /// Reads `SAMPLES`, `SAMPLES:OVERLAP` with the overlap in per cent, or `SAMPLES:OVERLAP:WINDOW`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Vec<&str> = text.split(':').collect();
+        let usual = Self::default();
+        let (samples, overlap, window) = match *parts.as_slice() {
+            [samples] => (samples, Ok(usual.overlap_percent), Ok(usual.window)),
+            [samples, overlap] => (samples, overlap.parse(), Ok(usual.window)),
+            [samples, overlap, window] => (samples, overlap.parse(), words::read(window)),
+            _ => {
+                return Err(format!(
+                    "write SAMPLES:OVERLAP:WINDOW, such as 1024:50:hann, not {text}"
+                ));
+            }
+        };
+        let segment = match samples.parse() {
+            Ok(samples) if samples > 0 => Some(samples),
+            _ => return Err(format!("\"{samples}\" is no number of samples")),
+        };
+        match overlap {
+            Ok(overlap_percent) if (0.0..100.0).contains(&overlap_percent) => {
+                Ok(Self { segment, window: window?, overlap_percent })
+            }
+            _ => Err(format!("an overlap lies from 0 to below 100 %, got {}", parts[1])),
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! | File | What it does |
 //! |---|---|
-//! | `options` | settings, as values |
+//! | `options`, `keywords` | settings as values; as the flat keywords of the program and of Python |
 //! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
@@ -28,6 +28,7 @@ mod derivatives;
 pub(crate) mod fitted;
 mod fitted_lines;
 mod force_noise;
+mod keywords;
 pub mod left_out;
 pub mod lines;
 pub mod mass;
@@ -56,7 +57,6 @@ use mechid_estimate::{Estimate, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::NonlinearEstimate;
-use mechid_signal::Extent;
 use mechid_spectra::Pooling;
 use serde::{Serialize, Serializer};
 
@@ -65,13 +65,15 @@ pub use self::coherence::ResponseCoherence;
 pub use self::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
 pub use self::fitted_lines::FittedLine;
 pub use self::force_noise::{ForceNoise, ForceNoiseSource};
-use self::left_out::LineRule;
+pub use self::keywords::{Constant, Domain, Keywords};
 pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
-use self::open_records::{Excitation, NoiseRule};
+use self::open_records::Excitation;
 pub use self::options::{
-    Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
+    Between, Derivatives, HitFit, Identify, Method, Nonlinear, OpenFit, OpenNoise, PeriodEstimator,
+    PeriodFit, Refinement, SampleFit, SegmentFit, Source, SpectralFit, SpectralLines,
+    TermEstimator, TermFit,
 };
 use self::prediction::{Compared, Model, Prediction};
 pub use self::response_settings::IdentifyResponses;
@@ -82,7 +84,7 @@ pub use self::tables::{IdentifiedResponses, identify_responses};
 pub use self::unscaled::Unscaled;
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
-use crate::hits;
+use crate::hits::{self, HitNoise};
 use crate::machine::Machine;
 use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
 
@@ -113,16 +115,12 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
     let (mut hits, mut hit_noise, mut of_hits) = (Vec::new(), Vec::new(), Vec::new());
-    if let Some(rule) = &how.hits {
-        how.check_hits(period_given)?;
+    how.check_open(period_given)?;
+    if let Source::Hits(HitFit { rule, .. }) = &how.source {
         let cut = hits::cut(&records, rule)?;
         (records, hits, hit_noise, of_hits) = (cut.hits, cut.rows, cut.noise, cut.remarks);
     }
-    let excitation = match &how.hits {
-        Some(_) => Excitation::Hits(&hit_noise),
-        None => Excitation::Lasting,
-    };
-    let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given, excitation);
+    let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given, &hit_noise);
     let driven: Vec<usize> = records.iter().flat_map(|r| r.held.driven.iter().copied()).collect();
     let fitted = match how.finds_modes_alone() {
         true => Unscaled::or_fitted(&unknowns, &driven, fit),
@@ -131,9 +129,9 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let (fitted, unscaled) = fitted.map_err(|error| explained(error, &records))?;
     let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
-    if how.hits.is_none() && how.nonlinear.is_none() && !period_given {
+    if !period_given && !matches!(how.source, Source::Hits(_) | Source::Terms(_)) {
         summary.remarks.extend(hits::uncut(&records));
-        if matches!(how.fit, Fit::Spectra { .. }) {
+        if !matches!(how.source, Source::Segments(_) | Source::Samples(_)) {
             summary.remarks.extend(records.iter().find_map(spectra::unsaid_period));
         }
     }
@@ -161,32 +159,44 @@ pub struct Identified {
 impl Identify {
     /// Returns how much of a record must be held in memory to fit it.
     pub(crate) fn hold(&self) -> Hold {
-        match &self.fit {
-            _ if self.hits.is_some() => Hold::Whole,
-            Fit::Spectra { .. } if self.nonlinear.is_some() => Hold::Whole,
-            Fit::Spectra { extent: Some(Extent::Open), .. }
-            | Fit::Spectra { force_noise: Some(_), .. } => Hold::Whole,
-            Fit::Spectra { .. } => Hold::Periods,
-            Fit::Responses(how) => how.segments.hold(),
-            Fit::Samples(how) => how.hold(),
+        match &self.source {
+            Source::Spectra(_) | Source::Periods(_) => Hold::Periods,
+            Source::Open(_) | Source::Hits(_) | Source::Terms(_) => Hold::Whole,
+            Source::Segments(how) => how.segments.hold(),
+            Source::Samples(how) => how.hold(),
         }
     }
 
     /// Returns whether modes are found where M, C and K have no scale: those of linear systems, from spectra
     /// and frequency responses.
     fn finds_modes_alone(&self) -> bool {
-        self.nonlinear.is_none() && !matches!(self.fit, Fit::Samples(_))
+        !matches!(self.source, Source::Terms(_) | Source::Samples(_))
     }
 
-    /// Refuses what hits are not fitted with.
-    fn check_hits(&self, period_given: bool) -> Result<(), AnalysisError> {
-        let why = match &self.fit {
-            _ if period_given => "hits have no `period`: leave one of them out",
-            _ if self.nonlinear.is_some() => "nonlinear terms are fitted to whole periods",
-            Fit::Responses(_) => "the hits themselves are fitted: leave `from_frf` out",
+    /// Refuses the period of a record that is fitted as an open one, and noise that it has not.
+    fn check_open(&self, period_given: bool) -> Result<(), AnalysisError> {
+        let (noise, setting, of_period) = match &self.source {
+            Source::Hits(how) => {
+                (&how.noise, "hits", "hits have no `period`: leave one of them out")
+            }
+            Source::Open(how) if how.noise.force.is_some() => (
+                &how.noise,
+                "force_noise",
+                "it is for open records: periods show the noise of their force by their scatter",
+            ),
+            Source::Open(how) => {
+                (&how.noise, "extent", "an open record has no `period`: leave one of them out")
+            }
             _ => return Ok(()),
         };
-        Err(AnalysisError::Setting { setting: "hits", why: why.into() })
+        let (setting, why) = match (period_given, noise.response) {
+            (true, _) => (setting, of_period),
+            (false, Pooling::PerLine) => {
+                ("noise", "per-line is for periods: an open record has no scatter at a line")
+            }
+            (false, _) => return Ok(()),
+        };
+        Err(AnalysisError::Setting { setting, why: why.into() })
     }
 
     fn fitted(
@@ -194,88 +204,40 @@ impl Identify {
         records: &[Windowed],
         unknowns: &Unknowns,
         period_given: bool,
-        excitation: Excitation<'_>,
+        hit_noise: &[HitNoise],
     ) -> Result<Fitted, AnalysisError> {
-        let lines = LineRule { choice: &self.lines, without: &self.without };
-        if let Some(how) = &self.nonlinear {
-            let Fit::Spectra { method, noise, extent, force_noise } = &self.fit else {
-                let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
-                           and `from_frf` out";
-                return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
-            };
-            if *noise != Pooling::Automatic {
-                let why = "fits with nonlinear terms have weights of their own: leave it out";
-                return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
-            }
-            if force_noise.is_some() {
-                let why = "fits with nonlinear terms take the force as exact: leave it out";
-                return Err(AnalysisError::Setting { setting: "force_noise", why: why.into() });
-            }
-            if *extent == Some(Extent::Open) {
-                let why = "nonlinear terms are fitted to whole periods";
-                return Err(AnalysisError::Setting { setting: "extent", why: why.into() });
-            }
-            return nonlinear::fit(records, unknowns, lines, *method, how);
-        }
-        match &self.fit {
-            Fit::Spectra { method, noise, extent, force_noise } => {
-                let likelihood = matches!(method, None | Some(Method::MaximumLikelihood));
-                let wrong =
-                    |setting, why: &str| Err(AnalysisError::Setting { setting, why: why.into() });
-                if *noise != Pooling::Automatic && !likelihood {
-                    return wrong("noise", "it weights `method` maximum-likelihood alone");
+        let open = |noise: &OpenNoise, lines: &SpectralLines, excitation| {
+            open_records::fit(records, unknowns, lines.rule(), noise, excitation)
+        };
+        match &self.source {
+            Source::Spectra(SpectralFit { likelihood, lines }) => {
+                if !period_given && open_records::suit(records, unknowns) {
+                    let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
+                    match open(&noise, lines, Excitation::Lasting) {
+                        Ok(open) if open.ends_show => return Ok(open.fitted),
+                        _ => {}
+                    }
                 }
-                if *noise == Pooling::PerLine && *extent == Some(Extent::Open) {
-                    return wrong(
-                        "noise",
-                        "per-line is for periods: an open record has no scatter at a line",
-                    );
-                }
-                // Weights that were asked for are used.
-                let method = match noise {
-                    Pooling::Automatic => *method,
-                    _ => Some(Method::MaximumLikelihood),
-                };
-                let rule = NoiseRule { response: *noise, force: force_noise.as_deref() };
-                let open = || open_records::fit(records, unknowns, lines, rule, excitation);
-                let periods = || spectra::fit(records, unknowns, lines, method, *noise);
-                // A hit dies out in its window or not, and periods are not asked about the noise of their force.
-                let is_open = self.hits.is_some() || (force_noise.is_some() && !period_given);
-                let extent = extent.or(is_open.then_some(Extent::Open));
-                match extent {
-                    Some(Extent::Open) if period_given => {
-                        wrong("extent", "an open record has no `period`: leave one of them out")
-                    }
-                    Some(Extent::Open) if !likelihood && force_noise.is_some() => {
-                        wrong("force_noise", "`method` maximum-likelihood alone allows for it")
-                    }
-                    Some(Extent::Open) if !likelihood => {
-                        wrong("extent", "the ends of open records take `method` maximum-likelihood")
-                    }
-                    Some(Extent::Open) => Ok(open()?.fitted),
-                    _ if force_noise.is_some() => wrong(
-                        "force_noise",
-                        "it is for open records: periods show the noise of their force by their scatter",
-                    ),
-                    None if likelihood
-                        && !period_given
-                        && open_records::suit(records, unknowns) =>
-                    {
-                        match open() {
-                            Ok(open) if open.ends_show => Ok(open.fitted),
-                            _ => periods(),
-                        }
-                    }
-                    _ => periods(),
-                }
+                let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
+                spectra::fit(records, unknowns, lines.rule(), estimator)
             }
-            Fit::Responses(how) => responses::fit(records, unknowns, lines, how, period_given),
-            Fit::Samples(_) if unknowns.is_related() => {
+            Source::Periods(PeriodFit { estimator, lines }) => {
+                spectra::fit(records, unknowns, lines.rule(), *estimator)
+            }
+            Source::Open(OpenFit { noise, lines }) => {
+                Ok(open(noise, lines, Excitation::Lasting)?.fitted)
+            }
+            Source::Hits(HitFit { noise, lines, .. }) => {
+                Ok(open(noise, lines, Excitation::Hits(hit_noise))?.fitted)
+            }
+            Source::Terms(how) => nonlinear::fit(records, unknowns, how),
+            Source::Segments(how) => responses::fit(records, unknowns, how, period_given),
+            Source::Samples(_) if unknowns.is_related() => {
                 let why =
                     "symmetric matrices and proportional damping belong to `domain` frequency";
                 Err(AnalysisError::Setting { setting: "structure", why: why.into() })
             }
-            Fit::Samples(how) => how.fit(records, unknowns),
+            Source::Samples(how) => how.fit(records, unknowns),
         }
     }
 }

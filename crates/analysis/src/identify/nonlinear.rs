@@ -1,6 +1,6 @@
 //! Fits of whole periods with nonlinear terms beside M, C and K.
 
-use mechid_checks::{Verdict, before_spectral_fit, steady_periods};
+use mechid_checks::{Finding, Verdict, before_spectral_fit, steady_periods};
 use mechid_estimate::Unknowns;
 use mechid_model::Terms;
 use mechid_nonlinear::{
@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
 use super::left_out::{LineRule, all_lines};
 use super::lines::LineChoice;
-use super::options::{Method, Nonlinear};
+use super::options::{Nonlinear, TermEstimator, TermFit};
 use super::prediction::{Model, Prediction};
 use super::remarks::one_motion_of;
 use super::rows::Uncertain;
@@ -124,11 +124,9 @@ pub struct DistortionRow {
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    rule: LineRule<'_>,
-    method: Option<Method>,
-    how: &Nonlinear,
+    how: &TermFit,
 ) -> Result<Fitted, AnalysisError> {
-    fitted(records, unknowns, rule, method, how).map_err(|error| match error {
+    fitted(records, unknowns, how).map_err(|error| match error {
         AnalysisError::Setting { .. } => error,
         other => no_period(records).unwrap_or(other),
     })
@@ -137,10 +135,10 @@ pub(super) fn fit(
 fn fitted(
     records: &[Windowed],
     unknowns: &Unknowns,
-    rule: LineRule<'_>,
-    method: Option<Method>,
-    how: &Nonlinear,
+    how: &TermFit,
 ) -> Result<Fitted, AnalysisError> {
+    let TermFit { terms: how, estimator, lines } = how;
+    let rule = lines.rule();
     let first = &records[0].held;
     let (kind, dofs) = (first.response().1, first.force.channels());
     let band = Lines::new(first.force.sampling().with_len(first.period)?, all_lines(first, rule)?)?;
@@ -152,38 +150,22 @@ fn fitted(
     let selection = select(&data, unknowns, how)?;
     let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
     let start = equation_error(&data, unknowns, terms, &options)?;
-    let (estimator, estimated) = match method.unwrap_or(Method::LeastSquares) {
-        Method::LeastSquares => {
+    let (estimator, estimated) = match estimator {
+        TermEstimator::EquationError => {
             ("least squares on the equation of motion, in the frequency domain", start)
         }
-        Method::MaximumLikelihood => {
+        TermEstimator::OutputError => {
             let stepped: Vec<SteppedRecord> =
                 records.iter().map(|r| mean_period(&r.held)).collect::<Result<_, _>>()?;
             let estimate = output_error(&stepped, kind, &start)?.estimate;
             ("output error on the mean periods, started from least squares", estimate)
-        }
-        Method::Instrumental => {
-            let why = "instrumental variables take linear systems only: choose another `method`";
-            return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
         }
     };
     let experiments: Vec<[&Record; 2]> =
         records.iter().map(|r| [&r.held.force, r.held.response().0]).collect();
     let seen = distortion(&band, &experiments, kind, unknowns)?;
     let model = Model::Nonlinear { system: estimated.system()?, channels: estimated.channels() };
-    let (mut before, mut spectra) = (Vec::new(), None::<FrequencyData>);
-    for recorded in records {
-        let held = &recorded.held;
-        let chosen =
-            LineRule { choice: &LineChoice::Driven, ..rule }.lines(&held.force, held.period)?;
-        let driven = Lines::new(band.sampling(), chosen)?;
-        before.push(steady_periods(&held.force, held.response().0, held.period)?);
-        let spectrum = periods(recorded, &driven)?.mean()?;
-        spectra = Some(match spectra {
-            None => spectrum,
-            Some(all) => all.and(&spectrum)?,
-        });
-    }
+    let (before, spectra) = driven_spectra(records, &band, rule)?;
     let before_all = match &spectra {
         Some(data) => before_spectral_fit(data, unknowns)?,
         None => Vec::new(),
@@ -225,6 +207,29 @@ fn fitted(
             selection: selection.map(|selection| SelectionSummary::of(selection, how)),
         }),
     })
+}
+
+/// Returns the findings on the periods of each record, and their mean spectra on the lines that the force drives, of all
+/// records together.
+fn driven_spectra(
+    records: &[Windowed],
+    band: &Lines,
+    rule: LineRule<'_>,
+) -> Result<(Vec<Vec<Finding>>, Option<FrequencyData>), AnalysisError> {
+    let (mut findings, mut spectra) = (Vec::new(), None::<FrequencyData>);
+    for recorded in records {
+        let held = &recorded.held;
+        let chosen =
+            LineRule { choice: &LineChoice::Driven, ..rule }.lines(&held.force, held.period)?;
+        let driven = Lines::new(band.sampling(), chosen)?;
+        findings.push(steady_periods(&held.force, held.response().0, held.period)?);
+        let spectrum = periods(recorded, &driven)?.mean()?;
+        spectra = Some(match spectra {
+            None => spectrum,
+            Some(all) => all.and(&spectrum)?,
+        });
+    }
+    Ok((findings, spectra))
 }
 
 /// Returns the reason why a fit fails whose window is taken for one period and does not look like one.

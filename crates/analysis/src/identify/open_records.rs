@@ -8,12 +8,13 @@ use mechid_estimate::frequency_domain::{EndLoads, output_error_pooling};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
-use mechid_spectra::{FrequencyData, Lines, Pooling};
+use mechid_spectra::{FrequencyData, Lines};
 
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
 use super::left_out::LineRule;
 use super::lines::LineChoice;
+use super::options::OpenNoise;
 use super::prediction::Prediction;
 use super::remarks::{of_noise, one_motion_of};
 use super::sinusoids::SinusoidRow;
@@ -48,15 +49,6 @@ pub(super) enum Excitation<'a> {
     Hits(&'a [HitNoise]),
 }
 
-/// Noise by which the lines of open records are weighted.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct NoiseRule<'a> {
-    /// Spectrum of the noise of the response, from the residual.
-    pub(super) response: Pooling,
-    /// Standard deviation of the noise of the forces, in N; `None`: as each record shows it.
-    pub(super) force: Option<&'a [f64]>,
-}
-
 /// A fit of open records, and whether their ends show at all.
 pub(super) struct OpenFit {
     pub(super) fitted: Fitted,
@@ -78,7 +70,7 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     rule: LineRule<'_>,
-    noise: NoiseRule<'_>,
+    noise: &OpenNoise,
     excitation: Excitation<'_>,
 ) -> Result<OpenFit, AnalysisError> {
     let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
@@ -89,7 +81,7 @@ pub(super) fn fit(
             Excitation::Lasting => None,
             Excitation::Hits(noise) => noise.get(at),
         };
-        let force_noise = ForceNoise::of(held, noise.force, hit)?;
+        let force_noise = ForceNoise::of(held, noise.force.as_deref(), hit)?;
         let data = FrequencyData::read(&lines, &held.force, motion, kind)?
             .of_open_record(held.force.sampling());
         let data = force_noise.known_to(data, held)?;

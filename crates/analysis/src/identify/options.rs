@@ -10,80 +10,161 @@ use mechid_signal::{Extent, HitRule, Interpolation};
 use mechid_spectra::Pooling;
 use serde::{Deserialize, Serialize};
 
-use super::left_out::LeftOut;
+use super::keywords::Keywords;
+use super::left_out::{LeftOut, LineRule};
 use super::lines::LineChoice;
 use super::mass::KnownMass;
 use super::structure::Structure;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
+use crate::words;
 
-/// Settings of an identification.
+/// Settings of an identification: what is fitted and how, and what is known of the machine.
+///
+/// Settings that cannot go together cannot be written. They are saved as the flat [`Keywords`] of the program
+/// and of Python.
 ///
 /// ```
 /// use mechid_analysis::{Identify, identify::Method};
 ///
 /// let how = Identify::spectra(Method::MaximumLikelihood);
 /// let saved = serde_json::to_string(&how)?;
+/// assert_eq!(saved, r#"{"method":"maximum-likelihood"}"#);
 /// assert_eq!(serde_json::from_str::<Identify>(&saved)?, how);
 /// # Ok::<(), serde_json::Error>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "Keywords", into = "Keywords")]
 pub struct Identify {
-    /// Data that are fitted: spectra, averaged frequency responses, or samples.
-    pub fit: Fit,
-    /// Spectral lines to use, of spectra and frequency responses.
-    pub lines: LineChoice,
-    /// Spectral lines to leave out of these.
-    pub without: LeftOut,
+    /// Data that are fitted, and the estimator.
+    pub source: Source,
     /// Known masses.
     pub mass: KnownMass,
     /// Form of M, C and K, such as that of a chain.
-    #[serde(skip_serializing_if = "Structure::is_empty")]
     pub structure: Structure,
-    /// Rule by which the records of a hammer test are cut into hits, each of which is fitted as a record of
-    /// its own; `None`: no hammer test.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hits: Option<HitRule>,
-    /// Nonlinear springs and dampers, fitted to the spectra of whole periods; `None`: a linear system.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nonlinear: Option<Nonlinear>,
 }
 
 /// Data that are fitted, and the estimator.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "domain", rename_all = "kebab-case")]
-pub enum Fit {
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// Spectral lines of windows that are periods or have ends that show: the record tells which.
+    Spectra(SpectralFit),
     /// Spectral lines of whole periods.
-    Spectra {
-        /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least
-        /// squares, otherwise least squares.
-        #[serde(default)]
-        method: Option<Method>,
-        /// Spectrum of the noise that weighs maximum likelihood and by which the residual is tested: from
-        /// the scatter of the periods or, of one period, from the residual.
-        #[serde(default)]
-        noise: Pooling,
-        /// Extent of the window, for maximum likelihood: of an open record the loads of its ends are found
-        /// with the machine. `None`: whole periods where a period is given; otherwise open if the ends show.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        extent: Option<Extent>,
-        /// Standard deviation of the white noise on the samples of the force, in N, of records that do not show
-        /// it by the scatter of periods, which are fitted as open ones then: one level for all forces, or one for
-        /// each degree of freedom. `None`: of open records that above the band that the force drives, of hits
-        /// that between them.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        force_noise: Option<Vec<f64>>,
-    },
+    Periods(PeriodFit),
+    /// Spectral lines of open records, by maximum likelihood: the loads of their ends are found with the machine.
+    Open(OpenFit),
+    /// Hits of a hammer, each an open record of its own.
+    Hits(HitFit),
+    /// Spectral lines of whole periods, with nonlinear springs and dampers beside M, C and K.
+    Terms(TermFit),
     /// Frequency responses, averaged over segments.
-    Responses(ResponseFit),
+    Segments(SegmentFit),
     /// Samples in time, of any record.
     Samples(SampleFit),
 }
 
-impl Default for Fit {
+impl Default for Source {
     fn default() -> Self {
-        Fit::Spectra { method: None, noise: Pooling::Automatic, extent: None, force_noise: None }
+        Self::Spectra(SpectralFit::default())
+    }
+}
+
+/// Fit of spectral lines for which the record tells whether they are those of a period.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SpectralFit {
+    /// Noise spectrum of maximum likelihood; `None`: maximum likelihood where two periods or more show the noise
+    /// or it biases least squares, otherwise least squares.
+    pub likelihood: Option<Pooling>,
+    /// Spectral lines.
+    pub lines: SpectralLines,
+}
+
+/// Fit of the spectral lines of whole periods.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PeriodFit {
+    /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least
+    /// squares, otherwise least squares.
+    pub estimator: Option<PeriodEstimator>,
+    /// Spectral lines.
+    pub lines: SpectralLines,
+}
+
+/// Estimator of the parameters from whole periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PeriodEstimator {
+    /// Least squares on the equation of motion; biased by noise on the response.
+    LeastSquares,
+    /// Instrumental variables, one half of the periods against the other; not biased.
+    Instrumental,
+    /// Maximum likelihood on the response, not biased, of least scatter; weighted by a noise spectrum from the
+    /// scatter of the periods or, of one period, from the residual.
+    MaximumLikelihood(Pooling),
+}
+
+/// Fit of the spectral lines of open records.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OpenFit {
+    /// Noise by which the lines are weighted.
+    pub noise: OpenNoise,
+    /// Spectral lines.
+    pub lines: SpectralLines,
+}
+
+/// Noise of open records.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OpenNoise {
+    /// Spectrum of the noise on the response, from the residual.
+    pub response: Pooling,
+    /// Standard deviation of the white noise on the samples of the force, in N: one level for all forces, or one
+    /// for each degree of freedom. `None`: of records that above the band that the force drives, of hits that
+    /// between them.
+    pub force: Option<Vec<f64>>,
+}
+
+/// Fit of the hits of a hammer.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HitFit {
+    /// Rule by which the records are cut into hits.
+    pub rule: HitRule,
+    /// Noise by which the lines are weighted.
+    pub noise: OpenNoise,
+    /// Spectral lines.
+    pub lines: SpectralLines,
+}
+
+/// Fit of nonlinear terms.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TermFit {
+    /// Springs and dampers.
+    pub terms: Nonlinear,
+    /// Estimator.
+    pub estimator: TermEstimator,
+    /// Spectral lines.
+    pub lines: SpectralLines,
+}
+
+/// Estimator of nonlinear terms.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum TermEstimator {
+    /// Least squares on the equation of motion.
+    #[default]
+    EquationError,
+    /// Least squares on the simulated response, from the solution of the former on.
+    OutputError,
+}
+
+/// Spectral lines to use.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SpectralLines {
+    /// Lines to use.
+    pub choice: LineChoice,
+    /// Lines to leave out of these.
+    pub without: LeftOut,
+}
+
+impl SpectralLines {
+    pub(crate) fn rule(&self) -> LineRule<'_> {
+        LineRule { choice: &self.choice, without: &self.without }
     }
 }
 
@@ -134,20 +215,20 @@ impl FromStr for Nonlinear {
 }
 
 /// Fit of averaged frequency responses.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ResponseFit {
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SegmentFit {
     /// Frequency response estimator.
     pub estimator: Estimator,
     /// Segments that are averaged.
     pub segments: Segmentation,
     /// Estimator of the parameters; `None`: maximum likelihood, weighted by the coherence.
     pub method: Option<Method>,
+    /// Spectral lines.
+    pub lines: SpectralLines,
 }
 
 /// Fit in the time domain.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SampleFit {
     /// Assumption on the force between samples; `None`: the equation of motion at the samples if
     /// there is an acceleration, otherwise linear.
@@ -168,6 +249,21 @@ pub struct Refinement {
     pub factor: usize,
     /// Interpolation between the samples.
     pub interpolation: Between,
+}
+
+impl FromStr for Refinement {
+    type Err = String;
+
+    /// Reads `FACTOR:INTERPOLATION`, such as `8:band-limited`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once(':').and_then(|(factor, way)| {
+            let factor = factor.parse().ok().filter(|factor| *factor > 0)?;
+            Some(Self { factor, interpolation: words::read(way).ok()? })
+        });
+        parsed.ok_or_else(|| {
+            format!("write FACTOR:linear, FACTOR:spline or FACTOR:band-limited, such as 8:band-limited, not {text}")
+        })
+    }
 }
 
 /// Interpolation between samples.
@@ -271,47 +367,59 @@ impl fmt::Display for Derivatives {
 }
 
 impl Identify {
-    /// Fits spectral lines of whole periods.
+    /// Fits spectral lines by this method: of windows that are periods or open for maximum likelihood, of whole
+    /// periods for the others.
     pub fn spectra(method: Method) -> Self {
-        let (noise, method) = (Pooling::Automatic, Some(method));
-        let fit = Fit::Spectra { method, noise, extent: None, force_noise: None };
-        Self { fit, ..Self::default() }
+        let lines = SpectralLines::default();
+        let periods = |estimator| {
+            Source::Periods(PeriodFit { estimator: Some(estimator), ..PeriodFit::default() })
+        };
+        Self::from(match method {
+            Method::LeastSquares => periods(PeriodEstimator::LeastSquares),
+            Method::Instrumental => periods(PeriodEstimator::Instrumental),
+            Method::MaximumLikelihood => {
+                Source::Spectra(SpectralFit { likelihood: Some(Pooling::Automatic), lines })
+            }
+        })
     }
 
     /// Fits frequency responses averaged over segments.
     pub fn responses(estimator: Estimator, segments: Segmentation) -> Self {
-        let fit = ResponseFit { estimator, segments, method: None };
-        Self { fit: Fit::Responses(fit), ..Self::default() }
+        Self::from(Source::Segments(SegmentFit { estimator, segments, ..SegmentFit::default() }))
     }
 
     /// Fits samples in time: the equation of motion at the samples if there is an acceleration,
     /// otherwise exactly for a force that is linear between them.
     pub fn samples() -> Self {
-        Self { fit: Fit::Samples(SampleFit::default()), ..Self::default() }
+        Self::from(Source::Samples(SampleFit::default()))
     }
 
-    /// Uses these spectral lines.
-    #[must_use]
-    pub fn lines(self, lines: LineChoice) -> Self {
-        Self { lines, ..self }
+    /// Cuts the records of a hammer test into hits, and fits each as a record of its own.
+    pub fn hits(rule: HitRule) -> Self {
+        Self::from(Source::Hits(HitFit { rule, ..HitFit::default() }))
     }
 
-    /// Leaves out the lines that carry something else than the response to the force.
-    #[must_use]
-    pub fn without(self, without: LeftOut) -> Self {
-        Self { without, ..self }
+    /// Fits nonlinear springs and dampers beside M, C and K by least squares on the equation of motion.
+    pub fn nonlinear(terms: Nonlinear) -> Self {
+        Self::from(Source::Terms(TermFit { terms, ..TermFit::default() }))
     }
 
-    /// Cuts the records of a hammer test into hits.
+    /// Uses these spectral lines; samples in time have none.
     #[must_use]
-    pub fn hits(self, rule: HitRule) -> Self {
-        Self { hits: Some(rule), ..self }
+    pub fn lines(mut self, choice: LineChoice) -> Self {
+        if let Some(lines) = self.source.lines_mut() {
+            lines.choice = choice;
+        }
+        self
     }
 
-    /// Fits nonlinear springs and dampers, too.
+    /// Leaves out the lines that carry something else than the response to the force; samples in time have none.
     #[must_use]
-    pub fn nonlinear(self, nonlinear: Nonlinear) -> Self {
-        Self { nonlinear: Some(nonlinear), ..self }
+    pub fn without(mut self, without: LeftOut) -> Self {
+        if let Some(lines) = self.source.lines_mut() {
+            lines.without = without;
+        }
+        self
     }
 
     /// Takes these masses as known.
@@ -324,6 +432,39 @@ impl Identify {
     #[must_use]
     pub fn structure(self, structure: Structure) -> Self {
         Self { structure, ..self }
+    }
+}
+
+impl From<Source> for Identify {
+    fn from(source: Source) -> Self {
+        Self { source, ..Self::default() }
+    }
+}
+
+impl Source {
+    /// Returns the spectral lines to use; `None` for samples in time.
+    pub fn lines(&self) -> Option<&SpectralLines> {
+        match self {
+            Self::Spectra(fit) => Some(&fit.lines),
+            Self::Periods(fit) => Some(&fit.lines),
+            Self::Open(fit) => Some(&fit.lines),
+            Self::Hits(fit) => Some(&fit.lines),
+            Self::Terms(fit) => Some(&fit.lines),
+            Self::Segments(fit) => Some(&fit.lines),
+            Self::Samples(_) => None,
+        }
+    }
+
+    fn lines_mut(&mut self) -> Option<&mut SpectralLines> {
+        match self {
+            Self::Spectra(fit) => Some(&mut fit.lines),
+            Self::Periods(fit) => Some(&mut fit.lines),
+            Self::Open(fit) => Some(&mut fit.lines),
+            Self::Hits(fit) => Some(&mut fit.lines),
+            Self::Terms(fit) => Some(&mut fit.lines),
+            Self::Segments(fit) => Some(&mut fit.lines),
+            Self::Samples(_) => None,
+        }
     }
 }
 
@@ -376,29 +517,32 @@ mod tests {
             derivatives: Some(Derivatives::SavitzkyGolay { window: 11, order: 4 }),
             refine: Some(Refinement { factor: 8, interpolation: Between::BandLimited }),
         };
+        let force = Some(vec![0.5, 0.1]);
+        let noise = OpenNoise { response: Pooling::Neighbours(3), force };
+        let terms: Nonlinear = "k3: x1^3, c2: |v1| v1".parse().unwrap();
+        let periods = |estimator| Source::Periods(PeriodFit { estimator, ..PeriodFit::default() });
         let all = [
             Identify::default(),
             Identify::spectra(Method::Instrumental).lines("odd".parse().unwrap()),
-            Identify {
-                fit: Fit::Spectra {
-                    method: None,
-                    noise: Pooling::Neighbours(3),
-                    extent: Some(Extent::Open),
-                    force_noise: Some(vec![0.5, 0.1]),
-                },
-                ..Identify::default()
-            },
+            Identify::spectra(Method::MaximumLikelihood),
+            Identify::from(periods(None)),
+            Identify::from(periods(Some(PeriodEstimator::MaximumLikelihood(Pooling::PerLine)))),
+            Identify::from(Source::Open(OpenFit { noise: noise.clone(), ..OpenFit::default() })),
+            Identify::from(Source::Hits(HitFit { noise, ..HitFit::default() })),
             Identify::responses(Estimator::Hv, Segmentation::default()),
-            Identify { fit: Fit::Samples(samples), ..Identify::default() }
-                .mass("2.5,unknown".parse().unwrap()),
+            Identify::from(Source::Samples(samples)).mass("2.5,unknown".parse().unwrap()),
             Identify::default().structure("chain k12=-5".parse().unwrap()),
-            Identify::default().hits(HitRule { samples: Some(512), ..HitRule::default() }),
-            Identify::default().nonlinear("k3: x1^3, c2: |v1| v1".parse().unwrap()),
-            Identify::default().nonlinear(Nonlinear {
-                candidates: "k3: x1^3, c2: |v1| v1".parse().unwrap(),
-                criterion: Criterion::HeldOut,
-                ..Nonlinear::default()
-            }),
+            Identify::hits(HitRule { samples: Some(512), ..HitRule::default() }),
+            Identify::nonlinear(terms.clone()),
+            Identify::from(Source::Terms(TermFit {
+                terms: Nonlinear {
+                    candidates: terms.terms,
+                    criterion: Criterion::HeldOut,
+                    ..Nonlinear::default()
+                },
+                estimator: TermEstimator::OutputError,
+                ..TermFit::default()
+            })),
         ];
         for how in all {
             let saved = serde_json::to_string(&how).unwrap();
@@ -406,5 +550,12 @@ mod tests {
         }
         assert_eq!(serde_json::from_str::<Identify>("{}").unwrap(), Identify::default());
         assert!(serde_json::from_str::<Identify>("{\"methd\": 1}").is_err());
+        assert_eq!(
+            "8:spline".parse(),
+            Ok(Refinement { factor: 8, interpolation: Between::Spline })
+        );
+        for text in ["8", "0:linear", "8:cubic", ":linear"] {
+            assert!(text.parse::<Refinement>().is_err(), "{text}");
+        }
     }
 }

@@ -14,8 +14,7 @@ use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
 use super::fitted::{Fitted, Misfit};
-use super::left_out::LineRule;
-use super::options::{Method, ResponseFit};
+use super::options::{Method, SegmentFit};
 use super::prediction::Prediction;
 use super::remarks::one_motion_of;
 use super::rows::LinesUsed;
@@ -36,11 +35,11 @@ const BLUNTED: f64 = 0.5;
 pub fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    lines: LineRule<'_>,
-    how: &ResponseFit,
+    how: &SegmentFit,
     period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
-    let ResponseFit { estimator, segments, method } = how;
+    let SegmentFit { estimator, segments, method, lines } = how;
+    let lines = lines.rule();
     let chosen = if period_given { None } else { segments.chosen(&records[0], lines)? };
     let segments = chosen.as_ref().map_or(segments, |(segments, _)| segments);
     let estimate =

@@ -15,7 +15,7 @@ use mechid_spectra::{FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods,
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::{LineRule, all_lines};
 use super::open_records::joined;
-use super::options::Method;
+use super::options::PeriodEstimator;
 use super::prediction::Prediction;
 use super::remarks::{of_noise, one_motion_of};
 use crate::AnalysisError;
@@ -42,6 +42,14 @@ const EXCESS: f64 = 10.0;
 /// Ratio of what both leave, from which least squares is biased whatever else is left.
 const MUCH: f64 = 2.0;
 
+/// Returns the noise spectrum by which an estimator weighs the lines.
+fn pooling_of(estimator: Option<PeriodEstimator>) -> Pooling {
+    match estimator {
+        Some(PeriodEstimator::MaximumLikelihood(noise)) => noise,
+        _ => Pooling::Automatic,
+    }
+}
+
 /// The periods of a record on the lines found in its force.
 type Spectra = (RepeatedPeriods, Lines);
 
@@ -51,9 +59,9 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     lines: LineRule<'_>,
-    method: Option<Method>,
-    noise: Pooling,
+    estimator: Option<PeriodEstimator>,
 ) -> Result<Fitted, AnalysisError> {
+    let noise = pooling_of(estimator);
     let mut spectra = Vec::new();
     for recorded in records {
         let held = &recorded.held;
@@ -68,7 +76,7 @@ pub(super) fn fit(
     }
     let data = together(&spectra, &RepeatedPeriods::mean)?;
     let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
-        found(&spectra, &data, unknowns, method, noise)?;
+        found(&spectra, &data, unknowns, estimator)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
@@ -208,9 +216,9 @@ fn found(
     spectra: &[Spectra],
     data: &FrequencyData,
     unknowns: &Unknowns,
-    method: Option<Method>,
-    noise: Pooling,
+    estimator: Option<PeriodEstimator>,
 ) -> Result<Found, AnalysisError> {
+    let noise = pooling_of(estimator);
     let with_noise = |periods: &RepeatedPeriods| with_noise(periods, noise, None);
     let least_squares = |remark| -> Result<Found, AnalysisError> {
         let estimator = "least squares on the equation of motion, in the frequency domain";
@@ -248,9 +256,9 @@ fn found(
             noise_through,
         })
     };
-    match method {
-        Some(Method::LeastSquares) => least_squares(None),
-        Some(Method::Instrumental) => {
+    match estimator {
+        Some(PeriodEstimator::LeastSquares) => least_squares(None),
+        Some(PeriodEstimator::Instrumental) => {
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
             Ok(Found {
@@ -262,7 +270,9 @@ fn found(
                 remark: None,
             })
         }
-        Some(Method::MaximumLikelihood) => Ok(likelihood(&together(spectra, &with_noise)?)?),
+        Some(PeriodEstimator::MaximumLikelihood(_)) => {
+            Ok(likelihood(&together(spectra, &with_noise)?)?)
+        }
         None => {
             let noisy = together(spectra, &with_noise)?;
             let parameters = unknowns.independent();

@@ -16,7 +16,7 @@ use super::fitted::Fitted;
 use super::fitted_lines::FittedLine;
 use super::force_noise::ForceNoise;
 use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
-use super::options::Identify;
+use super::options::{Identify, Source};
 use super::prediction::Prediction;
 use super::rows::{
     self, CONFIDENCE, LinesUsed, ParameterRow, ProportionalDamping, WindowRow, mode_table,
@@ -179,7 +179,7 @@ impl IdentificationSummary {
             checks: {
                 let scope = checks::Scope {
                     scaled: unscaled.is_none(),
-                    hits: how.hits.is_some(),
+                    hits: matches!(how.source, Source::Hits(_)),
                     unexplained: unexplained_motion,
                 };
                 checks::rows(fitted, &modes, &records, scope)?

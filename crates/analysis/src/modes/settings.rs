@@ -48,7 +48,7 @@ pub enum ModalTest {
     /// Forces are measured, whatever they are.
     Forced {
         /// Cuts the records into the hits of a hammer by this rule; `None`: each record as a whole.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "crate::words::written::optional")]
         hits: Option<HitRule>,
     },
     /// Forces act that are not measured, such as wind or traffic.

@@ -16,7 +16,7 @@ use self::residual::Residual;
 use self::whole::Whole;
 use crate::AnalysisError;
 use crate::identify::Identified;
-use crate::identify::lines::choose_lines;
+use crate::identify::lines::{LineChoice, choose_lines};
 use crate::identify::prediction::{Compared, Prediction};
 use crate::measurement::{Block, Windowed};
 
@@ -89,7 +89,8 @@ impl<'a> RecordReview<'a> {
         let lines = match identified.spectra() {
             // Lines of segments are not those of the record.
             Some(_) if identified.prediction() == Prediction::Steady => {
-                let choice = &identified.summary().analysis.lines;
+                let lines = identified.summary().analysis.source.lines();
+                let choice = lines.map_or(&LineChoice::Driven, |lines| &lines.choice);
                 Some(choose_lines(&held.force, held.period, choice)?)
             }
             _ => None,

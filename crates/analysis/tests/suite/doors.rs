@@ -1,7 +1,7 @@
 //! The analysis as a caller in Rust meets it: files and arrays, units, windows, saved settings, and
 //! errors, judged by exact steady states.
 
-use mechid_analysis::identify::{Fit, KnownMass, Method, SampleFit, ValidationWindow};
+use mechid_analysis::identify::{KnownMass, Method, ValidationWindow};
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
 use mechid_analysis::{
     AnalysisError, Channels, FrfSettings, Identify, Machine, Measurement, Reading, Reconstruct,
@@ -101,7 +101,7 @@ fn every_kind_of_fit_is_a_value_that_survives_json() {
         Identify::spectra(Method::LeastSquares),
         Identify::spectra(Method::MaximumLikelihood),
         Identify::responses(Default::default(), Default::default()),
-        Identify { fit: Fit::Samples(SampleFit::default()), ..Identify::default() },
+        Identify::samples(),
         known,
     ] {
         let saved = serde_json::to_string(&how).unwrap();

@@ -1,6 +1,6 @@
 //! One error rate for all checks: on records that the model fits, at most one in fifty shows any warning.
 
-use mechid_analysis::identify::{Fit, Method, SampleFit};
+use mechid_analysis::identify::{Method, SampleFit, Source};
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
 use mechid_model::{Discretisation, Sdof};
 use mechid_problems::{exact_harmonic_periodic, exact_zoh_periodic};
@@ -89,13 +89,13 @@ fn maximum_likelihood_with_noise_on_both() {
 
 #[test]
 fn samples_with_a_noisy_force() {
-    let how = Identify { fit: Fit::Samples(SampleFit::default()), ..Identify::default() };
+    let how = Identify::samples();
     assert_few_warned(&how, |seed| samples(seed, false));
 }
 
 #[test]
 fn samples_with_a_disturbance() {
     let between_samples = Some(Discretisation::ZeroOrderHold);
-    let fit = Fit::Samples(SampleFit { between_samples, ..SampleFit::default() });
-    assert_few_warned(&Identify { fit, ..Identify::default() }, |seed| samples(seed, true));
+    let fit = Source::Samples(SampleFit { between_samples, ..SampleFit::default() });
+    assert_few_warned(&Identify::from(fit), |seed| samples(seed, true));
 }

@@ -1,6 +1,6 @@
 //! Hammer tests of two masses whose response is known in closed form.
 
-use mechid_analysis::identify::{Band, LineChoice, Method, Nonlinear};
+use mechid_analysis::identify::{Band, LineChoice};
 use mechid_analysis::{
     AnalysisError, Channels, FrfSettings, HitRule, Identified, Identify, IdentifyResponses,
     Measurement, ResponseQuantity, frf, frf_of_records, identify, identify_responses,
@@ -52,9 +52,14 @@ fn hammer(rig: &HammerTest, dof: usize, seed: u64) -> Measurement {
     measured(rig, &HammerRecord { response, ..record }, dof)
 }
 
+const BAND: Band = Band { low_hz: 2.0, high_hz: 150.0 };
+
+fn hits(rule: HitRule) -> Identify {
+    Identify::hits(rule).lines(LineChoice::Band(BAND))
+}
+
 fn settings() -> Identify {
-    let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
-    Identify::default().hits(HitRule::default()).lines(band)
+    hits(HitRule::default())
 }
 
 fn roving(quantity: ResponseQuantity, seed: u64) -> Identified {
@@ -230,7 +235,7 @@ fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
 fn a_hammer_test_that_is_not_cut_is_told_of() {
     let rig = rig(ACCELERATION);
     let is_told = |test: &Measurement| {
-        let how = Identify { hits: None, ..settings() };
+        let how = Identify::default().lines(LineChoice::Band(BAND));
         let found = identify(std::slice::from_ref(test), &how).unwrap();
         found.summary().remarks.iter().any(|remark| remark.contains("`hits` cuts"))
     };
@@ -370,18 +375,12 @@ fn what_hits_cannot_be_found_in_is_refused() {
     let rig = rig(ACCELERATION);
     let test = hammer(&rig, 0, 1);
     let refused = |how: &Identify| match identify(std::slice::from_ref(&test), how).unwrap_err() {
-        AnalysisError::Setting { setting: "hits" | "extent", why } => why,
+        AnalysisError::Setting { setting: "hits", why } => why,
         other => panic!("{other}"),
     };
-    refused(&settings().nonlinear("k3: x1^3".parse::<Nonlinear>().unwrap()));
-    refused(&Identify { fit: Identify::spectra(Method::LeastSquares).fit, ..settings() });
-    refused(&Identify {
-        fit: Identify::responses(Default::default(), Default::default()).fit,
-        ..settings()
-    });
-    refused(&settings().hits(HitRule { trigger_percent: -1.0, ..HitRule::default() }));
+    refused(&hits(HitRule { trigger_percent: -1.0, ..HitRule::default() }));
     // Every hit is weak beside the median of all, or has too little room.
-    let how = settings().hits(HitRule { samples: Some(2000), ..HitRule::default() });
+    let how = hits(HitRule { samples: Some(2000), ..HitRule::default() });
     let error = identify(std::slice::from_ref(&test), &how).unwrap_err();
     assert!(matches!(error, AnalysisError::NoHit { .. }), "{error}");
     let error = identify(&[test.clone().period(512).unwrap()], &settings()).unwrap_err();

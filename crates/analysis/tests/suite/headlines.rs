@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_analysis::identify::{Band, Fit, LineChoice, Method, SampleFit};
+use mechid_analysis::identify::{Band, LineChoice, Method, SampleFit, Source};
 use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     identify,
@@ -167,7 +167,7 @@ fn the_highest_mode_is_that_of_the_fit() {
     let test = Measurement::from_records(&force, &responses).unwrap();
     for between in [Discretisation::FirstOrderHold, Discretisation::ZeroOrderHold] {
         let fit = SampleFit { between_samples: Some(between), ..SampleFit::default() };
-        let how = Identify { fit: Fit::Samples(fit), ..Identify::default() };
+        let how = Identify::from(Source::Samples(fit));
         let found = identify(std::slice::from_ref(&test), &how).unwrap();
         let told = found.checks().iter().find_map(|check| match check.finding {
             Finding::HighestMode(HighestMode { frequency_hz, .. }) => Some(frequency_hz),

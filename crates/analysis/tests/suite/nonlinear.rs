@@ -1,7 +1,7 @@
 //! Machines with nonlinear terms through the doors of the analysis. The response is prescribed and the
 //! force follows from the equation of motion in closed form.
 
-use mechid_analysis::identify::{Fit, Method, Nonlinear, SampleFit};
+use mechid_analysis::identify::{Nonlinear, Source, TermEstimator, TermFit};
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
 use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Machine, Measurement, ModalSummary, Predict,
@@ -10,7 +10,6 @@ use mechid_analysis::{
 use mechid_model::{NonlinearSystem, Response, Sdof, Terms, UncertainNonlinearSystem};
 use mechid_nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
-use mechid_spectra::Pooling;
 use nalgebra::{Complex, DMatrix};
 
 const PERIOD: usize = 256;
@@ -46,7 +45,7 @@ fn test_of(force: &Record, displacement: &Record) -> Measurement {
 }
 
 fn how() -> Identify {
-    Identify::default().nonlinear("k2: x1^2, k3: x1^3".parse().unwrap())
+    Identify::nonlinear("k2: x1^2, k3: x1^3".parse().unwrap())
 }
 
 #[test]
@@ -204,15 +203,9 @@ fn output_error_takes_noise_on_the_response() {
     let (force, x) = steady_state();
     let x = noise::add_white(&x, noise::NoiseLevel::FractionOfRms(0.01), 3).unwrap();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    let likely = Identify {
-        fit: Fit::Spectra {
-            method: Some(Method::MaximumLikelihood),
-            noise: Pooling::default(),
-            extent: None,
-            force_noise: None,
-        },
-        ..how()
-    };
+    let terms = "k2: x1^2, k3: x1^3".parse().unwrap();
+    let estimator = TermEstimator::OutputError;
+    let likely = Identify::from(Source::Terms(TermFit { terms, estimator, ..TermFit::default() }));
     let found = identify(&[test], &likely).unwrap();
     let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().estimate;
     assert!((cubic.value - 4e6).abs() < 4.0 * cubic.standard_error, "{cubic:?}");
@@ -226,7 +219,7 @@ fn terms_are_chosen_from_candidates() {
         candidates: "k2: x1^2, k3: x1^3, k5: x1^5, c2: |v1| v1, c3: v1^3".parse().unwrap(),
         ..Nonlinear::default()
     };
-    let how = Identify::default().nonlinear(candidates.clone());
+    let how = Identify::nonlinear(candidates.clone());
     let (force, x) = steady_state();
     let noisy = |force: &Record, seed| {
         noise::add_white(force, noise::NoiseLevel::FractionOfRms(0.01), seed).unwrap()
@@ -259,7 +252,7 @@ fn terms_are_chosen_from_candidates() {
     );
 
     let held_out = Nonlinear { criterion: Criterion::HeldOut, ..candidates };
-    let how = Identify::default().nonlinear(held_out);
+    let how = Identify::nonlinear(held_out);
     let error = identify(&[test(&force, 7)], &how).unwrap_err();
     assert!(matches!(error, AnalysisError::Setting { setting: "criterion", .. }), "{error}");
     let three: Vec<_> = (7..10).map(|seed| test(&force, seed)).collect();
@@ -274,7 +267,7 @@ fn terms_are_chosen_from_candidates() {
 fn a_fifth_power_is_told_to_extrapolate_badly() {
     let (force, x) = steady_state();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    let how = Identify::default().nonlinear("k2: x1^2, k3: x1^3, k5: x1^5".parse().unwrap());
+    let how = Identify::nonlinear("k2: x1^2, k3: x1^3, k5: x1^5".parse().unwrap());
     let found = identify(&[test], &how).unwrap();
     // The machine has none: its share is nothing, and nothing is told.
     assert!(!found.to_string().contains("extrapolates badly"), "{found}");
@@ -314,25 +307,13 @@ fn a_force_alone_is_enough_for_a_prediction() {
 fn what_nonlinear_terms_cannot_be_fitted_to_is_refused() {
     let (force, x) = steady_state();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    for fit in [
-        Fit::Samples(SampleFit::default()),
-        Fit::Spectra {
-            method: Some(Method::Instrumental),
-            noise: Pooling::default(),
-            extent: None,
-            force_noise: None,
-        },
-    ] {
-        let error = identify(std::slice::from_ref(&test), &Identify { fit, ..how() }).unwrap_err();
-        assert!(matches!(error, AnalysisError::Setting { setting: "nonlinear", .. }), "{error}");
-    }
-    let other = Identify::default().nonlinear("k3: x2^3".parse().unwrap());
+    let other = Identify::nonlinear("k3: x2^3".parse().unwrap());
     assert!(identify(&[test], &other).unwrap_err().to_string().contains("degrees of freedom"));
 }
 
 #[test]
 fn settings_of_terms_survive_json() {
-    let how = Identify::default().nonlinear(Nonlinear {
+    let how = Identify::nonlinear(Nonlinear {
         terms: "c3: v1^3/(1 + (v1/20)^2)".parse().unwrap(),
         search: ShapeConstants { laws: true, delay: false, phase: true },
         weighting: Weighting::SmoothSpectrum,
@@ -397,7 +378,7 @@ fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
         let records = one_shaker_at_a_time(4e6, seed);
         let linear = identify(&records, &Identify::default()).unwrap();
         assert!(named(&linear), "{seed}: {linear}");
-        let how = Identify::default().nonlinear("k3: x1^3".parse().unwrap());
+        let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
         let found = identify(&records, &how).unwrap();
         let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().estimate;
         assert!((cubic.value / 4e6 - 1.0).abs() < 0.05, "{seed}: {cubic:?}");
@@ -453,7 +434,7 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
 /// The terms may be found in a window that is no period all the same, with a warning of its ends.
 #[test]
 fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
-    let how = Identify::default().nonlinear("k3: x1^3".parse().unwrap());
+    let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
     let mut refused = 0;
     for seed in 0..6 {
         match identify(&[random_motion(3e7, seed)], &how) {

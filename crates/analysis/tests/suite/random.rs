@@ -1,7 +1,7 @@
 //! Random tests: windows cut out of the closed-form steady state under a random force of a far longer period.
 
 use mechid_analysis::frf::{Estimator, frf};
-use mechid_analysis::identify::{Fit, Method};
+use mechid_analysis::identify::{Method, OpenFit, OpenNoise, Source};
 use mechid_analysis::sweep::{self, Kind};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Machine, Measurement,
@@ -14,7 +14,7 @@ use mechid_estimate::Estimate;
 use mechid_io::FrequencyResponses;
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};
-use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
+use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use mechid_spectra::Pooling;
 use rayon::prelude::*;
 
@@ -193,25 +193,15 @@ fn noise_on_one_period_biases_nothing() {
 }
 
 #[test]
-fn settings_that_contradict_open_records_are_refused() {
-    let open = |method| Identify {
-        fit: Fit::Spectra {
-            method,
-            noise: Pooling::Automatic,
-            extent: Some(Extent::Open),
-            force_noise: None,
-        },
-        ..Identify::default()
-    };
-    let refused = |test: Measurement, how: &Identify| {
-        let error = identify(&[test], how).unwrap_err();
-        assert!(matches!(error, AnalysisError::Setting { setting: "extent", .. }), "{error}");
-    };
-    refused(random_test(0), &open(Some(Method::LeastSquares)));
-    refused(random_test(0).period(SAMPLES).unwrap(), &open(None));
-    let nonlinear = open(None).nonlinear("k3: x1^3".parse().unwrap());
-    refused(random_test(0), &nonlinear);
-    assert!(is_open(&identify(&[random_test(0)], &open(None)).unwrap()));
+fn an_open_record_has_no_period() {
+    let open = Identify::from(Source::Open(OpenFit::default()));
+    let error = identify(&[random_test(0).period(SAMPLES).unwrap()], &open).unwrap_err();
+    assert!(matches!(error, AnalysisError::Setting { setting: "extent", .. }), "{error}");
+    assert!(is_open(&identify(&[random_test(0)], &open).unwrap()));
+    let noise = OpenNoise { response: Pooling::PerLine, force: None };
+    let per_line = Identify::from(Source::Open(OpenFit { noise, ..OpenFit::default() }));
+    let error = identify(&[random_test(0)], &per_line).unwrap_err();
+    assert!(matches!(error, AnalysisError::Setting { setting: "noise", .. }), "{error}");
 }
 
 /// The share of the intervals of 95 % that hold, of `runs` records with noise on force and response, and how many
@@ -245,10 +235,14 @@ fn judged(
     (share, warned, all)
 }
 
-fn with_force_noise(levels: Option<Vec<f64>>) -> Identify {
-    let (noise, extent) = (Pooling::Automatic, None);
-    let fit = Fit::Spectra { method: None, noise, extent, force_noise: levels };
-    Identify { fit, ..Identify::default() }
+fn with_force_noise(force: Option<Vec<f64>>) -> Identify {
+    match force {
+        None => Identify::default(),
+        Some(_) => {
+            let noise = OpenNoise { force, ..OpenNoise::default() };
+            Identify::from(Source::Open(OpenFit { noise, ..OpenFit::default() }))
+        }
+    }
 }
 
 /// Fewer than 88 % of 180 intervals of 95 %, three of a record that go together, hold with a probability below 0.01.

@@ -1,6 +1,6 @@
 //! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
 
-use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
+use mechid_analysis::identify::{Disturbance, KnownMass, LeftOut, Method};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     Window, frf, frf_of_records, identify,
@@ -86,7 +86,7 @@ fn idle_channels_do_not_keep_exact_records_from_a_fit() {
         Measurement::from_records(&force, &responses).unwrap()
     };
     let records: Vec<Measurement> = (0..DOFS).map(samples).collect();
-    let how = Identify { fit: Fit::Samples(SampleFit::default()), ..Identify::default() };
+    let how = Identify::samples();
     let found = identify(&records, &how).unwrap();
     assert!(error(&found.system().unwrap()) < 1e-9, "{found}");
 }

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_analysis::identify::{Band, Fit, Method};
+use mechid_analysis::identify::{Band, Method, PeriodEstimator, PeriodFit, Source};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identify, IdentifyResponses, Measurement, ResponseQuantity, frf,
     identify, identify_responses,
@@ -131,13 +131,8 @@ fn a_record_and_its_table_agree() {
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
     // Line by line, as the coherence weighs.
-    let fit = Fit::Spectra {
-        method: Some(Method::MaximumLikelihood),
-        noise: Pooling::PerLine,
-        extent: None,
-        force_noise: None,
-    };
-    let how = Identify { fit, ..Identify::default() };
+    let estimator = Some(PeriodEstimator::MaximumLikelihood(Pooling::PerLine));
+    let how = Identify::from(Source::Periods(PeriodFit { estimator, ..PeriodFit::default() }));
     let of_record = identify(std::slice::from_ref(&test), &how).unwrap();
     let table = frf(&test, &FrfSettings::default()).unwrap();
 

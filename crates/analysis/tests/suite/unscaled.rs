@@ -201,7 +201,7 @@ fn struck(seed: u64) -> (HammerTest, Measurement) {
 #[test]
 fn a_hammer_at_one_point_gives_the_modes() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
-    let how = Identify::default().hits(HitRule::default()).lines(band);
+    let how = Identify::hits(HitRule::default()).lines(band);
     let run = |seed| identify(&[struck(seed).1], &how).unwrap();
     let all: Vec<Identified> = (0..12).into_par_iter().map(run).collect();
     let (held, total) = held(&all, &struck(0).0.system().unwrap());

@@ -2,24 +2,23 @@
 //! the machine.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::Args;
 use mechid::analysis::identify::{
-    Band, Derivatives, Disturbance, Fit, Form, Identified, IdentifiedResponses, Identify,
-    IdentifyResponses, KnownMass, LeftOut, LineChoice, Method, Nonlinear, Refinement, ResponseFit,
-    SampleFit, Structure, ValidationWindow,
+    Band, Constant, Derivatives, Disturbance, Domain, Form, Identified, IdentifiedResponses,
+    Identify, IdentifyResponses, Keywords, KnownMass, LeftOut, LineChoice, Method, Refinement,
+    Structure, ValidationWindow,
 };
-use mechid::analysis::{Segmentation, Window};
+use mechid::analysis::{ResponseQuantity, Segmentation, Window, frf};
 use mechid::io::{FrequencyResponses, LineSpec};
-use mechid::model::Terms;
-use mechid::nonlinear::{Criterion, ShapeConstants, Weighting};
+use mechid::model::{Discretisation, Terms};
+use mechid::nonlinear::{Criterion, Weighting};
+use mechid::signal::Extent;
 use mechid::spectra::Pooling;
 
-use super::choices::{
-    BetweenSamplesChoice, CriterionChoice, EstimatorChoice, ExtentChoice, InterpolationChoice,
-    MethodChoice, QuantityChoice, SearchChoice, WeightChoice, WeightingChoice,
-};
 use super::hits::HitArgs;
+use super::word::word;
 use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::Files;
@@ -39,15 +38,18 @@ pub struct FitArgs {
     more_starts: Vec<usize>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Domain of the fit
-    #[arg(long, value_name = "DOMAIN", value_enum, default_value_t = Domain::Frequency)]
+    /// Domain of the fit: lines of spectra (frequency), or samples of any record (time)
+    #[arg(long, value_name = "DOMAIN", value_parser = word::<Domain>(), default_value = "frequency")]
     domain: Domain,
     #[command(flatten)]
     lines: LineArgs,
-    /// Estimator of the parameters from the spectra [default: maximum-likelihood where two periods or
-    /// more show the noise, where it biases least squares, or with --from-frf; otherwise least-squares]
-    #[arg(long, value_name = "METHOD", value_enum)]
-    method: Option<MethodChoice>,
+    /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise on the
+    /// response biases it), instrumental (one half of the periods against the other; not biased), or
+    /// maximum-likelihood on the response (not biased, of least scatter) [default: maximum-likelihood
+    /// where two periods or more show the noise, where it biases least squares, or with --from-frf;
+    /// otherwise least-squares]
+    #[arg(long, value_name = "METHOD", value_parser = word::<Method>())]
+    method: Option<Method>,
     /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
     /// N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
@@ -55,23 +57,19 @@ pub struct FitArgs {
     /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one per
     /// degree of freedom; for open records, which are fitted as such then [default: that above the band
     /// that the force drives, or between hits]
-    #[arg(
-        long,
-        value_name = "N,…",
-        value_delimiter = ',',
-        conflicts_with = "period",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
-    /// Extent of the window: of open records the unknown loads of their ends are fitted with the machine
-    /// [default: period with --period; otherwise period unless the ends show, and in the time domain open
-    /// but for spectral derivatives]
-    #[arg(long, value_name = "EXTENT", value_enum)]
-    extent: Option<ExtentChoice>,
-    /// Assumption on the force between samples, in the time domain [default: the equation of motion
-    /// at the samples if there is an acceleration, else linear]
-    #[arg(long, value_name = "ASSUMPTION", value_enum)]
-    between_samples: Option<BetweenSamplesChoice>,
+    /// Extent of the window: open (any part of a response: the unknown loads of its ends are fitted with the
+    /// machine) or period (whole ones: the first sample follows the last again) [default: period with
+    /// --period; otherwise period unless the ends show, and in the time domain open but for spectral
+    /// derivatives]
+    #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
+    extent: Option<Extent>,
+    /// Assumption on the force between samples, in the time domain: held (as a converter drives a shaker) or
+    /// linear, exact if it is true; euler, the dissertation's rule, biased in proportion to the step
+    /// [default: the equation of motion at the samples if there is an acceleration, else linear]
+    #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
+    between_samples: Option<Discretisation>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
     /// unknown
     #[arg(
@@ -92,13 +90,18 @@ pub struct FitArgs {
     nonlinear: NonlinearArgs,
     #[command(flatten)]
     time: TimeArgs,
-    /// Fit frequency responses, averaged over segments, with their coherence as weights
-    #[arg(long, value_name = "ESTIMATOR", value_enum, help_heading = "Frequency responses")]
-    from_frf: Option<EstimatorChoice>,
+    /// Fit frequency responses, averaged over segments, with their coherence as weights, estimated by where the
+    /// noise is: h1 on the response, h2 on the force, hv on both
+    #[arg(long, value_name = "ESTIMATOR", value_parser = word::<frf::Estimator>(),
+          help_heading = "Frequency responses")]
+    from_frf: Option<frf::Estimator>,
     #[command(flatten)]
     segments: SegmentArgs,
-    #[command(flatten)]
-    validation: ValidationArgs,
+    /// Record to predict (same columns), of it COUNT samples from START on: report the percentage of its response
+    /// that the identified system predicts. Without a name, such as :2049:1024, it is the first record
+    /// itself [default: all of it]
+    #[arg(long, value_name = "RECORD:START:COUNT", help_heading = "Validation")]
+    validate: Option<Validated>,
     /// Add every line of the fit to the JSON: force, measured and fitted response with their standard errors,
     /// and the residual
     #[arg(long, help_heading = "Output", requires = "json")]
@@ -106,15 +109,6 @@ pub struct FitArgs {
     /// List every check with its verdict, not only the warnings (--json and the report always do)
     #[arg(long, help_heading = "Output", conflicts_with_all = ["json", "quiet"])]
     verbose: bool,
-}
-
-/// Domain of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Domain {
-    /// Spectral lines of whole periods
-    Frequency,
-    /// Sample by sample, any record
-    Time,
 }
 
 /// Spectral lines.
@@ -138,53 +132,31 @@ pub struct LineArgs {
 
 /// Nonlinear springs and dampers.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Nonlinear terms", group = ArgGroup::new("terms").multiple(true))]
+#[command(next_help_heading = "Nonlinear terms")]
 struct NonlinearArgs {
     /// Springs and dampers to fit beside mass, damping and stiffness, each `name: law`: powers of x1
     /// and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and (v1-v2), |v1| v1,
     /// v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with that clearance (m) on either
     /// side, tanh(v1/0.01) for friction smoothed below that velocity (m/s), x1^0 for a constant force
-    #[arg(long, value_name = "TERMS", group = "terms")]
+    #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
     /// Terms to try besides, written in the same way: one after the other the most useful is added, as
     /// long as --criterion finds it worth it
-    #[arg(long, value_name = "TERMS", group = "terms")]
+    #[arg(long, value_name = "TERMS")]
     candidates: Option<Terms>,
-    /// Criterion by which a candidate is added [default: information]
-    #[arg(long, value_name = "CRITERION", value_enum, requires = "candidates")]
-    criterion: Option<CriterionChoice>,
-    /// Constants to search for besides: those inside the laws, the delay of the force, the phase that
-    /// all channels have in common
-    #[arg(long, value_name = "WHAT,…", value_enum, value_delimiter = ',', requires = "terms")]
-    search: Vec<SearchChoice>,
-    /// Weighting of the lines [default: automatic]
-    #[arg(long, value_name = "WEIGHTING", value_enum, requires = "terms")]
-    weighting: Option<WeightingChoice>,
-}
-
-impl NonlinearArgs {
-    /// Returns the settings of the terms, if there are any.
-    fn settings(&self) -> Option<Nonlinear> {
-        self.given()?;
-        let searched = |what| self.search.contains(&what);
-        Some(Nonlinear {
-            terms: self.nonlinear.clone().unwrap_or_default(),
-            candidates: self.candidates.clone().unwrap_or_default(),
-            criterion: self.criterion.map_or(Criterion::default(), Into::into),
-            search: ShapeConstants {
-                laws: searched(SearchChoice::Laws),
-                delay: searched(SearchChoice::Delay),
-                phase: searched(SearchChoice::Phase),
-            },
-            weighting: self.weighting.map_or(Weighting::Automatic, Into::into),
-        })
-    }
-
-    /// Returns the first of these options that was given.
-    fn given(&self) -> Option<&'static str> {
-        let candidates = self.candidates.as_ref().map(|_| "--candidates");
-        self.nonlinear.as_ref().map(|_| "--nonlinear").or(candidates)
-    }
+    /// Criterion by which a candidate is added: information (extended Bayesian, and a coefficient that differs
+    /// from zero) or held-out (misfit of each record, predicted by the fit to the others: three
+    /// records or windows at least) [default: information]
+    #[arg(long, value_name = "CRITERION", value_parser = word::<Criterion>())]
+    criterion: Option<Criterion>,
+    /// Constants to search for besides: laws (those inside the laws, from the values given), delay (of the force),
+    /// phase (that all channels have in common, as of equal filters)
+    #[arg(long, value_name = "WHAT,…", value_parser = word::<Constant>(), value_delimiter = ',')]
+    search: Vec<Constant>,
+    /// Weighting of the lines, by where the equation error is equally large on all of them: white-force,
+    /// response, or smooth-spectrum (the residual's own); automatic: the likeliest [default: automatic]
+    #[arg(long, value_name = "WEIGHTING", value_parser = word::<Weighting>())]
+    weighting: Option<Weighting>,
 }
 
 /// Fits in the time domain.
@@ -196,30 +168,22 @@ struct TimeArgs {
     /// through a sliding WINDOW of samples (odd)
     #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
     derivatives: Option<Derivatives>,
-    /// Put this many steps into every interval, which makes the error of --between-samples smaller
-    #[arg(long, value_name = "FACTOR", value_parser = at_least_one,
-          requires_all = ["interpolation", "between_samples"])]
-    refine: Option<usize>,
-    /// Interpolation between the samples
-    #[arg(long, value_name = "WAY", value_enum, requires = "refine")]
-    interpolation: Option<InterpolationChoice>,
+    /// Put FACTOR steps into every interval, which makes the error of --between-samples smaller, with samples
+    /// between by linear, spline or band-limited interpolation
+    #[arg(long, value_name = "FACTOR:INTERPOLATION", requires = "between_samples")]
+    refine: Option<Refinement>,
 }
 
 /// Segments of a record to average over.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Samples of a segment, for a random excitation [default: the periods are the segments; of records
-    /// without --period, chosen by the coherence]
-    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
-    segment: Option<usize>,
-    /// Window that weights the samples of a segment [default: hann]
-    #[arg(long, value_name = "WINDOW", value_enum, requires = "segment")]
-    segment_window: Option<WeightChoice>,
-    /// Part of a segment that the next one repeats, in per cent [default: 50]
-    #[arg(long, value_name = "PERCENT", value_parser = share, requires = "segment",
-          allow_negative_numbers = true)]
-    segment_overlap: Option<f64>,
+    /// Samples of a segment, for a random excitation; the part that the next one repeats, in per cent (50); and the
+    /// window that weights its samples: hann, hamming (a narrower peak, more leakage from far away),
+    /// blackman (the least leakage, a wider peak) or rectangular (for bursts that begin and end at rest)
+    /// [default: the periods are the segments; of records without --period, chosen by the coherence]
+    #[arg(long, value_name = "SAMPLES:OVERLAP:WINDOW")]
+    segment: Option<Segmentation>,
 }
 
 /// Frequency responses that were measured elsewhere.
@@ -228,14 +192,14 @@ pub struct SegmentArgs {
 pub struct TableArgs {
     /// The files are tables of frequency responses: text with columns h_1_1_real, h_1_1_imaginary …
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
-    #[arg(long, conflicts_with_all = ["force", "displacement", "velocity", "acceleration",
-          "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz", "from_frf", "segment", "nonlinear", "candidates", "more_starts",
-          "between_samples", "extent", "force_noise", "hits", "struck", "derivatives", "refine", "validate", "validate_start",
-          "validate_samples", "skip_lines", "record_column"])]
+    #[arg(long, conflicts_with_all = ["ChannelArgs", "HitArgs", "HitRuleArgs", "NonlinearArgs", "TimeArgs",
+          "SegmentArgs", "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz",
+          "from_frf", "noise", "more_starts", "between_samples", "extent", "force_noise", "validate",
+          "skip_lines", "record_column"])]
     frf_table: bool,
-    /// Measured quantity of the responses, where the table does not state it
-    #[arg(long, value_name = "QUANTITY", value_enum, requires = "frf_table")]
-    quantity: Option<QuantityChoice>,
+    /// Measured quantity of the responses per force, where the table does not state it
+    #[arg(long, value_name = "QUANTITY", value_parser = word::<ResponseQuantity>(), requires = "frf_table")]
+    quantity: Option<ResponseQuantity>,
     /// Number of independent averages behind the coherence, from which standard errors follow; not
     /// needed where the table has standard errors
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
@@ -245,28 +209,43 @@ pub struct TableArgs {
     points: Vec<String>,
 }
 
-/// A record to predict.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Validation")]
-struct ValidationArgs {
-    /// Validation record (same columns): report the percentage of its response that the identified
-    /// system predicts
-    #[arg(long, value_name = "RECORD")]
-    validate: Option<PathBuf>,
-    /// First sample to predict, counted from 1; without --validate, of the record itself
-    /// [default: 1]
-    #[arg(long, value_name = "SAMPLE", value_parser = at_least_one)]
-    validate_start: Option<usize>,
-    /// Samples to predict [default: all from --validate-start on]
-    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
-    validate_samples: Option<usize>,
+/// A record to predict, written `RECORD:START:COUNT`.
+#[derive(Debug, Clone)]
+struct Validated {
+    /// The record; `None`: the first of those that are fitted.
+    record: Option<PathBuf>,
+    window: ValidationWindow,
 }
 
-fn share(text: &str) -> Result<f64, String> {
-    let percent: f64 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    match (0.0..100.0).contains(&percent) {
-        true => Ok(percent),
-        false => Err(format!("an overlap lies from 0 to below 100 %, got {percent}")),
+impl FromStr for Validated {
+    type Err = String;
+
+    /// Reads up to two numbers at the end, so that a name may have colons.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.parse::<usize>().ok();
+        let (name, numbers) = match text.rsplit_once(':') {
+            None => (text, (None, None)),
+            Some((before, last)) => match (before.rsplit_once(':'), number(last)) {
+                (Some((name, start)), count @ Some(_)) if number(start).is_some() => {
+                    (name, (number(start), count))
+                }
+                (_, start @ Some(_)) => (before, (start, None)),
+                _ => (text, (None, None)),
+            },
+        };
+        let (start, samples) = numbers;
+        match (name, start) {
+            (_, Some(0)) | (_, Some(_)) if samples == Some(0) || start == Some(0) => {
+                Err("samples are counted from 1".into())
+            }
+            ("", None) => {
+                Err("write RECORD, RECORD:START, RECORD:START:COUNT or :START:COUNT".into())
+            }
+            ("", _) => Ok(Self { record: None, window: ValidationWindow { start, samples } }),
+            _ => {
+                Ok(Self { record: Some(name.into()), window: ValidationWindow { start, samples } })
+            }
+        }
     }
 }
 
@@ -284,41 +263,19 @@ impl LineArgs {
     pub fn without(&self) -> LeftOut {
         LeftOut { lines: self.without_lines.clone(), frequencies: self.without_hz.clone() }
     }
-
-    /// Returns the first of these options that was given.
-    fn given(&self) -> Option<&'static str> {
-        let lines = self.lines.as_ref().map(|_| "--lines");
-        let without = self.without_lines.as_ref().map(|_| "--without-lines");
-        let frequencies = self.without_hz.first().map(|_| "--without-hz");
-        lines.or(self.band_hz.map(|_| "--band-hz")).or(without).or(frequencies)
-    }
 }
 
 impl SegmentArgs {
     /// Returns the segments.
     pub fn segmentation(&self) -> Segmentation {
-        let usual = Segmentation::default();
-        Segmentation {
-            segment: self.segment,
-            window: self.segment_window.map_or(usual.window, Into::into),
-            overlap_percent: self.segment_overlap.unwrap_or(usual.overlap_percent),
-        }
-    }
-}
-
-impl TimeArgs {
-    /// Returns the first of these options that was given.
-    fn given(&self) -> Option<&'static str> {
-        [(self.derivatives.is_some(), "--derivatives"), (self.refine.is_some(), "--refine")]
-            .into_iter()
-            .find_map(|(given, name)| given.then_some(name))
+        self.segment.clone().unwrap_or_default()
     }
 }
 
 impl FitArgs {
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
-        self.check_options()?;
+        let how = self.settings()?;
         let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
         let first = self.input.open(&channels[0])?;
         let mut records = vec![first.clone()];
@@ -328,21 +285,16 @@ impl FitArgs {
         for (record, channels) in self.more.iter().zip(&channels[1..]) {
             records.push(self.input.open_other(record, channels, self.input.window())?);
         }
-        let mut identified = mechid::identify(&records, &self.settings())?;
+        let mut identified = mechid::identify(&records, &how)?;
         if self.fitted_lines {
             identified.add_fitted_lines()?;
         }
-        let predicted = &self.validation;
-        let (start, samples) = (predicted.validate_start, predicted.validate_samples);
-        let other = match (&predicted.validate, start, samples) {
-            (None, None, None) => return Ok(identified),
-            (None, None, Some(samples)) => return Err(CliError::ValidationStart { samples }),
-            (Some(record), _, _) => {
-                self.input.open_other(record, &channels[0], Window::default())?
-            }
-            (None, _, _) => records.swap_remove(0),
+        let Some(Validated { record, window }) = &self.validate else { return Ok(identified) };
+        let other = match record {
+            Some(record) => self.input.open_other(record, &channels[0], Window::default())?,
+            None => records.swap_remove(0),
         };
-        let other = identified.validation_window(other, &ValidationWindow { start, samples })?;
+        let other = identified.validation_window(other, window)?;
         identified.add_validation(&other)?;
         Ok(identified)
     }
@@ -364,13 +316,13 @@ impl FitArgs {
         let tables: Vec<FrequencyResponses> =
             files.map(FrequencyResponses::read).collect::<Result<_, _>>()?;
         let how = IdentifyResponses {
-            quantity: table.quantity.map(Into::into),
+            quantity: table.quantity,
             averages: table.averages.map(|count| count as f64),
             points: table.points.clone(),
             band: self.lines.band_hz,
             mass: self.mass.clone(),
             structure: self.structure(),
-            method: self.method.map(Method::from),
+            method: self.method,
         };
         let mut identified = mechid::identify_responses(&tables, &how)?;
         if self.fitted_lines {
@@ -384,7 +336,7 @@ impl FitArgs {
         Files::default()
             .reads([&self.input.record])
             .reads(&self.more)
-            .reads(&self.validation.validate)
+            .reads(self.validate.iter().filter_map(|validated| validated.record.as_ref()))
     }
 
     /// Returns the result as text, with every check if asked for.
@@ -401,73 +353,31 @@ impl FitArgs {
     }
 
     /// Returns the settings of the identification.
-    fn settings(&self) -> Identify {
-        let method = self.method.map(Method::from);
-        let fit = match (self.domain, self.from_frf) {
-            (Domain::Time, _) => Fit::Samples(SampleFit {
-                between_samples: self.between_samples.map(Into::into),
-                extent: self.extent.map(Into::into),
-                derivatives: self.time.derivatives,
-                refine: self.time.refine.zip(self.time.interpolation).map(
-                    |(factor, interpolation)| Refinement {
-                        factor,
-                        interpolation: interpolation.into(),
-                    },
-                ),
-            }),
-            (Domain::Frequency, Some(estimator)) => Fit::Responses(ResponseFit {
-                estimator: estimator.into(),
-                segments: self.segments.segmentation(),
-                method,
-            }),
-            (Domain::Frequency, None) => {
-                let (noise, extent) = (self.noise.unwrap_or_default(), self.extent);
-                let stated = !self.force_noise.is_empty();
-                let force_noise = stated.then(|| self.force_noise.clone());
-                Fit::Spectra { method, noise, extent: extent.map(Into::into), force_noise }
-            }
-        };
-        Identify {
-            fit,
-            lines: self.lines.choice(),
-            without: self.lines.without(),
+    fn settings(&self) -> Result<Identify, CliError> {
+        let keywords = Keywords {
+            domain: self.domain,
+            method: self.method,
+            noise: self.noise,
+            force_noise: Some(self.force_noise.clone()).filter(|levels| !levels.is_empty()),
+            extent: self.extent,
+            lines: self.lines.lines.clone(),
+            band_hz: self.lines.band_hz,
+            without_lines: self.lines.without_lines.clone(),
+            without_hz: self.lines.without_hz.clone(),
             mass: self.mass.clone(),
             structure: self.structure(),
             hits: self.hits.rule(),
-            nonlinear: self.nonlinear.settings(),
-        }
-    }
-
-    /// Refuses options that the domain does not use.
-    fn check_options(&self) -> Result<(), CliError> {
-        let of_time = [self.between_samples.map(|_| "--between-samples"), self.time.given()];
-        let of_frequency = [
-            self.lines.given(),
-            self.method.map(|_| "--method"),
-            self.noise.map(|_| "--noise"),
-            self.force_noise.first().map(|_| "--force-noise"),
-            self.from_frf.map(|_| "--from-frf"),
-            self.nonlinear.given(),
-        ];
-        let first = |options: &[Option<&'static str>]| options.iter().flatten().next().copied();
-        let (misplaced, why) = match self.domain {
-            Domain::Frequency => (first(&of_time), "belongs to --domain time"),
-            Domain::Time => (first(&of_frequency), "belongs to --domain frequency"),
+            from_frf: self.from_frf,
+            segment: self.segments.segment.clone(),
+            nonlinear: self.nonlinear.nonlinear.clone(),
+            candidates: self.nonlinear.candidates.clone(),
+            criterion: self.nonlinear.criterion,
+            search: self.nonlinear.search.clone(),
+            weighting: self.nonlinear.weighting,
+            between_samples: self.between_samples,
+            derivatives: self.time.derivatives,
+            refine: self.time.refine,
         };
-        let alone =
-            (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
-        let of_spectra = [
-            (self.noise.is_some(), "--noise"),
-            (!self.force_noise.is_empty(), "--force-noise"),
-            (self.extent.is_some(), "--extent"),
-        ];
-        let of_spectra =
-            of_spectra.into_iter().find(|(given, _)| *given && self.from_frf.is_some());
-        let alone = alone.map(|o| (o, "belongs to --from-frf"));
-        let of_spectra = of_spectra.map(|(_, o)| (o, "belongs to fits without --from-frf"));
-        match misplaced.map(|o| (o, why)).or(alone).or(of_spectra) {
-            Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
-            None => Ok(()),
-        }
+        Ok(Identify::try_from(keywords)?)
     }
 }

@@ -10,29 +10,15 @@ use crate::error::CliError;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Hammer tests")]
 pub struct HitRuleArgs {
-    /// The records are hammer tests: the hits are found in the force, and bad ones (double hits, overloads,
-    /// weak hits, too little room) are left out
-    #[arg(long)]
-    hits: bool,
-    /// Force that begins a hit, in per cent of the largest force of the record [default: 0.5]
-    #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
-    trigger_percent: Option<f64>,
-    /// Least second peak of a double hit, in per cent of the first [default: 5]
-    #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
-    double_percent: Option<f64>,
-    /// Least peak of a hit, in per cent of the median of all peaks that are a tenth of the largest or more
-    /// [default: 25]
-    #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
-    weak_percent: Option<f64>,
-    /// Time after the trigger within which a force belongs to the same hit, in s [default: 0.1]
-    #[arg(long, value_name = "SECONDS", requires = "hits", allow_negative_numbers = true)]
-    bounce_s: Option<f64>,
-    /// Samples of a hit before its pulse [default: twice those of the pulse]
-    #[arg(long, value_name = "SAMPLES", requires = "hits")]
-    before_hit: Option<usize>,
-    /// Samples of a hit, those before it included [default: up to the next hit]
-    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one, requires = "hits")]
-    hit_samples: Option<usize>,
+    /// The records are hammer tests: the hits are found in the force, and bad ones (double hits, overloads, weak
+    /// hits, too little room) are left out. --hits=trigger=0.5,double=5,… changes the rule: trigger (force
+    /// that begins a hit, in per cent of the largest of the record; 0.5), double (least second peak of a
+    /// double hit, in per cent of the first; 5), weak (least peak, in per cent of the median of all peaks
+    /// of a tenth of the largest or more; 25), bounce (time after the trigger within which a force belongs
+    /// to the same hit, in s; 0.1), before (samples before the pulse; twice those of the pulse), samples
+    /// (those of a hit, the ones before it included; up to the next hit)
+    #[arg(long, value_name = "RULE", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    hits: Option<HitRule>,
 }
 
 /// Hits of a hammer, and where it strikes.
@@ -76,14 +62,6 @@ impl HitArgs {
 impl HitRuleArgs {
     /// Returns the rule by which hits are found, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
-        let usual = HitRule::default();
-        self.hits.then(|| HitRule {
-            trigger_percent: self.trigger_percent.unwrap_or(usual.trigger_percent),
-            double_percent: self.double_percent.unwrap_or(usual.double_percent),
-            weak_percent: self.weak_percent.unwrap_or(usual.weak_percent),
-            bounce_s: self.bounce_s.unwrap_or(usual.bounce_s),
-            before: self.before_hit,
-            samples: self.hit_samples,
-        })
+        self.hits.clone()
     }
 }

@@ -1,10 +1,10 @@
 //! Arguments that several subcommands share, and what they mean to the analysis.
 
 pub mod channels;
-pub mod choices;
 pub mod fit;
 pub mod hits;
 mod style;
+pub mod word;
 
 use std::path::PathBuf;
 
@@ -15,8 +15,8 @@ use mechid::io::Geometry;
 use mechid::report::ModeShapes;
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
-use self::choices::DetrendChoice;
 pub use self::style::StyleArgs;
+use self::word::word;
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -167,8 +167,8 @@ pub struct RecordArgs {
           help_heading = "Time and window")]
     pub periods: Option<usize>,
     /// Constant to subtract from every channel: the mean of the whole record, not only of the window
-    #[arg(long, value_name = "WHAT", value_enum, help_heading = "Time and window")]
-    pub detrend: Option<DetrendChoice>,
+    #[arg(long, value_name = "WHAT", value_parser = word::<Detrend>(), help_heading = "Time and window")]
+    pub detrend: Option<Detrend>,
 }
 
 /// Parses a column and a text behind the last equals sign.
@@ -216,7 +216,7 @@ impl RecordArgs {
             skip_lines: self.skip_lines,
             time: self.time.clone(),
             sample_rate_hz: self.sample_rate,
-            detrend: self.detrend.map_or(Detrend::None, Detrend::from),
+            detrend: self.detrend.unwrap_or_default(),
             record_column: self.record_column.clone(),
             record_id: self.record_id.clone(),
             units: self.units.iter().cloned().collect(),

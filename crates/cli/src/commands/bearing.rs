@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable};
+use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable, Coefficients};
 use mechid::analysis::{IdentifyBearing, Measurement};
 use mechid::io::FrequencyResponses;
 use mechid::report::FigureStyle;
 use mechid::{BearingData, identify_bearing};
 
-use crate::args::choices::CoefficientsChoice;
 use crate::args::fit::LineArgs;
+use crate::args::word::word;
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -63,9 +63,10 @@ pub struct BearingArgs {
     /// Static load, in N, for dimensionless coefficients
     #[arg(long, value_name = "N")]
     load: Option<f64>,
-    /// Coefficients to identify
-    #[arg(long, value_name = "WHICH", value_enum, default_value_t = CoefficientsChoice::Automatic)]
-    coefficients: CoefficientsChoice,
+    /// Coefficients to identify: eight of stiffness and damping, twelve with the mass of the fluid, or automatic,
+    /// which takes twelve if a likelihood-ratio test at 5 % finds inertia
+    #[arg(long, value_name = "WHICH", value_parser = word::<Coefficients>(), default_value = "automatic")]
+    coefficients: Coefficients,
     #[command(flatten)]
     lines: LineArgs,
     #[command(flatten)]
@@ -174,7 +175,7 @@ impl BearingArgs {
             rotation_hz: self.rotation_hz,
             load: self.load,
             size: BearingSize { clearance, diameter, length, viscosity },
-            coefficients: self.coefficients.into(),
+            coefficients: self.coefficients,
             lines: self.lines.choice(),
             without: self.lines.without(),
             averages: self.tables.averages.map(|count| count as f64),

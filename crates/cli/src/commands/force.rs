@@ -6,13 +6,13 @@ use clap::Args;
 use mechid::Reconstruct;
 use mechid::analysis::identify::Band;
 use mechid::analysis::reconstruct::{
-    ForceChunk, ParameterRule, reconstruct_in_chunks, reconstruct_with,
+    ForceChunk, Method, ParameterRule, reconstruct_in_chunks, reconstruct_with,
 };
 use mechid::analysis::{AnalysisError, Machine};
 use mechid::io::{BegunFile, CsvFile, LineSpec};
 use mechid::report::{FigureStyle, spectrum_csv};
 
-use crate::args::choices::{ForceMethodChoice, RuleChoice};
+use crate::args::word::{one_of, word};
 use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -44,9 +44,13 @@ pub struct ForceArgs {
     /// Degrees of freedom on which a force acts, counted from 1 [default: all]
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     forced: Vec<usize>,
-    /// Method of the reconstruction
-    #[arg(long, value_name = "METHOD", value_enum, default_value_t = ForceMethodChoice::Auto)]
-    method: ForceMethodChoice,
+    /// Method: auto (the one that suits the record); continuous (equation of motion at the samples: displacement,
+    /// velocity and acceleration of everything); discretised (from sample to sample, the force linear
+    /// between them: displacement and velocity); frequency-domain (dynamic stiffness: whole periods);
+    /// shrinkage (posterior mean), tikhonov or truncated-svd (whole periods, or a short record); kalman
+    /// (filter and smoother: an open record of any length)
+    #[arg(long, value_name = "METHOD", value_parser = word::<Method>(), default_value = "auto")]
+    method: Method,
     /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
     #[arg(long, value_name = "LINES")]
     lines: Option<LineSpec>,
@@ -61,9 +65,11 @@ pub struct ForceArgs {
     /// averaged [default: estimated]
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
-    /// Rule that chooses the regularisation parameter
-    #[arg(long, value_name = "RULE", value_enum, default_value_t = RuleChoice::Likelihood)]
-    rule: RuleChoice,
+    /// Rule that chooses the regularisation parameter: likelihood (nearest to the posterior mean of the force), gcv
+    /// (generalised cross-validation) or l-curve (its corner)
+    #[arg(long, value_name = "RULE", value_parser = one_of::<ParameterRule>(&["likelihood", "gcv", "l-curve"]),
+          default_value = "likelihood")]
+    rule: ParameterRule,
     /// The regularisation parameter, instead of a rule
     #[arg(long, value_name = "LAMBDA", allow_negative_numbers = true, conflicts_with = "rule")]
     parameter: Option<f64>,
@@ -113,16 +119,13 @@ impl ForceArgs {
     /// Returns the settings of the reconstruction.
     fn settings(&self) -> Reconstruct {
         Reconstruct {
-            method: self.method.into(),
+            method: self.method,
             forced: self.forced.clone(),
             lines: self.lines.clone(),
             band_hz: self.band_hz,
             at_rest: self.at_rest,
             noise: self.noise.clone(),
-            rule: match self.parameter {
-                Some(lambda) => ParameterRule::Given(lambda),
-                None => self.rule.into(),
-            },
+            rule: self.parameter.map_or(self.rule, ParameterRule::Given),
         }
     }
 }

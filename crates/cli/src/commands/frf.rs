@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mechid::analysis::FrfSettings;
+use mechid::analysis::frf::Estimator;
 
-use crate::args::choices::EstimatorChoice;
 use crate::args::fit::{LineArgs, SegmentArgs};
 use crate::args::hits::HitArgs;
+use crate::args::word::word;
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -20,7 +21,7 @@ use crate::outcome::{Files, Outcome};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
-  mechid frf random.csv --force f --acceleration a --segment 1024 --segment-overlap 66 \\
+  mechid frf random.csv --force f --acceleration a --segment 1024:66 \\
       --estimator hv --band-hz 5:400 --output frf.csv
   mechid frf a.csv b.csv --force f --acceleration a --segment 1024 --plot frf.svg
   mechid frf hammer.csv --force f --acceleration a --hits --exponential-percent 1
@@ -35,9 +36,9 @@ pub struct FrfArgs {
     more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Frequency response estimator
-    #[arg(long, value_enum, default_value_t = EstimatorChoice::H1)]
-    estimator: EstimatorChoice,
+    /// Frequency response estimator, by where the noise is: h1 on the response, h2 on the force, hv on both
+    #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "h1")]
+    estimator: Estimator,
     #[command(flatten)]
     lines: LineArgs,
     #[command(flatten)]
@@ -90,7 +91,7 @@ impl FrfArgs {
         }
         let channels = self.hits.channels_of(&channels, 1 + self.more.len())?;
         let how = FrfSettings {
-            estimator: self.estimator.into(),
+            estimator: self.estimator,
             lines: self.lines.choice(),
             without: self.lines.without(),
             segments: self.segments.segmentation(),

@@ -21,7 +21,7 @@ use crate::outcome::{Files, Outcome};
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
 /// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
-/// are windows for spectral --derivatives, and for --interpolation by a spline or band-limited, one
+/// are windows for spectral --derivatives, and for a --refine by a spline or band-limited, one
 /// long period, and what --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -35,7 +35,7 @@ use crate::outcome::{Files, Outcome};
   mechid identify random.csv --force f --acceleration a --from-frf h1 --segment 1024
   mechid identify modal.unv --frf-table --averages 32 --band-hz 20:400
   mechid identify t.csv --force f --displacement x --velocity v --domain time \\
-      --between-samples euler --extent period --refine 8 --interpolation band-limited --plot t.svg
+      --between-samples euler --extent period --refine 8:band-limited --plot t.svg
   mechid identify t.csv --force f --acceleration a --domain time --derivatives savitzky-golay:11:4")]
 pub struct IdentifyArgs {
     #[command(flatten)]

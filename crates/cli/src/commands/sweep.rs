@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::ProgressBar;
 use mechid::analysis::identify::KnownMass;
-use mechid::analysis::sweep::{Kind, Settings, SweepSettings, SweepSummary, sweep_record};
+use mechid::analysis::sweep::{
+    Estimator, Kind, Settings, SweepSettings, SweepSummary, sweep_record,
+};
 use mechid::io::{Experiment, read_system};
 use mechid::report::FigureStyle;
 
-use crate::args::choices::SweepEstimatorChoice;
+use crate::args::word::word;
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -43,9 +45,11 @@ pub struct SweepArgs {
     /// Natural frequency that NPI counts, in Hz [default: the lowest of the machine]
     #[arg(long, value_name = "HZ")]
     natural_frequency_hz: Option<f64>,
-    /// Estimator
-    #[arg(long, value_name = "ESTIMATOR", value_enum, default_value_t = SweepEstimatorChoice::Linear)]
-    estimator: SweepEstimatorChoice,
+    /// Estimator: from sample to sample by Euler's rule (the dissertation's; biased in proportion to the step), with the
+    /// force held or linear between samples; the equation of motion at the samples, with the acceleration;
+    /// or least squares or maximum likelihood on the spectra
+    #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "linear")]
+    estimator: Estimator,
     /// Find the mass of a described machine, too; without this it is taken from the description
     #[arg(long)]
     unknown_mass: bool,
@@ -118,7 +122,7 @@ impl SweepArgs {
         let how = SweepSettings {
             kind,
             settings,
-            estimator: self.estimator.into(),
+            estimator: self.estimator,
             mass,
             natural_frequency_hz: self.natural_frequency_hz,
         };

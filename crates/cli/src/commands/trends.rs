@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::analysis::fleet::Trends;
+use mechid::analysis::fleet::{TrendAxis, Trends};
 use mechid::report::{FigureStyle, trends_page};
 
 use super::report::html_file;
-use crate::args::choices::TrendAxisChoice;
+use crate::args::word::word;
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -27,8 +27,8 @@ pub struct TrendsArgs {
     results: PathBuf,
     /// Order of the records: as their names sort, or by the last number in the name (1500 of
     /// speed-1500.csv)
-    #[arg(long, value_name = "ORDER", value_enum, default_value = "order")]
-    over: TrendAxisChoice,
+    #[arg(long, value_name = "ORDER", value_parser = word::<TrendAxis>(), default_value = "order")]
+    over: TrendAxis,
     /// File for a page with all series, outliers and failures (-: standard output)
     #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
     output: Option<PathBuf>,
@@ -57,7 +57,7 @@ impl TrendsArgs {
 
     /// Reads the results, and draws them.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let trends = Trends::read(&self.results, self.over.into())?;
+        let trends = Trends::read(&self.results, self.over)?;
         let mut outcome = Outcome::new(trends.to_string(), &trends)?;
         if let Some(file) = &self.output {
             let of_folder = || format!("Results in {}", self.results.display());

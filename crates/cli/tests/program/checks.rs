@@ -118,7 +118,7 @@ fn a_refined_fit_is_judged_from_measured_sample_to_measured_sample() {
     write(folder, "clean.csv", &force, &motion, 0.0);
     write(folder, "noisy.csv", &force, &motion, 0.001);
     let refined = "--force f --displacement x --velocity v --domain time \
-                   --between-samples linear --refine 4 --interpolation linear";
+                   --between-samples linear --refine 4:linear";
     for subject in ["whiteness", "cross-correlation"] {
         let found = verdicts(folder, &format!("identify clean.csv {refined} --mass 2"), subject);
         assert_eq!(found.len(), 1);

@@ -80,7 +80,7 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
         "analysis.json",
         r#"{ "channels": { "force": ["force"], "displacement": ["displacement"] },
              "reading": { "record_column": "run" }, "window": { "period": 256 },
-             "identify": { "fit": { "domain": "spectra", "method": "maximum-likelihood" } } }"#,
+             "identify": { "method": "maximum-likelihood" } }"#,
     );
     write("runs.csv", "system.mass;noise.seed\n20;1\n25;2\n30;3\n");
     let json = |arguments: &str| -> Value {

@@ -181,12 +181,12 @@ fn another_record_is_predicted() {
     assert_eq!(fits(&exact).len(), 2);
     assert!(fits(&exact).iter().all(|fit| *fit > 99.9999), "{exact}");
     // All that is missing is the noise.
-    let noise = json(folder, &format!("{common} --validate c.csv --validate-start 101"));
+    let noise = json(folder, &format!("{common} --validate c.csv:101"));
     assert_eq!(noise["validation"]["first_sample"], 101);
     assert!(fits(&noise).iter().all(|fit| (fit - 90.0).abs() < 1.5), "{noise}");
     // A window of the record itself, as a person reads it.
     let own =
-        format!("{common} --period 300 --periods 1 --validate-start 301 --validate-samples 200");
+        format!("{common} --period 300 --periods 1 --validate :301:200");
     let (done, text, message) = run(folder, &own);
     assert!(done, "{message}");
     assert!(text.contains("predicted of a.csv, samples 301 to 500 "), "{text}");
@@ -199,17 +199,15 @@ fn another_record_is_predicted() {
     }
     let steady = json(
         folder,
-        "identify p.csv --force f --displacement x --period 256 --validate q.csv \
-         --validate-samples 600",
+        "identify p.csv --force f --displacement x --period 256 --validate q.csv:1:600",
     );
     assert_eq!(steady["validation"]["last_sample"], 512);
     assert!(fits(&steady)[0] > 99.9999);
 
-    refused(folder, &format!("{common} --validate-samples 20"), &["--validate-start"]);
+    refused(folder, &format!("{common} --validate :0"), &["counted from 1"]);
     refused(folder, &format!("{common} --validate d.csv"), &["cannot read d.csv"]);
-    refused(folder, &format!("{common} --validate b.csv --validate-start 700"), &["b.csv has 600"]);
-    let short = "identify p.csv --force f --displacement x --period 256 --validate q.csv \
-                 --validate-samples 100";
+    refused(folder, &format!("{common} --validate b.csv:700"), &["b.csv has 600"]);
+    let short = "identify p.csv --force f --displacement x --period 256 --validate q.csv:1:100";
     refused(folder, short, &["--validate-samples 100 is less than one period of 256"]);
 }
 
@@ -252,16 +250,15 @@ fn intermediate_points_make_the_step_smaller_and_nothing_more_certain() {
                   --extent period --between-samples euler";
     let once = json(folder, common);
     for (way, better) in [("band-limited", 6.0), ("spline", 6.0), ("linear", 1.05)] {
-        let finer = json(folder, &format!("{common} --refine 8 --interpolation {way}"));
+        let finer = json(folder, &format!("{common} --refine 8:{way}"));
         assert!(error(&finer) < error(&once) / better, "{way}: {} {}", error(&finer), error(&once));
         let freedom = finer["covariance"]["degrees_of_freedom"].as_u64().unwrap();
         let measured = once["covariance"]["degrees_of_freedom"].as_u64().unwrap();
         // An open record has one interval less.
         assert!(measured - freedom <= 1, "{way}: {freedom} {measured}");
     }
-    refused(folder, &format!("{common} --refine 8"), &["--interpolation"]);
-    refused(folder, &format!("{common} --refine 0 --interpolation linear"), &["counted from 1"]);
-    refused(folder, &format!("{common} --interpolation linear"), &["--refine"]);
+    refused(folder, &format!("{common} --refine 8"), &["FACTOR:linear"]);
+    refused(folder, &format!("{common} --refine 0:linear"), &["FACTOR:linear"]);
 }
 
 #[test]
@@ -282,13 +279,13 @@ fn a_whole_period_closes() {
         }
     }
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
-    refused(folder, &segments, &["--extent belongs to fits without --from-frf"]);
+    refused(folder, &segments, &["--extent: it belongs to", "not to --from-frf"]);
     let weights = format!("{common} --method least-squares --noise smooth");
     refused(folder, &weights, &["--noise: it weights --method maximum-likelihood alone"]);
     let weights = format!("{common} --noise per-line --extent period");
     refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
     let lines = "--domain time --lines odd --plot a.svg";
-    refused(folder, &format!("{common} {lines}"), &["--lines belongs to --domain frequency"]);
+    refused(folder, &format!("{common} {lines}"), &["--lines: it belongs to", "not to --domain time"]);
 }
 
 /// Periods without noise, and a period that is not said.
@@ -417,22 +414,29 @@ fn frequency_responses_are_estimated_and_fitted() {
     let motion = exact_harmonic_periodic(&system, &force).unwrap();
     write(folder, "r.csv", &force, &noisy(&motion, 0.05, 8));
     let common = "--force f --displacement x --segment 1024 --band-hz 0.5:12";
+    let other = "--force f --displacement x --band-hz 0.5:12 --segment";
     let frf = json(folder, &format!("frf r.csv {common}"));
     assert_eq!(frf["segments"]["hop"], 512);
     let found = json(folder, &format!("identify r.csv {common} --from-frf h1"));
     assert!(error(&found) < 0.03, "{found}");
     let least_squares = format!("identify r.csv {common} --from-frf h1 --method least-squares");
     assert!(error(&json(folder, &least_squares)) > error(&found));
-    let three = format!("frf r.csv {common} --segment-overlap 75 --segment-window blackman");
+    let three = format!("frf r.csv {other} 1024:75:blackman");
     assert_eq!(json(folder, &three)["segments"]["hop"], 256);
     for (more, part) in [
-        ("--segment-overlap 100", "from 0 to below 100 %, got 100"),
-        ("--segment-overlap -1", "from 0 to below 100 %, got -1"),
         ("--from-frf h3", "h3"),
         ("--from-frf h1 --method instrumental", "instrumental variables need periods"),
-        ("", "--segment belongs to --from-frf"),
+        ("", "--segment: it belongs to --from-frf"),
     ] {
         refused(folder, &format!("identify r.csv {common} {more}"), &[part]);
+    }
+    for (segment, part) in [
+        ("1024:100", "from 0 to below 100 %, got 100"),
+        ("1024:-1", "from 0 to below 100 %, got -1"),
+        ("1024:50:hanning", "is none of hann, hamming, blackman, rectangular"),
+        ("0", "is no number of samples"),
+    ] {
+        refused(folder, &format!("frf r.csv {other} {segment}"), &[part]);
     }
     let long = "frf r.csv --force f --displacement x --segment 20000 --output frf2.csv";
     refused(folder, long, &["20000"]);

@@ -165,7 +165,7 @@ fn stretches_of_a_long_text_meet_as_in_one_record() {
             whole.fit(&x, &v, &f, &unknowns).unwrap().into_estimate(),
         ),
         (
-            "--velocity v --between-samples euler --refine 8 --interpolation linear",
+            "--velocity v --between-samples euler --refine 8:linear",
             refined.unwrap().into_estimate(),
         ),
         ("--derivatives savitzky-golay:21:4", equation_of_motion(&smooth, &f, &unknowns).unwrap()),
@@ -212,7 +212,7 @@ fn a_long_text_is_predicted_as_one_record() {
     let told = mechid(
         folder.path(),
         "identify rec.csv --force f --displacement x --velocity v --domain time --periods 1 \
-         --period 1000 --validate rec.csv --validate-start 501 --json",
+         --period 1000 --validate rec.csv:501 --json",
     );
     let report: Value = serde_json::from_str(&told).unwrap();
     let [start, samples] = [500, x.len() - 500];

@@ -361,9 +361,11 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
         remarks.iter().find(|(heading, _)| heading.starts_with("What speaks")).unwrap();
     assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
     // What was fitted proves nothing, unless other samples of it were.
-    for (more, proves) in [(&[][..], false), (&["--periods", "1", "--validate-start", "257"], true)]
-    {
-        mechid(folder.path(), &[&USUAL[..], &["--validate", "rig.csv"], more].concat());
+    for (more, proves) in [
+        (&["--validate", "rig.csv"][..], false),
+        (&["--validate", "rig.csv:257", "--periods", "1"], true),
+    ] {
+        mechid(folder.path(), &[&USUAL[..], more].concat());
         assert_eq!(page(folder.path()).contains("of every motion is predicted"), proves);
         assert_eq!(page(folder.path()).contains("agreement proves little"), !proves);
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
@@ -76,7 +75,6 @@ Scheme: TypeAlias = Literal[
 SweepEstimator: TypeAlias = Literal[
     "euler", "held", "linear", "equation-of-motion", "least-squares", "maximum-likelihood"
 ]
-Weight: TypeAlias = Literal["hann", "hamming", "blackman", "rectangular"]
 
 
 @careful
@@ -93,23 +91,18 @@ def identify(
     structure: str | Sequence[str] = (),
     domain: Literal["frequency", "time"] = "frequency",
     from_frf: Estimator | None = None,
-    segment: int | None = None,
-    segment_window: Weight | None = None,
-    segment_overlap: float | None = None,
+    segment: int | str | Mapping[str, Any] | None = None,
     between_samples: Literal["euler", "held", "linear"] | None = None,
     extent: Literal["open", "period"] | None = None,
-    hits: bool | Mapping[str, Any] = False,
+    hits: bool | str | Mapping[str, Any] = False,
     derivatives: str | None = None,
-    refine: int | None = None,
-    interpolation: Literal["linear", "spline", "band-limited"] | None = None,
+    refine: str | Mapping[str, Any] | None = None,
     nonlinear: str | None = None,
     candidates: str | None = None,
     criterion: Literal["information", "held-out"] | None = None,
     search: Sequence[Literal["laws", "delay", "phase"]] = (),
     weighting: Literal["automatic", "white-force", "response", "smooth-spectrum"] | None = None,
-    validate: Measurement | None = None,
-    validate_start: int | None = None,
-    validate_samples: int | None = None,
+    validate: Measurement | Mapping[str, Any] | None = None,
     settings: dict[str, Any] | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
@@ -156,22 +149,26 @@ def identify(
         Domain of the fit.
     from_frf : {"h1", "h2", "hv"}, optional
         Fit frequency responses, averaged over segments.
-    segment, segment_window, segment_overlap : optional
-        Samples of a segment, its weights, and the part that the next one repeats, in per cent.
+    segment : int or str or dict, optional
+        Samples of a segment; ``"1024:50:hann"`` says also the part that the next one repeats, in per cent,
+        and the window (hann, hamming, blackman, rectangular), as a dict of ``segment``,
+        ``overlap_percent`` and ``window`` does.
     between_samples : {"euler", "held", "linear"}, optional
         Assumption on the force between samples, in the time domain.
     extent : {"open", "period"}, optional
         Extent of the window. Of open records the unknown loads of their ends are fitted with the
         machine; without, the window is a period where `period` is given, and otherwise unless the ends
         show (in the time domain it is open).
-    hits : bool or dict, optional
+    hits : bool or str or dict, optional
         Cut the records of a hammer test into hits, leave bad ones out and fit each of the others as a
-        record of its own; a dict changes the rule: ``trigger_percent``, ``double_percent``,
-        ``weak_percent``, ``bounce_s``, and ``before`` and ``samples`` of a hit in samples.
+        record of its own; ``"trigger=0.5,double=5"`` changes the rule, or a dict of
+        ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and ``before`` and
+        ``samples`` of a hit in samples.
     derivatives : str, optional
         How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
-    refine, interpolation : optional
-        Steps in every sampling interval, and the interpolation between the samples.
+    refine : str or dict, optional
+        Steps in every sampling interval and the interpolation between the samples (linear, spline,
+        band-limited), such as ``"8:band-limited"``.
     nonlinear : str, optional
         Springs and dampers to fit beside mass, damping and stiffness, such as
         ``"k3: x1^3, c2: |v1| v1"``.
@@ -185,10 +182,12 @@ def identify(
         all channels have in common.
     weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
         Weighting of the lines of a fit with nonlinear terms.
-    validate, validate_start, validate_samples : optional
-        Record to predict that is not fitted, its first sample counted from 1 and their number.
+    validate : Measurement or dict, optional
+        Record to predict that is not fitted; a dict of ``record``, ``start`` (first sample, counted from
+        1) and ``samples`` (their number) says which of its samples, without ``record`` those of the
+        first one fitted.
     settings : dict, optional
-        ``settings`` of another result, instead of the options above.
+        ``settings`` of another result, instead of the options above; they are keywords, too.
     threads : int, optional
         Number of threads; as many as there are processors, without.
     **record
@@ -217,22 +216,18 @@ def identify(
     """
     records = measurements(sources, "identify", record)
     if settings is None:
-        band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
-        told = _identify_settings(
-            method, noise, _levels(force_noise), domain, from_frf, segment, segment_window, segment_overlap, between_samples,
-            extent, derivatives, refine, interpolation, lines, band,
-            _without(without_lines, without_hz), tuple(_mass(mass)),
-            tuple(_structure(structure)), _hits(hits), nonlinear, candidates, criterion,
-            tuple(search), weighting,
+        settings = _given(
+            method=method, noise=noise, force_noise=_levels(force_noise), lines=lines, band_hz=band_hz,
+            without_lines=without_lines, without_hz=without_hz, mass=mass, structure=structure,
+            domain=domain, from_frf=from_frf, segment=segment, between_samples=between_samples,
+            extent=extent, hits=hits, derivatives=derivatives, refine=refine, nonlinear=nonlinear,
+            candidates=candidates, criterion=criterion, search=search, weighting=weighting,
         )
-    else:
-        told = json.dumps(settings)
+    told = json.dumps(settings, default=_plain)
     predicted = None
-    if validate is not None or validate_start is not None or validate_samples is not None:
-        if validate is None and validate_start is None:
-            raise TypeError("`validate_samples` of which record? Give `validate`, or `validate_start`")
-        other = records[0] if validate is None else validate
-        window = {"start": validate_start, "samples": validate_samples}
+    if validate is not None:
+        window = dict(validate) if isinstance(validate, Mapping) else {"record": validate}
+        other = window.pop("record", None) or records[0]
         predicted = (other._inner, json.dumps(window))
     inner = _mechid.identify(
         [record._inner for record in records], told, predicted, threads
@@ -435,10 +430,8 @@ def frf(
     band_hz: tuple[float, float] | None = None,
     without_lines: str | None = None,
     without_hz: Sequence[float | Mapping[str, Any]] = (),
-    segment: int | None = None,
-    segment_window: Weight | None = None,
-    segment_overlap: float | None = None,
-    hits: bool | Mapping[str, Any] = False,
+    segment: int | str | Mapping[str, Any] | None = None,
+    hits: bool | str | Mapping[str, Any] = False,
     exponential_percent: float | None = None,
     settings: dict[str, Any] | None = None,
     threads: int | None = None,
@@ -457,8 +450,8 @@ def frf(
         Where the noise is: on the response, on the force, or on both.
     lines, band_hz, without_lines, without_hz : optional
         Spectral lines of a segment, as in `identify`.
-    segment, segment_window, segment_overlap : optional
-        Samples of a segment, its weights, and the part that the next one repeats, in per cent.
+    segment : int or str or dict, optional
+        Samples of a segment, and more, as in `identify`.
     hits : bool or dict, optional
         Average over the good hits of a hammer test, as in `identify`.
     exponential_percent : float, optional
@@ -483,11 +476,11 @@ def frf(
             "estimator": estimator,
             "lines": _lines(lines, band_hz),
             "without": json.loads(_without(without_lines, without_hz)),
-            "segments": _segments(True, segment, segment_window, segment_overlap),
-            "hits": json.loads(_hits(hits) or "null"),
+            "segments": {} if segment is None else segment,
+            "hits": hits,
             "exponential_percent": exponential_percent,
         }
-    return FrequencyResponses(_mechid.frf(records, json.dumps(settings), threads))
+    return FrequencyResponses(_mechid.frf(records, json.dumps(settings, default=_plain), threads))
 
 
 @careful
@@ -555,7 +548,7 @@ def modes(
     near_hz: Sequence[float] = (),
     force_at: Sequence[str | int] = (),
     response_at: Sequence[str | int] = (),
-    hits: bool | Mapping[str, Any] = False,
+    hits: bool | str | Mapping[str, Any] = False,
     ambient: bool = False,
     without_hz: Sequence[float] = (),
     without_harmonics: bool = False,
@@ -612,7 +605,7 @@ def modes(
                 "ambient": {"without_hz": excluded, "without_harmonics": bool(without_harmonics)}
             }
         else:
-            test = {"forced": {"hits": json.loads(_hits(hits) or "null")}}
+            test = {"forced": {"hits": hits}}
         settings = {
             "test": test,
             "band_hz": None if band_hz is None else [float(hz) for hz in band_hz],
@@ -625,7 +618,7 @@ def modes(
             },
             "validate": float(validate),
         }
-    return Modes(_mechid.modes(records, json.dumps(settings), threads))
+    return Modes(_mechid.modes(records, json.dumps(settings, default=_plain), threads))
 
 
 def reconstruct(
@@ -1016,7 +1009,7 @@ def predict(
         matrix("force", force),
         float(fs),
         json.dumps(between_samples),
-        json.dumps({"period": "whole_period"}.get(extent, extent)),
+        json.dumps(extent),
         start,  # type: ignore[arg-type]
     )
     return MappingProxyType(dict(found))
@@ -1078,52 +1071,16 @@ def multisine(
     return Multisine._of(float(fs), found)
 
 
-@lru_cache(maxsize=64, typed=True)
-def _identify_settings(
-    method: str | None,
-    noise: str | None,
-    force_noise: tuple[float, ...] | None,
-    domain: str,
-    from_frf: str | None,
-    segment: int | None,
-    segment_window: str | None,
-    segment_overlap: float | None,
-    between_samples: str | None,
-    extent: str | None,
-    derivatives: str | None,
-    refine: int | None,
-    interpolation: str | None,
-    lines: str | None,
-    band_hz: tuple[float, float] | None,
-    without: str,
-    mass: tuple[float | None, ...],
-    structure: tuple[str, ...],
-    hits: str | None,
-    nonlinear: str | None,
-    candidates: str | None,
-    criterion: str | None,
-    search: tuple[str, ...],
-    weighting: str | None,
-) -> str:
-    """Return the settings of `identify` as JSON; kept, for studies call with the same ones."""
-    fit = _fit(
-        method, noise, force_noise, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
-        between_samples, extent, derivatives, refine, interpolation,
-    )
-    if domain == "time" and (lines is not None or band_hz is not None):
-        raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
-    if domain == "time" and without != _without(None, ()):
-        raise TypeError("`without_lines` and `without_hz` belong to domain='frequency'")
-    settings = {
-        "fit": fit,
-        "lines": _lines(lines, band_hz),
-        "without": json.loads(without),
-        "mass": list(mass),
-        "structure": list(structure),
-        "hits": None if hits is None else json.loads(hits),
-        "nonlinear": _nonlinear(nonlinear, candidates, criterion, search, weighting),
-    }
-    return json.dumps(settings)
+def _given(**keywords: Any) -> dict[str, Any]:
+    """Return the keywords that were given."""
+    return {name: value for name, value in keywords.items() if value is not None and value is not False and value != ()}
+
+
+def _plain(value: Any) -> Any:
+    """Return what NumPy or a mapping holds as JSON has it."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    return np.asarray(value).tolist()
 
 
 def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | None:
@@ -1132,88 +1089,6 @@ def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | 
         return None
     levels = force_noise if isinstance(force_noise, Iterable) else [force_noise]
     return tuple(float(level) for level in levels)
-
-
-def _fit(
-    method: str | None,
-    noise: str | None,
-    force_noise: tuple[float, ...] | None,
-    domain: str,
-    from_frf: str | None,
-    segments: dict[str, Any],
-    between_samples: str | None,
-    extent: str | None,
-    derivatives: str | None,
-    refine: int | None,
-    interpolation: str | None,
-) -> dict[str, Any]:
-    saved_extent = {"period": "whole_period"}.get(extent or "", extent)
-    of_time = {
-        "between_samples": between_samples,
-        "derivatives": derivatives,
-        "refine": refine,
-        "interpolation": interpolation,
-    }
-    if domain == "time":
-        of_frequency = {
-            "method": method, "noise": noise, "force_noise": force_noise, "from_frf": from_frf,
-        }
-        _refuse(of_frequency, "belongs to domain='frequency'")
-        if (refine is None) != (interpolation is None):
-            raise TypeError("`refine` and `interpolation` go together")
-        return {
-            "domain": "samples",
-            "between_samples": between_samples,
-            "extent": saved_extent,
-            "derivatives": _derivatives(derivatives),
-            "refine": None
-            if refine is None
-            else {"factor": refine, "interpolation": interpolation},
-        }
-    if domain != "frequency":
-        raise ValueError(f"`domain` is frequency or time, got {domain!r}")
-    _refuse(of_time, "belongs to domain='time'")
-    if from_frf is not None:
-        of_spectra = {"noise": noise, "force_noise": force_noise, "extent": extent}
-        _refuse(of_spectra, "belongs to fits without `from_frf`")
-        return {
-            "domain": "responses",
-            "estimator": from_frf,
-            "segments": segments,
-            "method": method,
-        }
-    levels = None if force_noise is None else list(force_noise)
-    return {
-        "domain": "spectra",
-        "method": method,
-        "noise": noise or "auto",
-        "extent": saved_extent,
-        "force_noise": levels,
-    }
-
-
-def _refuse(options: dict[str, Any], why: str) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise TypeError(f"`{name}` {why}")
-
-
-def _segments(
-    belongs: object, segment: int | None, window: str | None, overlap: float | None
-) -> dict[str, Any]:
-    if belongs is None:
-        _refuse({"segment": segment}, "belongs to `from_frf`")
-    if segment is None:
-        _refuse({"segment_window": window, "segment_overlap": overlap}, "needs `segment`")
-    kept = {"segment": segment, "window": window, "overlap_percent": overlap}
-    return {name: value for name, value in kept.items() if value is not None}
-
-
-def _hits(hits: bool | Mapping[str, Any]) -> str | None:
-    """Return the rule for hits as JSON, or None if there are none."""
-    if isinstance(hits, Mapping):
-        return json.dumps(dict(hits))
-    return "{}" if hits else None
 
 
 def _without(lines: str | None, hz: Sequence[float | Mapping[str, Any]]) -> str:
@@ -1233,32 +1108,6 @@ def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
     return "driven"
 
 
-def _nonlinear(
-    terms: str | None,
-    candidates: str | None,
-    criterion: str | None,
-    search: Sequence[str],
-    weighting: str | None,
-) -> dict[str, Any] | None:
-    if candidates is None:
-        _refuse({"criterion": criterion}, "belongs to `candidates`")
-    if terms is None and candidates is None:
-        _refuse({"search": search or None, "weighting": weighting}, "belongs to `nonlinear`")
-        return None
-    constants = ("laws", "delay", "phase")
-    for name in search:
-        if name not in constants:
-            raise ValueError(f"`search` names {', '.join(constants)}, got {name!r}")
-    tried = {} if candidates is None else {"candidates": candidates}
-    return {
-        "terms": terms or "",
-        **tried,
-        "criterion": criterion or "information",
-        "search": {name: name in search for name in constants},
-        "weighting": weighting or "automatic",
-    }
-
-
 def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:
     if mass is None:
         return []
@@ -1270,15 +1119,6 @@ def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:
 def _structure(structure: str | Sequence[str]) -> list[str]:
     forms = [structure] if isinstance(structure, str) else structure
     return [word for form in forms for word in str(form).split()]
-
-
-def _derivatives(text: str | None) -> Any:
-    if text is None or not text.startswith("savitzky-golay:"):
-        return text
-    _, window, order = (text + "::").split(":")[:3]
-    if not (window.isdecimal() and order.isdecimal()):
-        raise ValueError(f"`derivatives` is spectral or savitzky-golay:WINDOW:ORDER, got {text!r}")
-    return {"savitzky-golay": {"window": int(window), "order": int(order)}}
 
 
 def _vector(name: str, values: ArrayLike) -> list[float]:

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 
 use crate::clipping::clipping;
 use crate::error::{SignalError, not_negative, positive};
@@ -61,6 +62,38 @@ impl Default for HitRule {
             before: None,
             samples: None,
         }
+    }
+}
+
+impl FromStr for HitRule {
+    type Err = String;
+
+    /// Reads `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, any of them: per cent, seconds and
+    /// samples. An empty text is the usual rule.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut rule = Self::default();
+        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            let wrong = || {
+                format!(
+                    "\"{part}\" is none of trigger=PERCENT, double=PERCENT, weak=PERCENT, bounce=SECONDS, \
+                     before=SAMPLES and samples=SAMPLES"
+                )
+            };
+            let (name, value) = part.split_once('=').ok_or_else(wrong)?;
+            let number = || value.parse::<f64>().map_err(|_| wrong());
+            let count = || value.parse::<usize>().map_err(|_| wrong());
+            match name {
+                "trigger" => rule.trigger_percent = number()?,
+                "double" => rule.double_percent = number()?,
+                "weak" => rule.weak_percent = number()?,
+                "bounce" => rule.bounce_s = number()?,
+                "before" => rule.before = Some(count()?),
+                "samples" => rule.samples = Some(count()?),
+                _ => return Err(wrong()),
+            }
+        }
+        rule.check().map_err(|error| error.to_string())?;
+        Ok(rule)
     }
 }
 
