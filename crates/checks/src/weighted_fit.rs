@@ -123,101 +123,159 @@ impl Linearised {
     }
 }
 
-impl WeightedFit {
-    fn of(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
-        let noise: Option<Vec<&NoiseSpectrum>> =
-            records.iter().map(FrequencyData::noise_above_rounding).collect();
+/// Records of a fit with what weighs their residuals.
+struct Weighing<'a> {
+    records: &'a [FrequencyData],
+    estimate: &'a Estimate,
+    relations: Option<Relations>,
+    /// Noise that every record states; `None` if one of them does not.
+    noise: Option<Vec<&'a NoiseSpectrum>>,
+    /// Levels of white noise, where none is stated.
+    levels: Vec<f64>,
+    /// Few enough sensitivities to be found.
+    small: bool,
+    extent: Extent,
+}
+
+impl<'a> Weighing<'a> {
+    fn new(records: &'a [FrequencyData], estimate: &'a Estimate, extent: Extent) -> Option<Self> {
+        let noise = records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
         let relations = Relations::of(estimate.unknowns());
-        let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
-        let start = match &relations {
-            None => DVector::from_column_slice(&entries),
-            Some(relations) => relations.unknowns(&entries),
-        };
-        let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
-        let sensitivities = rows * start.len();
-        let small =
-            sensitivities <= MAX_SENSITIVITIES && sensitivities * start.len() <= FIT_PRODUCTS;
-        let entries_of = |values: &DVector<f64>| match &relations {
+        let mut weighing =
+            Self { records, estimate, relations, noise, levels, small: false, extent };
+        let unknowns = weighing.start().len();
+        let sensitivities = weighing.rows() * unknowns;
+        weighing.small =
+            sensitivities <= MAX_SENSITIVITIES && sensitivities * unknowns <= FIT_PRODUCTS;
+        Some(weighing)
+    }
+
+    fn rows(&self) -> usize {
+        self.records.iter().map(|data| 2 * data.dof() * data.len()).sum()
+    }
+
+    /// Returns the estimated entries of M, C and K.
+    fn entries(&self) -> Vec<f64> {
+        self.estimate.parameters().map(|p| p.value).collect()
+    }
+
+    /// Returns the parameters that the estimate has.
+    fn start(&self) -> DVector<f64> {
+        match &self.relations {
+            None => DVector::from_vec(self.entries()),
+            Some(relations) => relations.unknowns(&self.entries()),
+        }
+    }
+
+    fn entries_of(&self, values: &DVector<f64>) -> DVector<f64> {
+        match &self.relations {
             None => values.clone(),
             Some(relations) => relations.entries(values.as_slice()),
-        };
-        let covariance = |at: usize, row: usize| match &noise {
+        }
+    }
+
+    fn covariance(&self, at: usize, row: usize) -> DMatrix<Complex<f64>> {
+        match &self.noise {
             Some(noise) => noise[at].covariance(row).clone(),
-            None => white_covariance(&records[at], row, &levels),
-        };
-        let linearised = |values: &DVector<f64>| -> Option<Linearised> {
-            let (entries, unknowns) = (&entries_of(values), estimate.unknowns());
-            let one = |(at, data): (usize, &FrequencyData)| {
-                let covariance = |row: usize| covariance(at, row);
-                match small {
-                    true => Whitened::of(data, unknowns, entries, covariance),
-                    false => Whitened::residual_of(data, unknowns, entries, covariance),
-                }
-            };
-            let weighted = records.iter().enumerate().map(one).collect::<Option<_>>()?;
-            match small {
-                true => Linearised::of(weighted),
-                false => Some(Linearised::without_sensitivity(weighted, values.len())),
+            None => white_covariance(&self.records[at], row, &self.levels),
+        }
+    }
+
+    fn linearised(&self, values: &DVector<f64>) -> Option<Linearised> {
+        let (entries, unknowns) = (&self.entries_of(values), self.estimate.unknowns());
+        let one = |(at, data): (usize, &FrequencyData)| {
+            let covariance = |row: usize| self.covariance(at, row);
+            match self.small {
+                true => Whitened::of(data, unknowns, entries, covariance),
+                false => Whitened::residual_of(data, unknowns, entries, covariance),
             }
         };
-        let mut values = start;
-        let mut linear = linearised(&values)?;
+        let weighted = self.records.iter().enumerate().map(one).collect::<Option<_>>()?;
+        match self.small {
+            true => Linearised::of(weighted),
+            false => Some(Linearised::without_sensitivity(weighted, values.len())),
+        }
+    }
+
+    /// Returns the parameters after some Gauss–Newton steps, and the residuals there.
+    fn settled(&self) -> Option<(DVector<f64>, Linearised)> {
+        let mut values = self.start();
+        let mut linear = self.linearised(&values)?;
         for _ in 0..FIT_STEPS {
-            let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
+            let unit = (linear.power() / self.rows() as f64).max(f64::MIN_POSITIVE);
             if linear.coefficients.norm_squared() <= FIT_SETTLED * unit {
                 break;
             }
             // Half a step where a whole one goes too far.
             let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
                 let values = &values + linear.step() * *length;
-                let next = linearised(&values)?;
+                let next = self.linearised(&values)?;
                 (next.power() < linear.power()).then_some((values, next))
             });
             let Some(next) = next else { break };
             (values, linear) = next;
         }
-        let end = &values + linear.step();
-        let jumps = |at: usize| -> Vec<DVector<f64>> {
-            let seen = |data: FrequencyData| {
-                let covariance = |row| covariance(at, row);
-                let entries = entries_of(&values);
-                Whitened::residual_of(&data, estimate.unknowns(), &entries, covariance)
-            };
-            let (record, channels) = (&records[at], 0..records[at].dof());
-            let jumps: Vec<FrequencyData> = match extent {
-                Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
-                Extent::WholePeriod if has_unmeasured_force(record) => {
-                    let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
-                    channels
-                        .flat_map(loads)
-                        .map(|(dof, power)| record.of_load(dof, power))
-                        .collect()
-                }
-                Extent::WholePeriod => Vec::new(),
-            };
-            jumps.into_iter().filter_map(seen).map(|jump| jump.residual).collect()
+        Some((values, linear))
+    }
+
+    /// Returns what the ends of a record leave in its residual: jumps of an open record, loads of periods whose noise
+    /// is the response to an unmeasured force.
+    fn jumps(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
+        let entries = self.entries_of(values);
+        let seen = |data: FrequencyData| {
+            let covariance = |row| self.covariance(at, row);
+            Whitened::residual_of(&data, self.estimate.unknowns(), &entries, covariance)
         };
-        let step = entries_of(&end) - DVector::from_vec(entries);
-        let [m, c, k] = estimate.unknowns().assemble(entries_of(&values).as_slice());
+        let (record, channels) = (&self.records[at], 0..self.records[at].dof());
+        let jumps: Vec<FrequencyData> = match self.extent {
+            Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
+            Extent::WholePeriod if has_unmeasured_force(record) => {
+                let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
+                channels.flat_map(loads).map(|(dof, power)| record.of_load(dof, power)).collect()
+            }
+            Extent::WholePeriod => Vec::new(),
+        };
+        jumps.into_iter().filter_map(seen).map(|jump| jump.residual).collect()
+    }
+
+    /// Returns the residual of a record, of which the parameters explain some columns.
+    fn residual(
+        &self,
+        at: usize,
+        system: Option<&SecondOrderSystem>,
+        jumps: &[DVector<f64>],
+        (values, explained): (DVector<f64>, DMatrix<f64>),
+    ) -> SpectralResidual {
+        let (data, is_stated) = (&self.records[at], self.noise.is_some());
+        let is_noise = self.extent == Extent::WholePeriod && has_unmeasured_force(data);
+        let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
+        let (values, explained) = without(jumps, values, explained);
+        let of_force = if is_stated { None } else { force_decides(data, self.estimate) };
+        let likely =
+            system.and_then(|system| likely_force(data, system, |row| self.covariance(at, row)));
+        SpectralResidual::new(data.clone(), is_stated, values, explained)
+            .with_ends(with_ends)
+            .of_rounding(is_rounding(data, &self.levels))
+            .with_force_decides(of_force)
+            .with_likely_force(likely)
+    }
+}
+
+impl WeightedFit {
+    fn of(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
+        let weighing = Weighing::new(records, estimate, extent)?;
+        let (values, linear) = weighing.settled()?;
+        let end = &values + linear.step();
+        let step = weighing.entries_of(&end) - DVector::from_vec(weighing.entries());
+        let [m, c, k] = estimate.unknowns().assemble(weighing.entries_of(&values).as_slice());
         let system = SecondOrderSystem::new(m, c, k).ok();
         let Linearised { weighted, explained, coefficients, .. } = linear;
-        let residuals = records.iter().enumerate().zip(weighted).zip(explained);
-        let residuals = residuals.map(|(((at, data), weighted), explained)| {
-            let values = weighted.residual - &explained * &coefficients;
-            let is_noise = extent == Extent::WholePeriod && has_unmeasured_force(data);
-            let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
-            let (values, explained) = without(&jumps(at), values, explained);
-            let of_force = if noise.is_none() { force_decides(data, estimate) } else { None };
-            SpectralResidual::new(data.clone(), noise.is_some(), values, explained)
-                .with_ends(with_ends)
-                .of_rounding(is_rounding(data, &levels))
-                .with_force_decides(of_force)
-                .with_likely_force(
-                    system
-                        .as_ref()
-                        .and_then(|system| likely_force(data, system, |row| covariance(at, row))),
-                )
+        let residuals = weighted.into_iter().zip(explained).enumerate();
+        let residuals = residuals.map(|(at, (weighted, explained))| {
+            let left = weighted.residual - &explained * &coefficients;
+            let jumps = weighing.jumps(at, &values);
+            weighing.residual(at, system.as_ref(), &jumps, (left, explained))
         });
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
@@ -225,7 +283,8 @@ impl WeightedFit {
             let lines = concentration(&parts);
             records.iter_mut().for_each(|record| record.hold_misfit(lines.clone()));
         }
-        Some(Self { records, noise_stated: noise.is_some(), step: small.then_some(step) })
+        let noise_stated = weighing.noise.is_some();
+        Some(Self { records, noise_stated, step: weighing.small.then_some(step) })
     }
 
     fn bias(&self, estimate: &Estimate) -> Option<Finding> {

@@ -115,7 +115,7 @@ pub(super) fn of_hits(
     if left > DIED_OUT {
         remarks.push(format!(
             "at the end of a window the response is still {} % of its largest: leakage makes resonances \
-             blunt; fit the hits with `mechid identify --hits`, which takes the ends into account, or give \
+             blunt; fit the hits with `hits` of an identification, which takes the ends into account, or give \
              `exponential_percent`",
             significant(100.0 * left, 2)
         ));
@@ -123,7 +123,7 @@ pub(super) fn of_hits(
     if before > DIED_OUT {
         remarks.push(format!(
             "before a hit the response is still {} % of its largest, and no window mends that: wait longer \
-             between hits, or fit them with `mechid identify --hits`",
+             between hits, or fit them with `hits` of an identification",
             significant(100.0 * before, 2)
         ));
     }

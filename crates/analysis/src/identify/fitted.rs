@@ -12,6 +12,7 @@ use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 
 use super::coherence::ResponseCoherence;
 use super::force_noise::ForceNoise;
+use super::keywords::Domain;
 use super::prediction::{Model, Prediction};
 use super::selection::SelectionSummary;
 use super::sinusoids::SinusoidRow;
@@ -21,8 +22,8 @@ use crate::machine::NonlinearPart;
 /// An estimate and how it came about.
 #[derive(Debug)]
 pub struct Fitted {
-    /// Domain of the fit: frequency or time.
-    pub domain: &'static str,
+    /// Domain of the fit.
+    pub domain: Domain,
     /// Name of the estimator.
     pub estimator: &'static str,
     /// The checks after the fit see the bias of least squares, which another method does not have.
@@ -127,6 +128,38 @@ impl SampleResidual {
 }
 
 impl Fitted {
+    /// Creates what every fit has; what some have in addition is empty.
+    pub(super) fn new(
+        domain: Domain,
+        estimator: &'static str,
+        prediction: Prediction,
+        estimate: Estimate,
+    ) -> Self {
+        Self {
+            domain,
+            estimator,
+            least_squares: false,
+            estimate,
+            nonlinear: None,
+            equations: 0,
+            frequency: None,
+            scattered: None,
+            coherence: None,
+            before_all: Vec::new(),
+            before: Vec::new(),
+            after: Vec::new(),
+            after_all: Vec::new(),
+            residuals: Vec::new(),
+            prediction,
+            misfit: None,
+            noise: Vec::new(),
+            force_noise: Vec::new(),
+            sinusoids: Vec::new(),
+            drawn: None,
+            remarks: Vec::new(),
+        }
+    }
+
     /// Returns the system that was fitted, which has the responses to the forces that acted.
     ///
     /// # Errors

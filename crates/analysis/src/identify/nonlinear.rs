@@ -13,6 +13,7 @@ use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
+use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
 use super::lines::LineChoice;
 use super::options::{Nonlinear, TermEstimator, TermFit};
@@ -179,33 +180,22 @@ fn fitted(
         );
     }
     let restoring = estimated.restoring_forces(&data)?.swap_remove(0);
+    let linear = estimated.linear().clone();
     Ok(Fitted {
-        domain: "frequency",
-        estimator,
-        least_squares: false,
         equations: estimated.equations() / dofs,
         frequency: spectra.map(|data| (band, data)),
-        scattered: None,
-        coherence: None,
         before_all,
         before,
         after: vec![Vec::new(); records.len()],
-        after_all: Vec::new(),
         residuals: steady_residuals(records, &model)?,
-        prediction: Prediction::Steady,
-        misfit: None,
-        noise: Vec::new(),
-        force_noise: Vec::new(),
-        sinusoids: Vec::new(),
-        drawn: None,
         remarks,
-        estimate: estimated.linear().clone(),
         nonlinear: Some(WithTerms {
             estimate: estimated,
             distortion: seen,
             restoring,
             selection: selection.map(|selection| SelectionSummary::of(selection, how)),
         }),
+        ..Fitted::new(Domain::Frequency, estimator, Prediction::Steady, linear)
     })
 }
 

@@ -4,14 +4,15 @@ use mechid_checks::{
     AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
     delay_of_open_records, fitted_band, linearity_of_open_record,
 };
-use mechid_estimate::frequency_domain::{EndLoads, output_error_pooling};
-use mechid_estimate::{EstimateError, Unknowns};
+use mechid_estimate::frequency_domain::{EndLoads, OutputErrorFit, output_error_pooling};
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines};
 
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
+use super::keywords::Domain;
 use super::left_out::LineRule;
 use super::lines::LineChoice;
 use super::options::OpenNoise;
@@ -64,6 +65,51 @@ pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
     whole && is_short && parameters <= PARAMETERS
 }
 
+/// Spectra of open records, with the noise of their forces.
+struct OpenSpectra {
+    data: Vec<FrequencyData>,
+    lines: Vec<Lines>,
+    force_noise: Vec<ForceNoise>,
+}
+
+impl OpenSpectra {
+    fn read(
+        records: &[Windowed],
+        rule: LineRule<'_>,
+        force: Option<&[f64]>,
+        excitation: Excitation<'_>,
+    ) -> Result<Self, AnalysisError> {
+        let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
+        for (at, Windowed { held, .. }) in records.iter().enumerate() {
+            let lines = Lines::new(held.force.sampling(), band(held, rule)?)?;
+            let (motion, kind) = held.response();
+            let hit = match excitation {
+                Excitation::Lasting => None,
+                Excitation::Hits(noise) => noise.get(at),
+            };
+            let force_noise = ForceNoise::of(held, force, hit)?;
+            let data = FrequencyData::read(&lines, &held.force, motion, kind)?
+                .of_open_record(held.force.sampling());
+            let data = force_noise.known_to(data, held)?;
+            of_force.push(force_noise);
+            spectra.push((data, lines));
+        }
+        let (data, lines) = spectra.into_iter().unzip();
+        Ok(Self { data, lines, force_noise: of_force })
+    }
+
+    /// Takes off the sinusoids that were found.
+    fn without_sinusoids(&mut self, fit: &OutputErrorFit) {
+        if fit.sinusoids.is_empty() {
+            return;
+        }
+        let each = self.data.iter().zip(&fit.sinusoids);
+        self.data = each
+            .map(|(data, sinusoids)| data.without_sinusoids(std::slice::from_ref(sinusoids)))
+            .collect();
+    }
+}
+
 /// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
 /// record, beside the noise that `noise` says; `excitation` says what the forces are like.
 pub(super) fn fit(
@@ -73,50 +119,16 @@ pub(super) fn fit(
     noise: &OpenNoise,
     excitation: Excitation<'_>,
 ) -> Result<OpenFit, AnalysisError> {
-    let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
-    for (at, Windowed { held, .. }) in records.iter().enumerate() {
-        let lines = Lines::new(held.force.sampling(), band(held, rule)?)?;
-        let (motion, kind) = held.response();
-        let hit = match excitation {
-            Excitation::Lasting => None,
-            Excitation::Hits(noise) => noise.get(at),
-        };
-        let force_noise = ForceNoise::of(held, noise.force.as_deref(), hit)?;
-        let data = FrequencyData::read(&lines, &held.force, motion, kind)?
-            .of_open_record(held.force.sampling());
-        let data = force_noise.known_to(data, held)?;
-        of_force.push(force_noise);
-        spectra.push((data, lines));
-    }
-    let (data, lines): (Vec<FrequencyData>, Vec<Lines>) = spectra.into_iter().unzip();
-    let all = joined(&data)?;
-    let fit = output_error_pooling(&all, unknowns, noise.response)?;
-    let data: Vec<FrequencyData> = match fit.sinusoids.is_empty() {
-        true => data,
-        false => data
-            .iter()
-            .zip(&fit.sinusoids)
-            .map(|(data, sinusoids)| data.without_sinusoids(std::slice::from_ref(sinusoids)))
-            .collect(),
-    };
+    let mut spectra = OpenSpectra::read(records, rule, noise.force.as_deref(), excitation)?;
+    let fit = output_error_pooling(&joined(&spectra.data)?, unknowns, noise.response)?;
+    spectra.without_sinusoids(&fit);
+    let OpenSpectra { data, lines, force_noise } = spectra;
     let (closed, alone) = match &fit.ends {
         Some(ends) => {
             (ends.taken_off(&data)?, ends.taken_off_responses(&data, &fit.estimate.system()?)?)
         }
         None => (data.clone(), data.clone()),
     };
-    let mut after = Vec::new();
-    for ((Windowed { held, .. }, lines), closed) in records.iter().zip(&lines).zip(&closed) {
-        let mut checks = Vec::from_iter(fitted_band(&fit.estimate, lines)?);
-        if matches!(excitation, Excitation::Lasting) {
-            match linearity_of_open_record(&fit.estimate, &held.force, closed, lines) {
-                // A free machine has no displacement to take powers of.
-                Err(EstimateError::Model(_)) => {}
-                looked => checks.push(looked?),
-            }
-        }
-        after.push(checks);
-    }
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let explains = |finding: &Finding| {
@@ -125,48 +137,81 @@ pub(super) fn fit(
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
     let dt = records[0].held.force.sampling().dt();
     let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
-    let windows = match excitation {
-        Excitation::Lasting => "the windows are no periods",
-        Excitation::Hits(_) => "hits are no periods",
-    };
-    let remark = format!(
-        "{windows}: the loads of their ends were fitted with the machine, on all lines of the band"
-    );
-    let of_motion = one_motion_of(&records[0].held).into_iter();
-    let known: Vec<(&Block, &ForceNoise)> =
-        records.iter().map(|record| &record.held).zip(&of_force).collect();
-    let remarks = [remark, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)];
     let each = records.iter().zip(&fit.sinusoids).enumerate();
     let sinusoids: Vec<SinusoidRow> =
         each.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect();
     let all = joined(&closed)?;
+    let prediction = Prediction::Sampled {
+        discretisation: Discretisation::FirstOrderHold,
+        extent: Extent::Open,
+    };
     let fitted = Fitted {
-        domain: "frequency",
-        estimator: "maximum likelihood on open records, in the frequency domain",
-        least_squares: false,
         equations: 2 * all.len(),
-        scattered: None,
-        coherence: None,
         before_all: before_spectral_fit(&all, unknowns)?,
-        frequency: lines.into_iter().next().map(|lines| (lines, all)),
         before: vec![Vec::new(); records.len()],
-        after,
+        after: after(records, &lines, &closed, &fit.estimate, excitation)?,
+        frequency: lines.into_iter().next().map(|lines| (lines, all)),
         after_all: bias.into_iter().chain(late).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
-        prediction: Prediction::Sampled {
-            discretisation: Discretisation::FirstOrderHold,
-            extent: Extent::Open,
-        },
-        misfit: None,
-        remarks: of_motion.chain(remarks).chain(SinusoidRow::remark(&sinusoids)).collect(),
+        remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
-        force_noise: of_force,
+        force_noise,
         sinusoids,
         drawn: Some(joined(&alone)?),
-        nonlinear: None,
-        estimate: fit.estimate,
+        ..Fitted::new(
+            Domain::Frequency,
+            "maximum likelihood on open records, in the frequency domain",
+            prediction,
+            fit.estimate,
+        )
     };
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
+}
+
+/// Returns the findings on the band and the linearity of each record.
+fn after(
+    records: &[Windowed],
+    lines: &[Lines],
+    closed: &[FrequencyData],
+    estimate: &Estimate,
+    excitation: Excitation<'_>,
+) -> Result<Vec<Vec<Finding>>, AnalysisError> {
+    let mut after = Vec::new();
+    for ((Windowed { held, .. }, lines), closed) in records.iter().zip(lines).zip(closed) {
+        let mut checks = Vec::from_iter(fitted_band(estimate, lines)?);
+        if matches!(excitation, Excitation::Lasting) {
+            match linearity_of_open_record(estimate, &held.force, closed, lines) {
+                // A free machine has no displacement to take powers of.
+                Err(EstimateError::Model(_)) => {}
+                looked => checks.push(looked?),
+            }
+        }
+        after.push(checks);
+    }
+    Ok(after)
+}
+
+fn remarks(
+    records: &[Windowed],
+    fit: &OutputErrorFit,
+    force_noise: &[ForceNoise],
+    sinusoids: &[SinusoidRow],
+    excitation: Excitation<'_>,
+) -> Vec<String> {
+    let windows = match excitation {
+        Excitation::Lasting => "the windows are no periods",
+        Excitation::Hits(_) => "hits are no periods",
+    };
+    let of_ends = format!(
+        "{windows}: the loads of their ends were fitted with the machine, on all lines of the band"
+    );
+    let known: Vec<(&Block, &ForceNoise)> =
+        records.iter().map(|record| &record.held).zip(force_noise).collect();
+    one_motion_of(&records[0].held)
+        .into_iter()
+        .chain([of_ends, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)])
+        .chain(SinusoidRow::remark(sinusoids))
+        .collect()
 }
 
 fn show(ends: &EndLoads) -> bool {

@@ -14,6 +14,7 @@ use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
 use super::fitted::{Fitted, Misfit};
+use super::keywords::Domain;
 use super::options::{Method, SegmentFit};
 use super::prediction::Prediction;
 use super::remarks::one_motion_of;
@@ -70,7 +71,34 @@ pub fn fit(
         before.push(checks);
         after.push(looked);
     }
-    let of_channels = records.iter().zip(&responses).flat_map(|(recorded, r)| {
+    let of_motion = one_motion_of(&records[0].held).into_iter();
+    let remarks = of_motion.chain(of_averages(records, &responses)).chain(remark);
+    let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
+    let prediction = match periodic {
+        true => Prediction::Steady,
+        false => Prediction::Sampled {
+            discretisation: Discretisation::FirstOrderHold,
+            extent: Extent::Open,
+        },
+    };
+    Ok(Fitted {
+        least_squares: *method == Some(Method::LeastSquares),
+        equations: 2 * data.len(),
+        coherence: coherent,
+        before_all: before_spectral_fit(&data, unknowns)?,
+        frequency: responses.into_iter().next().map(|r| (r.lines, data)),
+        before,
+        after,
+        misfit,
+        drawn: Some(measured),
+        remarks,
+        ..Fitted::new(Domain::Frequency, name, prediction, estimate)
+    })
+}
+
+/// Returns remarks on the averages of several records, and on their channels.
+fn of_averages(records: &[Windowed], responses: &[Responses]) -> Vec<String> {
+    let of_channels = records.iter().zip(responses).flat_map(|(recorded, r)| {
         let file = (records.len() > 1).then_some(recorded.held.file.as_str());
         r.of_channels(file)
     });
@@ -81,38 +109,7 @@ pub fn fit(
         segments_of.join(", ")
     );
     let of_segments = (records.len() > 1).then_some(of_segments);
-    let of_motion = one_motion_of(&records[0].held).into_iter();
-    let remarks = of_motion.chain(of_segments).chain(of_channels).chain(remark);
-    let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
-    Ok(Fitted {
-        domain: "frequency",
-        estimator: name,
-        least_squares: *method == Some(Method::LeastSquares),
-        equations: 2 * data.len(),
-        scattered: None,
-        coherence: coherent,
-        before_all: before_spectral_fit(&data, unknowns)?,
-        frequency: responses.into_iter().next().map(|r| (r.lines, data)),
-        before,
-        after,
-        after_all: Vec::new(),
-        residuals: Vec::new(),
-        prediction: match periodic {
-            true => Prediction::Steady,
-            false => Prediction::Sampled {
-                discretisation: Discretisation::FirstOrderHold,
-                extent: Extent::Open,
-            },
-        },
-        misfit,
-        noise: Vec::new(),
-        force_noise: Vec::new(),
-        sinusoids: Vec::new(),
-        drawn: Some(measured),
-        remarks,
-        estimate,
-        nonlinear: None,
-    })
+    of_segments.into_iter().chain(of_channels).collect()
 }
 
 /// The responses of all records, one after the other.

@@ -13,6 +13,7 @@ use mechid_signal::{Extent, Interpolation, Record, message};
 use super::CONSPICUOUS;
 use super::derivatives::Prepared;
 use super::fitted::{Fitted, Residual, SampleResidual};
+use super::keywords::Domain;
 use super::options::{Between, Derivatives, SampleFit};
 use super::prediction::Prediction;
 use crate::AnalysisError;
@@ -160,27 +161,18 @@ impl SampleFit {
         let look = |p: &Prepared| self.at_samples_after(p, &estimate);
         let after = prepared.iter().map(look).collect::<Result<_, _>>()?;
         Ok(Fitted {
-            domain: "time",
-            estimator: "least squares on the equation of motion, sample by sample",
-            least_squares: false,
             equations: rows.rows(),
-            frequency: None,
-            scattered: None,
-            coherence: None,
             before_all,
             before,
             after,
-            after_all: Vec::new(),
             residuals: residuals.collect::<Result<_, _>>()?,
-            prediction: self.prediction(Discretisation::FirstOrderHold),
-            misfit: None,
-            noise: Vec::new(),
-            force_noise: Vec::new(),
-            sinusoids: Vec::new(),
-            drawn: None,
-            nonlinear: None,
             remarks: self.remarks(prepared, &estimate),
-            estimate,
+            ..Fitted::new(
+                Domain::Time,
+                "least squares on the equation of motion, sample by sample",
+                self.prediction(Discretisation::FirstOrderHold),
+                estimate,
+            )
         })
     }
 
@@ -246,27 +238,18 @@ impl SampleFit {
             Vec::from_iter(delay_between_samples(method, x, v, force, unknowns))
         };
         Ok(Fitted {
-            domain: "time",
-            estimator: estimator(discretisation),
-            least_squares: false,
             equations: rows.rows(),
-            frequency: None,
-            scattered: None,
-            coherence: None,
             before_all,
             before,
             after: prepared.iter().map(late).collect(),
-            after_all: Vec::new(),
             residuals,
-            prediction: self.prediction(discretisation),
-            misfit: None,
-            noise: Vec::new(),
-            force_noise: Vec::new(),
-            sinusoids: Vec::new(),
-            drawn: None,
-            nonlinear: None,
             remarks: self.remarks(prepared, &estimate),
-            estimate,
+            ..Fitted::new(
+                Domain::Time,
+                estimator(discretisation),
+                self.prediction(discretisation),
+                estimate,
+            )
         })
     }
 

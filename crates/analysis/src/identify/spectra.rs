@@ -13,6 +13,7 @@ use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, SpectraError};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
+use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
 use super::open_records::joined;
 use super::options::PeriodEstimator;
@@ -62,6 +63,90 @@ pub(super) fn fit(
     estimator: Option<PeriodEstimator>,
 ) -> Result<Fitted, AnalysisError> {
     let noise = pooling_of(estimator);
+    let mut spectra = read(records, lines, noise)?;
+    let data = together(&spectra, &RepeatedPeriods::mean)?;
+    let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
+        found(&spectra, &data, unknowns, estimator)?;
+    // Says what the data leave open, before anything is made of it.
+    estimate.system()?;
+    let Looked { before, after, weighted, repeats } =
+        Looked::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
+    misfit = misfit.filter(|_| repeats);
+    let AfterSpectralFit { records: residuals, bias } =
+        after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
+    let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
+    let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
+    let is_left = residuals.iter().any(|left| left.findings().iter().any(is_told));
+    let nonlinear = match is_left && unknowns.free().len() <= TERM_PARAMETERS {
+        true => nonlinear_term(records, unknowns, lines)?,
+        false => None,
+    };
+    Ok(Fitted {
+        equations: 2 * data.len(),
+        scattered: scattered.transpose()?,
+        before_all: before_spectral_fit(&data, unknowns)?,
+        frequency: Some((spectra.swap_remove(0).1, data)),
+        before,
+        after,
+        after_all: bias.into_iter().chain(nonlinear).collect(),
+        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
+        misfit,
+        noise: models,
+        remarks: one_motion_of(&records[0].held)
+            .into_iter()
+            .chain(remark)
+            .chain(idle_forces(&records[0].held, &weighted))
+            .collect(),
+        ..Fitted::new(Domain::Frequency, estimator, Prediction::Steady, estimate)
+    })
+}
+
+/// Findings on the periods of each record.
+struct Looked {
+    before: Vec<Vec<Finding>>,
+    after: Vec<Vec<Finding>>,
+    /// Means of the periods, with the noise that they show.
+    weighted: Vec<FrequencyData>,
+    /// `true` if all windows are periods.
+    repeats: bool,
+}
+
+impl Looked {
+    fn at(
+        records: &[Windowed],
+        spectra: &[Spectra],
+        unknowns: &Unknowns,
+        estimate: &Estimate,
+        noise: Pooling,
+        noise_through: Option<&SecondOrderSystem>,
+    ) -> Result<Self, AnalysisError> {
+        let (before, after, weighted) = (Vec::new(), Vec::new(), Vec::new());
+        let mut looked = Self { before, after, weighted, repeats: true };
+        for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(spectra) {
+            let checks = steady_periods(&held.force, held.response().0, held.period)?;
+            // What differs between windows that are no periods is no noise.
+            let repeats = !checks.iter().any(no_period);
+            let data = match repeats {
+                true => with_noise(periods, noise, noise_through)?,
+                false => periods.mean()?,
+            };
+            looked.repeats &= repeats;
+            looked.before.push(checks);
+            let band = fitted_band(estimate, lines)?;
+            let late = delay_of_lines(&data, lines.sampling().dt(), unknowns);
+            looked.after.push(band.into_iter().chain(late).collect());
+            looked.weighted.push(data);
+        }
+        Ok(looked)
+    }
+}
+
+/// Returns the periods of each record, on the lines found in its force.
+fn read(
+    records: &[Windowed],
+    lines: LineRule<'_>,
+    noise: Pooling,
+) -> Result<Vec<Spectra>, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
         let held = &recorded.held;
@@ -74,64 +159,7 @@ pub(super) fn fit(
                    another noise";
         return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
     }
-    let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
-        found(&spectra, &data, unknowns, estimator)?;
-    // Says what the data leave open, before anything is made of it.
-    estimate.system()?;
-    let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
-    for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
-        let motion = held.response().0;
-        let checks = steady_periods(&held.force, motion, held.period)?;
-        // What differs between windows that are no periods is no noise.
-        let repeats = !checks.iter().any(no_period);
-        let data = match repeats {
-            true => with_noise(periods, noise, noise_through.as_ref())?,
-            false => periods.mean()?,
-        };
-        misfit = misfit.filter(|_| repeats);
-        before.push(checks);
-        let band = fitted_band(&estimate, lines)?;
-        let late = delay_of_lines(&data, lines.sampling().dt(), unknowns);
-        after.push(band.into_iter().chain(late).collect());
-        weighted.push(data);
-    }
-    let AfterSpectralFit { records: residuals, bias } =
-        after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
-    let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
-    let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
-    let is_left = residuals.iter().any(|left| left.findings().iter().any(is_told));
-    let nonlinear = match is_left && unknowns.free().len() <= TERM_PARAMETERS {
-        true => nonlinear_term(records, unknowns, lines)?,
-        false => None,
-    };
-    Ok(Fitted {
-        domain: "frequency",
-        estimator,
-        least_squares: false,
-        equations: 2 * data.len(),
-        scattered: scattered.transpose()?,
-        coherence: None,
-        before_all: before_spectral_fit(&data, unknowns)?,
-        frequency: Some((spectra.swap_remove(0).1, data)),
-        before,
-        after,
-        after_all: bias.into_iter().chain(nonlinear).collect(),
-        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
-        prediction: Prediction::Steady,
-        misfit,
-        noise: models,
-        force_noise: Vec::new(),
-        sinusoids: Vec::new(),
-        drawn: None,
-        nonlinear: None,
-        remarks: one_motion_of(&records[0].held)
-            .into_iter()
-            .chain(remark)
-            .chain(idle_forces(&records[0].held, &weighted))
-            .collect(),
-        estimate,
-    })
+    Ok(spectra)
 }
 
 /// Returns the remark on the forces that show nothing but noise in any record, if there are any.
@@ -219,45 +247,8 @@ fn found(
     estimator: Option<PeriodEstimator>,
 ) -> Result<Found, AnalysisError> {
     let noise = pooling_of(estimator);
-    let with_noise = |periods: &RepeatedPeriods| with_noise(periods, noise, None);
-    let least_squares = |remark| -> Result<Found, AnalysisError> {
-        let estimator = "least squares on the equation of motion, in the frequency domain";
-        let estimate = equation_error(data, unknowns)?;
-        let none = Vec::new();
-        Ok(Found { estimator, estimate, misfit: None, noise: none, noise_through: None, remark })
-    };
-    let likelihood = |noisy: &FrequencyData| -> Result<Found, EstimateError> {
-        let mut fit = output_error_pooling(noisy, unknowns, noise)?;
-        let mut noise_through = None;
-        if noisy.noise().is_some() && fit.noise.iter().any(|model| *model != NoiseModel::White) {
-            let machine = fit.estimate.system()?;
-            let of_forces =
-                |periods: &RepeatedPeriods| self::with_noise(periods, noise, Some(&machine));
-            let beside = together(spectra, &of_forces).ok();
-            let is_of_forces =
-                |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
-            let beside = beside.filter(|data| {
-                data.noise().is_some_and(|noise| noise.models().iter().any(is_of_forces))
-            });
-            // The machine found first stands where the search from anew fails.
-            let again = beside.and_then(|data| output_error_pooling(&data, unknowns, noise).ok());
-            if let Some(again) = again {
-                (fit, noise_through) = (again, Some(machine));
-            }
-        }
-        let source = "estimated from the periods";
-        let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
-        Ok(Found {
-            estimator: "maximum likelihood, in the frequency domain",
-            estimate: fit.estimate,
-            misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
-            remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
-            noise: fit.noise,
-            noise_through,
-        })
-    };
     match estimator {
-        Some(PeriodEstimator::LeastSquares) => least_squares(None),
+        Some(PeriodEstimator::LeastSquares) => least_squares(data, unknowns, None),
         Some(PeriodEstimator::Instrumental) => {
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
@@ -271,35 +262,94 @@ fn found(
             })
         }
         Some(PeriodEstimator::MaximumLikelihood(_)) => {
-            Ok(likelihood(&together(spectra, &with_noise)?)?)
+            let noisy = together(spectra, &|periods| with_noise(periods, noise, None))?;
+            Ok(likelihood(spectra, &noisy, unknowns, noise)?)
         }
-        None => {
-            let noisy = together(spectra, &with_noise)?;
-            let parameters = unknowns.independent();
-            if noisy.noise().is_none() {
-                let plain = least_squares(None)?;
-                if parameters > LIKELIHOOD_PARAMETERS {
-                    return Ok(plain);
-                }
-                return Ok(match likelihood(&noisy) {
-                    Ok(likely) => less_left(data, plain, likely)?,
-                    Err(_) => plain,
-                });
-            }
-            if parameters > LIKELIHOOD_PARAMETERS {
-                return least_squares(Some(format!(
-                    "least squares was used, for {parameters} parameters: noise on the response biases it. \
-                     Maximum likelihood takes minutes; --method maximum-likelihood chooses it"
-                )));
-            }
-            match likelihood(&noisy) {
-                Err(error @ EstimateError::NotConverged { .. }) => least_squares(Some(format!(
-                    "least squares was used, which noise on the response biases: {error}"
-                ))),
-                other => Ok(other?),
-            }
+        None => suitable(spectra, data, unknowns),
+    }
+}
+
+/// Returns the estimate of maximum likelihood if the periods show the noise and the search ends well, otherwise of
+/// least squares.
+fn suitable(
+    spectra: &[Spectra],
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Result<Found, AnalysisError> {
+    let noise = Pooling::Automatic;
+    let noisy = together(spectra, &|periods| with_noise(periods, noise, None))?;
+    let parameters = unknowns.independent();
+    if noisy.noise().is_none() {
+        let plain = least_squares(data, unknowns, None)?;
+        if parameters > LIKELIHOOD_PARAMETERS {
+            return Ok(plain);
+        }
+        return Ok(match likelihood(spectra, &noisy, unknowns, noise) {
+            Ok(likely) => less_left(data, plain, likely)?,
+            Err(_) => plain,
+        });
+    }
+    if parameters > LIKELIHOOD_PARAMETERS {
+        let remark = format!(
+            "least squares was used, for {parameters} parameters: noise on the response biases it. \
+             Maximum likelihood takes minutes; `method` maximum-likelihood chooses it"
+        );
+        return least_squares(data, unknowns, Some(remark));
+    }
+    match likelihood(spectra, &noisy, unknowns, noise) {
+        Err(error @ EstimateError::NotConverged { .. }) => {
+            let remark =
+                format!("least squares was used, which noise on the response biases: {error}");
+            least_squares(data, unknowns, Some(remark))
+        }
+        other => Ok(other?),
+    }
+}
+
+fn least_squares(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    remark: Option<String>,
+) -> Result<Found, AnalysisError> {
+    let estimator = "least squares on the equation of motion, in the frequency domain";
+    let estimate = equation_error(data, unknowns)?;
+    Ok(Found { estimator, estimate, misfit: None, noise: Vec::new(), noise_through: None, remark })
+}
+
+/// Returns the estimate of maximum likelihood from data with noise; where the noise may be the response to unmeasured
+/// forces, that of a second search, which knows the machine of the first.
+fn likelihood(
+    spectra: &[Spectra],
+    noisy: &FrequencyData,
+    unknowns: &Unknowns,
+    noise: Pooling,
+) -> Result<Found, EstimateError> {
+    let mut fit = output_error_pooling(noisy, unknowns, noise)?;
+    let mut noise_through = None;
+    if noisy.noise().is_some() && fit.noise.iter().any(|model| *model != NoiseModel::White) {
+        let machine = fit.estimate.system()?;
+        let of_forces = |periods: &RepeatedPeriods| with_noise(periods, noise, Some(&machine));
+        let beside = together(spectra, &of_forces).ok();
+        let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+        let beside = beside.filter(|data| {
+            data.noise().is_some_and(|noise| noise.models().iter().any(is_of_forces))
+        });
+        // The machine found first stands where the search from anew fails.
+        let again = beside.and_then(|data| output_error_pooling(&data, unknowns, noise).ok());
+        if let Some(again) = again {
+            (fit, noise_through) = (again, Some(machine));
         }
     }
+    let source = "estimated from the periods";
+    let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
+    Ok(Found {
+        estimator: "maximum likelihood, in the frequency domain",
+        estimate: fit.estimate,
+        misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
+        remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
+        noise: fit.noise,
+        noise_through,
+    })
 }
 
 /// Least squares where it explains the motion as well as maximum likelihood does, or where that leaves more than noise;

@@ -15,6 +15,7 @@ use super::checks::{self, CheckRow, When};
 use super::fitted::Fitted;
 use super::fitted_lines::FittedLine;
 use super::force_noise::ForceNoise;
+use super::keywords::Domain;
 use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::{Identify, Source};
 use super::prediction::Prediction;
@@ -37,7 +38,7 @@ pub struct IdentificationSummary {
     /// The record.
     pub file: String,
     /// Domain of the fit: frequency or time.
-    pub domain: &'static str,
+    pub domain: Domain,
     /// Name of the estimator.
     pub estimator: &'static str,
     /// Samples used.
@@ -144,6 +145,11 @@ impl IdentificationSummary {
         let unexplained_motion = fitted.unexplained_motion(&system)?;
         let carried = rows::carries_covariance(estimate);
         let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
+        let scope = checks::Scope {
+            scaled: unscaled.is_none(),
+            hits: matches!(how.source, Source::Hits(_)),
+            unexplained: unexplained_motion,
+        };
         let mut summary = Self {
             file: hits.first().map_or(&records[0].file, |hit| &hit.record).clone(),
             domain: fitted.domain,
@@ -156,34 +162,11 @@ impl IdentificationSummary {
             proportional_damping: ProportionalDamping::of(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: ShapedMode::all(&modes, false)?,
-            fit: FitRow {
-                nrmse: match fitted.fits_response() {
-                    true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
-                    false => fitted.nrmse(),
-                },
-                unexplained_motion,
-                misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
-                noise: fitted.noise.clone(),
-                force_noise: fitted.force_noise.clone(),
-                sinusoids: fitted.sinusoids.clone(),
-                condition_number: estimate.condition(),
-                equations: fitted.equations,
-                unknowns: match &fitted.nonlinear {
-                    Some(all) => all.estimate.parameters().len(),
-                    None => estimate.unknowns().independent(),
-                },
-            },
+            fit: FitRow::of(fitted, unexplained_motion),
             channels: Channels::together(&records.iter().map(|r| &*r.names).collect::<Vec<_>>()),
             records: records.iter().map(row).collect(),
             hits,
-            checks: {
-                let scope = checks::Scope {
-                    scaled: unscaled.is_none(),
-                    hits: matches!(how.source, Source::Hits(_)),
-                    unexplained: unexplained_motion,
-                };
-                checks::rows(fitted, &modes, &records, scope)?
-            },
+            checks: checks::rows(fitted, &modes, &records, scope)?,
             fitted_lines: None,
             validation: None,
             remarks: Vec::new(),
@@ -192,6 +175,12 @@ impl IdentificationSummary {
             unscaled,
             analysis: how.clone(),
         };
+        summary.remarks = summary.all_remarks(fitted, &records);
+        Ok(summary)
+    }
+
+    /// Returns the remarks of a fit, of its records and of what the checks leave.
+    fn all_remarks(&self, fitted: &Fitted, records: &[&Block]) -> Vec<String> {
         let looked_at = records.iter().filter_map(|record| {
             let (first, last) = (record.first_sample, record.held_to()?);
             let file = &record.file;
@@ -199,18 +188,17 @@ impl IdentificationSummary {
                 "checks of single samples looked at samples {first} to {last} of {file} only"
             ))
         });
-        let of_method = of_least_squares(fitted, &summary.checks);
         let of_units = records.iter().flat_map(|record| record.unit_remarks.iter().cloned());
-        let of_scale = summary.unscaled.as_ref().map(Unscaled::to_string);
-        let remarks = of_scale
+        let of_scale = self.unscaled.as_ref().map(Unscaled::to_string);
+        of_scale
             .into_iter()
             .chain(of_units)
             .chain(fitted.remarks.iter().cloned())
-            .chain(looked_at);
-        let of_covariance = rows::of_covariance(estimate);
-        summary.remarks =
-            remarks.chain(summary.doubts()).chain(of_method).chain(of_covariance).collect();
-        Ok(summary)
+            .chain(looked_at)
+            .chain(self.doubts())
+            .chain(of_least_squares(fitted, &self.checks))
+            .chain(rows::of_covariance(&fitted.estimate))
+            .collect()
     }
 
     /// Returns what in the numbers themselves speaks against them.
@@ -362,6 +350,24 @@ pub(super) fn verdict(checks: &[CheckRow]) -> String {
 }
 
 impl FitRow {
+    fn of(fitted: &Fitted, unexplained_motion: Option<f64>) -> Self {
+        let of_response = unexplained_motion.filter(|_| fitted.fits_response());
+        Self {
+            nrmse: of_response.unwrap_or_else(|| fitted.nrmse()),
+            unexplained_motion,
+            misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
+            noise: fitted.noise.clone(),
+            force_noise: fitted.force_noise.clone(),
+            sinusoids: fitted.sinusoids.clone(),
+            condition_number: fitted.estimate.condition(),
+            equations: fitted.equations,
+            unknowns: match &fitted.nonlinear {
+                Some(all) => all.estimate.parameters().len(),
+                None => fitted.estimate.unknowns().independent(),
+            },
+        }
+    }
+
     /// Returns the quality of the fit as a table; `model` says what explains the motion.
     pub(super) fn lines(&self, model: &str) -> String {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));

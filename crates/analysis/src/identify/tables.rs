@@ -70,79 +70,89 @@ pub fn identify_responses(
     };
     let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
     let ((fit, of_machine, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
-    let mut findings: Vec<(When, Option<String>, Finding)> =
-        before.into_iter().map(|finding| (When::Before, None, finding)).collect();
-    for table in tables {
-        let name = (tables.len() > 1).then(|| table.file.clone());
-        let doubts = table.doubts.iter();
-        let doubts = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
-        findings.extend(doubts.map(|finding| (When::Before, name.clone(), finding)));
-    }
     if let Some(of_segments) = &fit.averaged {
         let mut responses = of_segments.responses.iter().cloned();
         measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;
         data = joined(&measured)?;
     }
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
-    let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
-    for (table, measured) in tables.iter().zip(&measured) {
-        let name = (tables.len() > 1).then(|| table.file.clone());
-        for (when, finding) in measured.findings(&fit.estimate, data.len(), settled)? {
-            findings.push((when, name.clone(), finding));
-        }
-    }
-    let mut of_matrices = Vec::from_iter(instability(&of_machine.modes()?));
-    if unscaled.is_none() {
-        of_matrices.extend(negative_mass(&of_machine));
-        of_matrices.extend(mass_symmetry(&of_machine));
-        of_matrices.extend(gain_symmetry(&of_machine));
-    }
-    findings.extend(of_matrices.into_iter().map(|finding| (When::After, None, finding)));
-    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
-    let row = |(when, name, finding): (When, Option<String>, Finding)| {
-        CheckRow::new(when, name, &finding, &Channels::default())
-    };
-    let checks = findings.into_iter().map(row).collect();
+    let checks =
+        checks(tables, &measured, before, &fit, &of_machine, unscaled.is_some(), data.len())?;
     let estimate = &of_machine;
     let system = estimate.system()?;
     let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
-    // Least squares fits the force, maximum likelihood the response.
-    let each = estimate.residual_nrmse();
-    let of_force = || (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt();
-    let of_response = unexplained.filter(|_| how.method != Some(Method::LeastSquares));
-    let hz = |rows: &mut dyn Iterator<Item = f64>| rows.map(|omega| omega / TAU).collect();
-    let frequencies: Vec<f64> = hz(&mut first.data.omega().iter().copied());
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
         quantity: data.measured().to_string(),
         points: first.points.clone(),
         forces: first.driven.iter().map(|dof| first.points[*dof].clone()).collect(),
-        frequencies: FrequencyRow {
-            count: first.data.len() / first.driven.len(),
-            first_hz: frequencies.iter().copied().fold(f64::INFINITY, f64::min),
-            last_hz: frequencies.iter().copied().fold(0.0, f64::max),
-        },
+        frequencies: FrequencyRow::of(first),
         confidence: CONFIDENCE,
         parameters: parameters(estimate, unscaled.as_ref())?,
         proportional_damping: ProportionalDamping::of(estimate)?,
         modes: ShapedMode::all(&estimate.modes()?, false)?,
-        fit: FitRow {
-            nrmse: of_response.unwrap_or_else(of_force),
-            unexplained_motion: unexplained,
-            misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
-            noise: fit.noise.clone(),
-            force_noise: Vec::new(),
-            sinusoids: Vec::new(),
-            condition_number: estimate.condition(),
-            equations: 2 * data.len(),
-            unknowns: estimate.unknowns().independent(),
-        },
+        fit: fit.row(estimate, unexplained, how.method, data.len()),
         fitted_lines: None,
         checks,
-        remarks: unscaled
+        remarks: remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref()),
+        system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
+        covariance: carries_covariance(estimate).then(|| covariance(estimate, unscaled.as_ref())),
+        unscaled,
+        analysis: how.clone(),
+    };
+    Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
+}
+
+/// Returns the checks of the tables before and after the fit; `rows` are those of all tables together.
+fn checks(
+    tables: &[FrequencyResponses],
+    measured: &[Tabulated],
+    before: Vec<Finding>,
+    fit: &Fit,
+    of_machine: &Estimate,
+    is_unscaled: bool,
+    rows: usize,
+) -> Result<Vec<CheckRow>, AnalysisError> {
+    let mut findings: Vec<(When, Option<String>, Finding)> =
+        before.into_iter().map(|finding| (When::Before, None, finding)).collect();
+    let named = |table: &FrequencyResponses| (tables.len() > 1).then(|| table.file.clone());
+    for table in tables {
+        let doubts = table.doubts.iter();
+        let doubts = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
+        findings.extend(doubts.map(|finding| (When::Before, named(table), finding)));
+    }
+    let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
+    for (table, measured) in tables.iter().zip(measured) {
+        for (when, finding) in measured.findings(&fit.estimate, rows, settled)? {
+            findings.push((when, named(table), finding));
+        }
+    }
+    let mut of_matrices = Vec::from_iter(instability(&of_machine.modes()?));
+    if !is_unscaled {
+        of_matrices.extend(negative_mass(of_machine));
+        of_matrices.extend(mass_symmetry(of_machine));
+        of_matrices.extend(gain_symmetry(of_machine));
+    }
+    findings.extend(of_matrices.into_iter().map(|finding| (When::After, None, finding)));
+    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
+    let row = |(when, name, finding): (When, Option<String>, Finding)| {
+        CheckRow::new(when, name, &finding, &Channels::default())
+    };
+    Ok(findings.into_iter().map(row).collect())
+}
+
+fn remarks(
+    tables: &[FrequencyResponses],
+    measured: &[Tabulated],
+    added_decay: Option<f64>,
+    fit: &Fit,
+    of_machine: &Estimate,
+    unscaled: Option<&Unscaled>,
+) -> Vec<String> {
+    unscaled
             .iter()
-            .map(Unscaled::to_string)
+            .map(|unscaled| unscaled.to_string())
             .chain(tables.iter().flat_map(|table| table.remarks.iter().cloned()))
             .chain(measured.iter().flat_map(|measured| measured.remarks.iter().cloned()))
             .chain(added_decay.map(|rate| {
@@ -154,14 +164,8 @@ pub fn identify_responses(
             }))
             .chain(fit.misfit.map(|misfit| misfit.to_string()))
             .chain(fit.averaged.as_ref().and_then(blunted))
-            .chain(of_covariance(estimate))
-            .collect(),
-        system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
-        covariance: carries_covariance(estimate).then(|| covariance(estimate, unscaled.as_ref())),
-        unscaled,
-        analysis: how.clone(),
-    };
-    Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
+            .chain(of_covariance(of_machine))
+            .collect()
 }
 
 /// A machine identified from tables of frequency responses.
@@ -231,6 +235,17 @@ pub struct FrequencyRow {
     pub first_hz: f64,
     /// Highest frequency, in Hz.
     pub last_hz: f64,
+}
+
+impl FrequencyRow {
+    fn of(table: &Tabulated) -> Self {
+        let hz = table.data.omega().iter().map(|omega| omega / TAU);
+        Self {
+            count: table.data.len() / table.driven.len(),
+            first_hz: hz.clone().fold(f64::INFINITY, f64::min),
+            last_hz: hz.fold(0.0, f64::max),
+        }
+    }
 }
 
 impl IdentifiedResponses {
@@ -350,6 +365,31 @@ fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
 }
 
 impl Fit {
+    /// Returns the quality of the fit; `rows` are those of all tables together.
+    fn row(
+        &self,
+        of_machine: &Estimate,
+        unexplained: Option<f64>,
+        method: Option<Method>,
+        rows: usize,
+    ) -> FitRow {
+        // Least squares fits the force, maximum likelihood the response.
+        let each = of_machine.residual_nrmse();
+        let of_force = || (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt();
+        let of_response = unexplained.filter(|_| method != Some(Method::LeastSquares));
+        FitRow {
+            nrmse: of_response.unwrap_or_else(of_force),
+            unexplained_motion: unexplained,
+            misfit_ratio: self.misfit.map(|misfit| misfit.ratio),
+            noise: self.noise.clone(),
+            force_noise: Vec::new(),
+            sinusoids: Vec::new(),
+            condition_number: of_machine.condition(),
+            equations: 2 * rows,
+            unknowns: of_machine.unknowns().independent(),
+        }
+    }
+
     fn of(
         data: &FrequencyData,
         unknowns: &Unknowns,

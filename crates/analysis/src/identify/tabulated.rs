@@ -36,6 +36,53 @@ impl Noise {
     }
 }
 
+/// Responses of a table, by their points.
+struct Layout<'a> {
+    points: Vec<String>,
+    /// Points of the forces.
+    forces: Vec<String>,
+    /// Degrees of freedom with a force, counted from 0.
+    driven: Vec<usize>,
+    /// Responses, points × forces.
+    functions: Vec<Vec<&'a ResponseFunction>>,
+}
+
+impl<'a> Layout<'a> {
+    /// Finds the responses at the `chosen` points, or at all of them if none is chosen.
+    fn of(table: &'a FrequencyResponses, chosen: &[String]) -> Result<Self, AnalysisError> {
+        let points = match chosen.is_empty() {
+            true => distinct(table.functions.iter().map(|f| &f.response)),
+            false => chosen.to_vec(),
+        };
+        let mut forces = distinct(table.functions.iter().map(|f| &f.reference));
+        if !chosen.is_empty() {
+            forces.retain(|force| points.contains(force));
+        }
+        let missing = |response: &str, force: &str| AnalysisError::NoResponse {
+            file: table.file.clone(),
+            response: response.into(),
+            force: force.into(),
+        };
+        let place = |force: &String| {
+            let at = points.iter().position(|point| point == force);
+            at.ok_or_else(|| missing(force, force))
+        };
+        let driven: Vec<usize> = forces.iter().map(place).collect::<Result<_, _>>()?;
+        if driven.is_empty() {
+            return Err(missing(&points.join(", "), &points.join(", ")));
+        }
+        let mut functions: Vec<Vec<&ResponseFunction>> = Vec::new();
+        for point in &points {
+            let find = |force: &String| {
+                let of_pair = |f: &&ResponseFunction| f.response == *point && f.reference == *force;
+                table.functions.iter().find(of_pair).ok_or_else(|| missing(point, force))
+            };
+            functions.push(forces.iter().map(find).collect::<Result<_, _>>()?);
+        }
+        Ok(Self { points, forces, driven, functions })
+    }
+}
+
 /// A table as the estimators take it.
 pub(super) struct Tabulated {
     pub(super) points: Vec<String>,
@@ -62,35 +109,7 @@ impl Tabulated {
             Some(rate) => Cow::Owned(added_decay::as_derivatives(table, measured, rate)),
             None => Cow::Borrowed(table),
         };
-        let points = match how.points.is_empty() {
-            true => distinct(table.functions.iter().map(|f| &f.response)),
-            false => how.points.clone(),
-        };
-        let mut forces = distinct(table.functions.iter().map(|f| &f.reference));
-        if !how.points.is_empty() {
-            forces.retain(|force| points.contains(force));
-        }
-        let missing = |response: &str, force: &str| AnalysisError::NoResponse {
-            file: table.file.clone(),
-            response: response.into(),
-            force: force.into(),
-        };
-        let place = |force: &String| {
-            let at = points.iter().position(|point| point == force);
-            at.ok_or_else(|| missing(force, force))
-        };
-        let driven: Vec<usize> = forces.iter().map(place).collect::<Result<_, _>>()?;
-        if driven.is_empty() {
-            return Err(missing(&points.join(", "), &points.join(", ")));
-        }
-        let mut functions: Vec<Vec<&ResponseFunction>> = Vec::new();
-        for point in &points {
-            let find = |force: &String| {
-                let of_pair = |f: &&ResponseFunction| f.response == *point && f.reference == *force;
-                table.functions.iter().find(of_pair).ok_or_else(|| missing(point, force))
-            };
-            functions.push(forces.iter().map(find).collect::<Result<_, _>>()?);
-        }
+        let Layout { points, forces, driven, functions } = Layout::of(table, &how.points)?;
         let rows = rows(table, how.band)?;
         let omega: Vec<f64> = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
         let matrix = |of: &dyn Fn(&ResponseFunction) -> Complex<f64>| {
@@ -327,6 +346,32 @@ struct Columns<'a> {
 }
 
 impl Columns<'_> {
+    /// Returns responses with their coherence: averages over the segments that the table states, or over as many as
+    /// are given.
+    fn frequency_responses(
+        &self,
+        table: &FrequencyResponses,
+        averages: Option<f64>,
+        response: Vec<DMatrix<Complex<f64>>>,
+        coherence: DMatrix<f64>,
+        averaged: Option<&Averaged>,
+        errors: Option<&[DMatrix<f64>]>,
+    ) -> Result<Frf, AnalysisError> {
+        if let Some(Averaged { lines, segments, count }) = averaged {
+            let over = (*segments, *count);
+            return Ok(Frf::of_segments(lines, response, coherence, errors, over, self.measured)?);
+        }
+        let omega = self.rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
+        let averages = averages.ok_or_else(|| AnalysisError::Setting {
+            setting: "averages",
+            why: format!(
+                "{} has coherences: from how many independent averages? (The standard errors follow from both)",
+                table.file
+            ),
+        })?;
+        Ok(Frf::new(omega, response, coherence, averages, self.measured)?)
+    }
+
     /// Returns the responses with the coherence of the table: of all forces together where it is multiple,
     /// otherwise of each by itself; `None` if the table has none.
     fn coherent(
@@ -337,7 +382,7 @@ impl Columns<'_> {
         averaged: Option<Averaged>,
         errors: Option<&[DMatrix<f64>]>,
     ) -> Result<Option<Coherent>, AnalysisError> {
-        let Self { points, forces, rows, measured } = *self;
+        let Self { points, forces, rows, .. } = *self;
         let of = |point: &String, force: Option<&String>| {
             let fits = |c: &&mechid_io::CoherenceFunction| {
                 c.response == *point && c.reference.as_ref() == force
@@ -356,28 +401,15 @@ impl Columns<'_> {
         if together.is_none() && apart.is_none() {
             return Ok(None);
         }
-        let frf = |response,
-                   coherence,
-                   errors: Option<&[DMatrix<f64>]>|
-         -> Result<Frf, AnalysisError> {
-            match &averaged {
-                Some(Averaged { lines, segments, count }) => {
-                    let over = (*segments, *count);
-                    Ok(Frf::of_segments(lines, response, coherence, errors, over, measured)?)
-                }
-                None => {
-                    let omega = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
-                    let averages = how.averages.ok_or_else(|| {
-                    let why = format!(
-                        "{} has coherences: from how many independent averages? (The standard errors follow \
-                         from both)",
-                        table.file
-                    );
-                    AnalysisError::Setting { setting: "averages", why }
-                })?;
-                    Ok(Frf::new(omega, response, coherence, averages, measured)?)
-                }
-            }
+        let frf = |response, coherence, errors: Option<&[DMatrix<f64>]>| {
+            self.frequency_responses(
+                table,
+                how.averages,
+                response,
+                coherence,
+                averaged.as_ref(),
+                errors,
+            )
         };
         let dof = |force: &String| points.iter().position(|point| point == force);
         let driven: Vec<usize> = forces.iter().filter_map(dof).collect();

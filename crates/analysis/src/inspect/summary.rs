@@ -133,7 +133,7 @@ impl RecordSummary {
                     "; by {number} of the file, no time column"
                 ))
             ),
-            None => "\nno time axis: give --time or --sample-rate\n".into(),
+            None => "\nno time axis: give `time` or `sample_rate`\n".into(),
         };
         text += &self.levels();
         text += &self.lines();

@@ -94,7 +94,7 @@ pub fn remark(
         format!("{share} of channel {} ({}{expected})", m.channel, m.column)
     });
     let unless = if excessive.iter().any(|m| m.expected.is_none()) {
-        "unless that is noise (--noise states its level), "
+        "unless that is noise (`noise` states its level), "
     } else {
         ""
     };
@@ -112,10 +112,10 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
         let forced: Vec<String> = request.forced.iter().map(|dof| (dof + 1).to_string()).collect();
         let degrees = if forced.len() == 1 { "degree" } else { "degrees" };
         let forced = listed(&forced);
-        causes.push(format!("another force acts than on {degrees} of freedom {forced} (--forced)"));
+        causes.push(format!("another force acts than on {degrees} of freedom {forced} (`forced`)"));
     }
     if matches!(request.rule, Rule::Given(_)) {
-        causes.push("--parameter holds too much of the force back".into());
+        causes.push("`parameter` holds too much of the force back".into());
     }
     if !request.periodic && request.start == Start::FromRest {
         causes.push("the record does not begin at rest".into());

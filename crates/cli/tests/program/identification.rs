@@ -185,8 +185,7 @@ fn another_record_is_predicted() {
     assert_eq!(noise["validation"]["first_sample"], 101);
     assert!(fits(&noise).iter().all(|fit| (fit - 90.0).abs() < 1.5), "{noise}");
     // A window of the record itself, as a person reads it.
-    let own =
-        format!("{common} --period 300 --periods 1 --validate :301:200");
+    let own = format!("{common} --period 300 --periods 1 --validate :301:200");
     let (done, text, message) = run(folder, &own);
     assert!(done, "{message}");
     assert!(text.contains("predicted of a.csv, samples 301 to 500 "), "{text}");
@@ -285,7 +284,11 @@ fn a_whole_period_closes() {
     let weights = format!("{common} --noise per-line --extent period");
     refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
     let lines = "--domain time --lines odd --plot a.svg";
-    refused(folder, &format!("{common} {lines}"), &["--lines: it belongs to", "not to --domain time"]);
+    refused(
+        folder,
+        &format!("{common} {lines}"),
+        &["--lines: it belongs to", "not to --domain time"],
+    );
 }
 
 /// Periods without noise, and a period that is not said.

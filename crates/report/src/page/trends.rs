@@ -28,68 +28,8 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
         let one = Figure::new(series.name.as_str()).panel(panel(series, trends.over));
         figures.push(drawn(format!("series-{number}"), one, caption)?);
     }
-    let quantities = trends.series.iter().map(|series| {
-        let error = series.standard_error.map_or_else(|| "–".into(), |error| significant(error, 2));
-        vec![
-            series.name.clone(),
-            series.unit.clone(),
-            significant(series.median, 6),
-            significant(series.spread, 2),
-            error,
-            series.outliers().count().to_string(),
-            series.points.len().to_string(),
-        ]
-    });
-    let header = ["quantity", "unit", "median", "spread", "standard error", "outliers", "records"];
-    let quantities = Table {
-        caption: "Quantities",
-        header: &header,
-        numbers_from: 2,
-        rows: quantities.collect(),
-    };
-    let changes = trends.changes().map(|(series, change)| {
-        vec![
-            series.name.clone(),
-            change.kind.name().into(),
-            change.record.clone(),
-            significant(change.size, 3),
-            series.unit.clone(),
-            significant(change.p_value, 2),
-        ]
-    });
-    let header = ["quantity", "change", "begins with", "size", "unit", "p"];
-    let changes = Table {
-        caption: "Steps and drifts",
-        header: &header,
-        numbers_from: 3,
-        rows: changes.collect(),
-    };
-    let outliers = trends.series.iter().flat_map(|series| {
-        series.outliers().map(|point| {
-            let away = (point.value - series.median) / series.spread;
-            vec![
-                point.record.clone(),
-                series.name.clone(),
-                significant(point.value, 6),
-                series.unit.clone(),
-                significant(away, 3),
-            ]
-        })
-    });
-    let header = ["record", "quantity", "value", "unit", "spreads from the median"];
-    let outliers =
-        Table { caption: "Outliers", header: &header, numbers_from: 2, rows: outliers.collect() };
-    let failures = trends.failures.iter().map(|failure| {
-        vec![
-            failure.code.clone(),
-            failure.record.clone(),
-            failure.message.clone(),
-            failure.records.to_string(),
-        ]
-    });
-    let header = ["code", "first record", "its failure", "records"];
-    let failures =
-        Table { caption: "Failures", header: &header, numbers_from: 3, rows: failures.collect() };
+    let (quantities, changes) = (quantities(trends), changes(trends));
+    let (outliers, failures) = (outliers(trends), failures(trends));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -140,4 +80,86 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
         }
     };
     Ok(page.into_string() + "\n")
+}
+
+/// Returns the table of the quantities.
+fn quantities(trends: &Trends) -> Table<'static> {
+    let quantities = trends.series.iter().map(|series| {
+        let error = series.standard_error.map_or_else(|| "–".into(), |error| significant(error, 2));
+        vec![
+            series.name.clone(),
+            series.unit.clone(),
+            significant(series.median, 6),
+            significant(series.spread, 2),
+            error,
+            series.outliers().count().to_string(),
+            series.points.len().to_string(),
+        ]
+    });
+    Table {
+        caption: "Quantities",
+        header: &["quantity", "unit", "median", "spread", "standard error", "outliers", "records"],
+        numbers_from: 2,
+        rows: quantities.collect(),
+    }
+}
+
+/// Returns the table of steps and drifts.
+fn changes(trends: &Trends) -> Table<'static> {
+    let changes = trends.changes().map(|(series, change)| {
+        vec![
+            series.name.clone(),
+            change.kind.name().into(),
+            change.record.clone(),
+            significant(change.size, 3),
+            series.unit.clone(),
+            significant(change.p_value, 2),
+        ]
+    });
+    Table {
+        caption: "Steps and drifts",
+        header: &["quantity", "change", "begins with", "size", "unit", "p"],
+        numbers_from: 3,
+        rows: changes.collect(),
+    }
+}
+
+/// Returns the table of the values far from the others.
+fn outliers(trends: &Trends) -> Table<'static> {
+    let outliers = trends.series.iter().flat_map(|series| {
+        series.outliers().map(|point| {
+            let away = (point.value - series.median) / series.spread;
+            vec![
+                point.record.clone(),
+                series.name.clone(),
+                significant(point.value, 6),
+                series.unit.clone(),
+                significant(away, 3),
+            ]
+        })
+    });
+    Table {
+        caption: "Outliers",
+        header: &["record", "quantity", "value", "unit", "spreads from the median"],
+        numbers_from: 2,
+        rows: outliers.collect(),
+    }
+}
+
+/// Returns the table of the records without a result.
+fn failures(trends: &Trends) -> Table<'static> {
+    let failures = trends.failures.iter().map(|failure| {
+        vec![
+            failure.code.clone(),
+            failure.record.clone(),
+            failure.message.clone(),
+            failure.records.to_string(),
+        ]
+    });
+    Table {
+        caption: "Failures",
+        header: &["code", "first record", "its failure", "records"],
+        numbers_from: 3,
+        rows: failures.collect(),
+    }
 }
