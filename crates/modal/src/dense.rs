@@ -1,34 +1,43 @@
 //! Thin calls of the dense kernels on columns that stand one after the other in a slice.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::householder;
 use faer::linalg::matmul::triangular::BlockStructure;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::linalg::qr::no_pivoting::factor as qr;
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, Conj, MatMut, MatRef, Par};
 
 use crate::limits::DEPENDENT_COLUMN;
 
-/// Replaces the columns of a matrix by those of its triangular factor; below it the reflections
-/// remain.
-pub(crate) fn triangularise(columns: &mut [f64], rows: usize) {
-    let count = columns.len() / rows.max(1);
-    let size = rows.min(count);
+/// Replaces the first `factored` columns of a matrix by those of their triangular factor, and the
+/// others by Qᵀ times them; below the triangle the reflections remain.
+pub(crate) fn triangularise(columns: &mut [f64], rows: usize, factored: usize) {
+    let size = rows.min(factored);
     if size == 0 {
         return;
     }
-    let block = faer::linalg::qr::no_pivoting::factor::recommended_block_size::<f64>(rows, count);
+    let (left, right) = columns.split_at_mut(rows * factored);
+    let others = right.len() / rows;
+    let block = qr::recommended_block_size::<f64>(rows, factored);
+    let scratch =
+        qr::qr_in_place_scratch::<f64>(rows, factored, block, Par::Seq, Default::default()).or(
+            householder::apply_block_householder_sequence_transpose_on_the_left_in_place_scratch::<
+                f64,
+            >(rows, block, others),
+        );
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    let mut left = MatMut::from_column_major_slice_mut(left, rows, factored);
     let mut reflectors = vec![0.0; block * size];
-    let scratch = faer::linalg::qr::no_pivoting::factor::qr_in_place_scratch::<f64>(
-        rows,
-        count,
-        block,
+    let mut reflectors = MatMut::from_column_major_slice_mut(&mut reflectors, block, size);
+    qr::qr_in_place(left.rb_mut(), reflectors.rb_mut(), Par::Seq, stack, Default::default());
+    householder::apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj(
+        left.rb(),
+        reflectors.rb(),
+        Conj::No,
+        MatMut::from_column_major_slice_mut(right, rows, others),
         Par::Seq,
-        Default::default(),
-    );
-    faer::linalg::qr::no_pivoting::factor::qr_in_place(
-        MatMut::from_column_major_slice_mut(columns, rows, count),
-        MatMut::from_column_major_slice_mut(&mut reflectors, block, size),
-        Par::Seq,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Default::default(),
+        stack,
     );
 }
 

@@ -2,6 +2,7 @@
 
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
 
 use crate::ModalError;
 use crate::covariance::Covariance;
@@ -60,8 +61,8 @@ impl ModalEstimate {
             .collect();
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
-            modes: asked.into_iter().map(identified).collect(),
-            others: rest.into_iter().map(identified).collect(),
+            modes: asked.into_par_iter().map(identified).collect(),
+            others: rest.into_par_iter().map(identified).collect(),
             dropped,
             powers: model.powers.clone(),
             reference: model.reference,

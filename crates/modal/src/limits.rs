@@ -30,8 +30,8 @@ pub const MIN_FREQUENCY_STEP: f64 = 2e-3;
 pub const NOISE_WINDOW_SHARE: f64 = 1.0 / 16.0;
 /// Least number of lines on either side in the average of a noise spectrum.
 pub const MIN_NOISE_WINDOW: usize = 15;
-/// Number of expectation-maximisation steps for unmeasured forces.
-pub const EXPECTATION_STEPS: usize = 12;
+/// Largest number of scoring steps for the variances of unmeasured forces.
+pub const SCORING_STEPS: usize = 12;
 /// Response of a mode to a unit force over its largest, squared, above which a line bears on its
 /// unmeasured force.
 pub const NEAR_RESONANCE: f64 = 1e-2;

@@ -14,12 +14,12 @@ use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::dense::add_product;
-use crate::limits::{EXPECTATION_STEPS, LEAST_NOISE, MIN_NOISE_WINDOW, NOISE_WINDOW_SHARE};
+use crate::limits::{LEAST_NOISE, MIN_NOISE_WINDOW, NOISE_WINDOW_SHARE, SCORING_STEPS};
 use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{Projection, Weights};
 use crate::search::Fit;
-use crate::unmeasured::{ForceSums, Posterior};
+use crate::unmeasured::{ForceModel, ForceSums, Posterior};
 
 type C = Complex<f64>;
 
@@ -49,13 +49,11 @@ impl Noise {
                 *first = before.max(LEAST_FIRST_PROCESS * *first);
             }
         }
-        for _ in 0..EXPECTATION_STEPS {
-            let before = noise.process.clone();
-            let sums = noise.force_sums(lines, model, &shapes, &residuals);
-            noise.improve_process(&sums);
-            let power = noise.sensor_power(lines, model, &shapes, &residuals);
+        for _ in 0..SCORING_STEPS {
+            let (sums, power) = noise.expectation(lines, model, &shapes, &residuals);
+            let step = noise.improve_process(&sums);
             noise.sensor = residuals.smooth_power(lines, power);
-            if settled(&before, &noise.process) {
+            if step < SETTLED {
                 break;
             }
         }
@@ -68,6 +66,7 @@ impl Noise {
     /// times 1 + Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the modes.
     pub(crate) fn weights(&self, lines: &Lines, model: &Model, shapes: &[Vec<C>]) -> Weights {
         let count = lines.len() as f64;
+        let directions = self.directions(shapes);
         let level: Vec<f64> =
             self.sensor.iter().map(|d| (d.iter().sum::<f64>() / count).sqrt()).collect();
         let value = |line: usize| {
@@ -75,7 +74,7 @@ impl Noise {
             let mut factor = 1.0;
             for mode in (0..model.modes()).filter(|mode| self.process[*mode] > 0.0) {
                 let gain = modal_gain(model.poles[mode], lines.omega[line]).norm_sqr();
-                factor += self.process[mode] * gain * self.direction(&shapes[mode], line);
+                factor += self.process[mode] * gain * directions[mode * lines.len() + line];
             }
             (sum / level.len() as f64 * factor).sqrt()
         };
@@ -83,44 +82,77 @@ impl Noise {
     }
 
     /// Returns φᴴ D⁻¹ φ on a line.
-    pub(crate) fn direction(&self, shape: &[C], line: usize) -> f64 {
+    fn direction(&self, shape: &[C], line: usize) -> f64 {
         shape.iter().zip(&self.sensor).map(|(z, d)| z.norm_sqr() / d[line]).sum()
     }
 
-    /// Takes one step of the variances of the unmeasured forces: S_r is multiplied by
-    /// √(Σ |b_rᴴV⁻¹e|² / Σ b_rᴴV⁻¹b_r), which never lowers the likelihood.
-    fn improve_process(&mut self, sums: &[ForceSums]) {
+    /// Takes one scoring step of the logarithms of the variances of the unmeasured forces, and
+    /// returns the largest step.
+    ///
+    /// The information of a force counts what it shares with the others, so that forces of close
+    /// modes do not overshoot together.
+    fn improve_process(&mut self, sums: &[ForceSums]) -> f64 {
+        let mut largest: f64 = 0.0;
         for (process, sum) in self.process.iter_mut().zip(sums) {
-            if sum.expected > 0.0 {
-                *process *= (sum.seen / sum.expected).sqrt();
+            if sum.information > 0.0 {
+                let step = (sum.score / sum.information).clamp(-MAX_SCORING_STEP, MAX_SCORING_STEP);
+                *process *= step.exp();
+                largest = largest.max(step.abs());
             }
         }
+        largest
     }
 
-    /// Sums over the lines what they say of each unmeasured force.
-    fn force_sums(
+    /// Returns φ_rᴴ D⁻¹ φ_r of every mode and line: `[mode · lines + line]`.
+    fn directions(&self, shapes: &[Vec<C>]) -> Vec<f64> {
+        let (modes, lines) = (shapes.len(), self.sensor.first().map_or(0, Vec::len));
+        let precision: Vec<f64> = self.sensor.iter().flatten().map(|d| 1.0 / d).collect();
+        let outputs = self.sensor.len();
+        let power = |k: usize| shapes[k / outputs][k % outputs].norm_sqr();
+        let powers: Vec<f64> = (0..modes * outputs).map(power).collect();
+        let mut directions = vec![0.0; modes * lines];
+        add_product(&mut directions, &precision, &powers, lines, outputs, 1.0);
+        directions
+    }
+
+    /// Returns what the lines say of each unmeasured force, and the expected power of each sensor's
+    /// own noise, given the residuals.
+    fn expectation(
         &self,
         lines: &Lines,
         model: &Model,
         shapes: &[Vec<C>],
         residuals: &Residuals,
-    ) -> Vec<ForceSums> {
+    ) -> (Vec<ForceSums>, Vec<Vec<f64>>) {
+        let directions = self.directions(shapes);
+        let directions = directions.as_slice();
+        let forces = ForceModel { noise: self, lines, model, shapes, residuals, directions };
         let of_block = |block: &Block| {
             let mut sums = vec![ForceSums::default(); model.modes()];
-            for line in block.rows.clone() {
-                if let Some(near) = Posterior::new(self, lines, model, shapes, residuals, line) {
-                    near.add_powers(&mut sums);
+            let mut power: Vec<Vec<f64>> =
+                residuals.power.iter().map(|power| power[block.rows.clone()].to_vec()).collect();
+            let mut posterior = Posterior::default();
+            for (k, line) in block.rows.clone().enumerate() {
+                if posterior.move_to(&forces, line) {
+                    posterior.add_powers(&mut sums);
+                    for (output, power) in power.iter_mut().enumerate() {
+                        let error = residuals.error[output][line];
+                        power[k] = posterior.remaining_power(shapes, output, error);
+                    }
                 }
             }
-            sums
+            (sums, power)
         };
-        let parts: Vec<Vec<ForceSums>> = lines.blocks.par_iter().map(of_block).collect();
+        let parts: Vec<_> = lines.blocks.par_iter().map(of_block).collect();
         let mut all = vec![ForceSums::default(); model.modes()];
-        for (mode, part) in parts.iter().flat_map(|part| part.iter().enumerate()) {
-            all[mode].seen += part.seen;
-            all[mode].expected += part.expected;
+        let mut powers = vec![Vec::with_capacity(lines.len()); self.sensor.len()];
+        for (sums, power) in parts {
+            for (all, part) in all.iter_mut().zip(&sums) {
+                all.add(part);
+            }
+            powers.iter_mut().zip(&power).for_each(|(to, part)| to.extend_from_slice(part));
         }
-        all
+        (all, powers)
     }
 
     /// Returns first variances of the unmeasured forces: the power of the residuals along each
@@ -150,30 +182,6 @@ impl Noise {
             sum / count
         };
         (0..model.modes()).into_par_iter().map(of_mode).collect()
-    }
-
-    /// Returns the expected power of each sensor's own noise, given the residuals.
-    fn sensor_power(
-        &self,
-        lines: &Lines,
-        model: &Model,
-        shapes: &[Vec<C>],
-        residuals: &Residuals,
-    ) -> Vec<Vec<f64>> {
-        let outputs = self.sensor.len();
-        let of_line = |line: usize| -> Vec<f64> {
-            let Some(near) = Posterior::new(self, lines, model, shapes, residuals, line) else {
-                return (0..outputs).map(|output| residuals.power[output][line]).collect();
-            };
-            let mut parts = Vec::new();
-            let value = |output: usize| {
-                let error = residuals.error[output][line];
-                near.remaining_power(shapes, output, error, &mut parts)
-            };
-            (0..outputs).map(value).collect()
-        };
-        let rows: Vec<Vec<f64>> = (0..lines.len()).into_par_iter().map(of_line).collect();
-        (0..outputs).map(|output| rows.iter().map(|row| row[output]).collect()).collect()
     }
 }
 
@@ -301,11 +309,9 @@ pub(crate) fn modal_gain(pole: C, omega: f64) -> C {
     1.0 / (C::new(0.0, omega) - pole)
 }
 
-/// Relative change of the variances of unmeasured forces that ends their iteration.
+/// Step of the logarithms of the variances of unmeasured forces that ends their iteration.
 const SETTLED: f64 = 0.05;
+/// Largest step of the logarithm of a variance: a force that is not there shrinks by it each time.
+const MAX_SCORING_STEP: f64 = 1.0;
 /// Share of its first estimate below which the variance of an unmeasured force does not start.
 const LEAST_FIRST_PROCESS: f64 = 0.01;
-
-fn settled(before: &[f64], after: &[f64]) -> bool {
-    before.iter().zip(after).all(|(a, b)| (a - b).abs() <= SETTLED * b.abs())
-}

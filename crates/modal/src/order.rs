@@ -222,6 +222,7 @@ pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candi
         trial.model.poles.push(candidate.pole);
         trial.model.participation.push(candidate.participation.clone());
         trial.model.gauge.push(0);
+        trial.refresh();
         trial.search_roughly();
         let gain = fit.cost() - trial.cost();
         let pole = trial.model.poles[fit.model.modes()];

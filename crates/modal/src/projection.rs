@@ -136,7 +136,7 @@ impl Projection {
             }
             top += count;
         }
-        triangularise(&mut self.stacked, rows);
+        triangularise(&mut self.stacked, rows, columns);
         self.triangle = Triangle::new(&self.stacked, rows, columns);
         self.unknowns.resize(columns * outputs, 0.0);
         for (output, to) in self.unknowns.chunks_exact_mut(columns.max(1)).enumerate() {
@@ -163,7 +163,7 @@ impl BlockArrays {
         self.stacked.clear();
         self.stacked.extend_from_slice(&self.design);
         self.stacked.extend_from_slice(&self.outputs);
-        triangularise(&mut self.stacked, rows);
+        triangularise(&mut self.stacked, rows, self.columns.len());
     }
 
     fn take_residual(&mut self, unknowns: &[f64], columns: usize, rows: usize) -> f64 {

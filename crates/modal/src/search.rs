@@ -37,6 +37,7 @@ impl<'a> Fit<'a> {
 
     /// Takes other weights or another model: whitens again and solves for the linear unknowns.
     pub(crate) fn refresh(&mut self) {
+        self.model.fix_gauge(self.lines);
         self.projection.whiten(self.lines, &self.weights);
         self.projection.solve(self.lines, &self.model);
     }
@@ -56,8 +57,7 @@ impl<'a> Fit<'a> {
         if self.model.modes() == 0 {
             return;
         }
-        self.model.fix_gauge(self.lines);
-        let mut cost = self.projection.solve(self.lines, &self.model);
+        let mut cost = self.cost();
         let mut damping = 1e-3;
         for _ in 0..limit {
             let Some(next) = self.step(cost, &mut damping) else {

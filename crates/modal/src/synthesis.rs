@@ -112,7 +112,7 @@ impl Record<'_> {
             }
             put(count - 1, rest(*row));
         }
-        triangularise(&mut columns, height);
+        triangularise(&mut columns, height, count);
         (columns, height)
     }
 }
@@ -164,7 +164,7 @@ impl Accumulator {
                 columns[column * height + row] = *value;
             }
         }
-        triangularise(&mut columns, height);
+        triangularise(&mut columns, height, self.width);
         let triangle = Triangle::new(&columns, height, self.width);
         let start = self.width * height;
         let mut solution = columns[start..start + self.width].to_vec();

@@ -12,13 +12,36 @@ type C = Complex<f64>;
 /// Sums over the lines for the unmeasured force of one mode.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ForceSums {
-    /// Σ |b_rᴴV⁻¹e|².
-    pub(crate) seen: f64,
-    /// Σ b_rᴴV⁻¹b_r, what the first is on average.
-    pub(crate) expected: f64,
+    /// Derivative of the log-likelihood with respect to ln S_r: Σ S_r (|b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r).
+    pub(crate) score: f64,
+    /// Information on ln S_r, with that it shares with the other forces: Σ_s Σ S_r S_s |b_rᴴV⁻¹b_s|².
+    pub(crate) information: f64,
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line.
+impl ForceSums {
+    /// Adds the sums of other lines.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.score += other.score;
+        self.information += other.information;
+    }
+}
+
+/// What the posterior of a line is computed from.
+#[derive(Clone, Copy)]
+pub(crate) struct ForceModel<'a> {
+    pub(crate) noise: &'a Noise,
+    pub(crate) lines: &'a Lines,
+    pub(crate) model: &'a Model,
+    /// Shapes in the units of the outputs: `[mode][output]`.
+    pub(crate) shapes: &'a [Vec<C>],
+    pub(crate) residuals: &'a Residuals,
+    /// φ_rᴴD⁻¹φ_r: `[mode · lines + line]`.
+    pub(crate) directions: &'a [f64],
+}
+
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line; it
+/// keeps its memory from line to line.
+#[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,
     gains: Vec<C>,
@@ -26,40 +49,40 @@ pub(crate) struct Posterior {
     /// `[a · size + b]`.
     information: Vec<C>,
     seen: Vec<C>,
+    row: Vec<C>,
+    parts: Vec<C>,
 }
 
 impl Posterior {
-    /// Returns what the residuals of a line say of the unmeasured forces of the modes near it;
-    /// `None` if none is near.
-    pub(crate) fn new(
-        noise: &Noise,
-        lines: &Lines,
-        model: &Model,
-        shapes: &[Vec<C>],
-        residuals: &Residuals,
-        line: usize,
-    ) -> Option<Self> {
+    /// Moves to a line and returns whether a mode is near it.
+    pub(crate) fn move_to(&mut self, forces: &ForceModel<'_>, line: usize) -> bool {
+        let ForceModel { noise, lines, model, .. } = *forces;
         let omega = lines.omega[line];
-        let is_near = |mode: &usize| {
-            let gain = modal_gain(model.poles[*mode], omega).norm_sqr();
-            let process = noise.process[*mode];
-            gain * model.poles[*mode].re.powi(2) > NEAR_RESONANCE
-                || process > 0.0
-                    && process * gain * noise.direction(&shapes[*mode], line) > NEAR_PROCESS_POWER
-        };
-        let active: Vec<usize> = (0..model.modes()).filter(is_near).collect();
-        if active.is_empty() {
-            return None;
+        self.active.clear();
+        self.gains.clear();
+        self.process.clear();
+        for (mode, (pole, process)) in model.poles.iter().zip(&noise.process).enumerate() {
+            let gain = modal_gain(*pole, omega);
+            let direction = forces.directions[mode * lines.len() + line];
+            let power = gain.norm_sqr();
+            if power * pole.re.powi(2) > NEAR_RESONANCE
+                || process * power * direction > NEAR_PROCESS_POWER
+            {
+                self.active.push(mode);
+                self.gains.push(gain);
+                self.process.push(*process);
+            }
         }
-        let gains = active.iter().map(|mode| modal_gain(model.poles[*mode], omega)).collect();
-        let process = active.iter().map(|mode| noise.process[*mode]).collect();
-        let size = active.len();
-        let information = vec![C::default(); size * size];
-        let mut posterior =
-            Self { active, gains, process, information, seen: vec![C::default(); size] };
-        posterior.add_sensors(noise, shapes, residuals, line);
-        posterior.add_forces();
-        Some(posterior)
+        let size = self.active.len();
+        self.information.clear();
+        self.information.resize(size * size, C::default());
+        self.seen.clear();
+        self.seen.resize(size, C::default());
+        if size > 0 {
+            self.add_sensors(noise, forces.shapes, forces.residuals, line);
+            self.add_forces();
+        }
+        size > 0
     }
 
     /// Sums BᴴD⁻¹B and BᴴD⁻¹e over the sensors.
@@ -95,7 +118,8 @@ impl Posterior {
     /// Goes from V = D to V = D + Σ S_r b_r b_rᴴ, one force after the other (Sherman & Morrison).
     fn add_forces(&mut self) {
         let size = self.active.len();
-        let mut row = vec![C::default(); size];
+        let mut row = std::mem::take(&mut self.row);
+        row.resize(size, C::default());
         for (r, process) in self.process.iter().enumerate().filter(|(_, process)| **process > 0.0) {
             row.copy_from_slice(&self.information[r * size..(r + 1) * size]);
             let factor = process / (1.0 + process * row[r].re);
@@ -107,29 +131,26 @@ impl Posterior {
                 to.iter_mut().zip(&row).for_each(|(to, value)| *to -= along * value);
             }
         }
+        self.row = row;
     }
 
     /// Adds what this line says of each force.
     pub(crate) fn add_powers(&self, sums: &mut [ForceSums]) {
         let size = self.active.len();
         for (a, mode) in self.active.iter().enumerate() {
-            let (seen, expected) = (self.seen[a].norm_sqr(), self.information[a * size + a].re);
-            let sum = &mut sums[*mode];
-            sum.seen += seen;
-            sum.expected += expected;
+            let row = &self.information[a * size..(a + 1) * size];
+            let (process, sum) = (self.process[a], &mut sums[*mode]);
+            sum.score += process * (self.seen[a].norm_sqr() - row[a].re);
+            let shared = row.iter().zip(&self.process).map(|(i, other)| other * i.norm_sqr());
+            sum.information += process * shared.sum::<f64>();
         }
     }
 
     /// Returns the expected power of what remains of an error when the unmeasured forces are taken
     /// off.
-    pub(crate) fn remaining_power(
-        &self,
-        shapes: &[Vec<C>],
-        output: usize,
-        error: C,
-        parts: &mut Vec<C>,
-    ) -> f64 {
+    pub(crate) fn remaining_power(&mut self, shapes: &[Vec<C>], output: usize, error: C) -> f64 {
         let size = self.active.len();
+        let parts = &mut self.parts;
         parts.clear();
         let forces = self.active.iter().zip(&self.gains).zip(&self.process);
         parts.extend(forces.map(|((mode, gain), process)| shapes[*mode][output] * gain * *process));

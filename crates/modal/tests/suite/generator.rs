@@ -100,6 +100,30 @@ impl Case {
         })
     }
 
+    /// Adds the accelerations of one line of forces, mode by mode.
+    fn add_response(
+        &self,
+        omega: f64,
+        participation: &[Vec<f64>],
+        forces: &DMatrix<C>,
+        line: usize,
+        motion: &mut DMatrix<C>,
+    ) {
+        let s = C::new(0.0, omega);
+        for ((pole, shape), participation) in
+            self.poles().iter().zip(&self.shape).zip(participation)
+        {
+            let force: C =
+                participation.iter().enumerate().map(|(k, p)| forces[(line, k)] * p).sum();
+            let scale = C::new(0.0, 2.0 * pole.im);
+            let (direct, mirror) = (s * s * force / (s - pole), s * s * force / (s - pole.conj()));
+            for (output, value) in shape.iter().enumerate() {
+                let residue = value / scale;
+                motion[(line, output)] += residue * direct + residue.conj() * mirror;
+            }
+        }
+    }
+
     /// Returns forces and accelerations of one record.
     pub fn record(&self, seed: u64) -> (Record, Record) {
         let mut normal = Normal::new(seed);
@@ -115,11 +139,10 @@ impl Case {
         let mut motion = DMatrix::zeros(sampling.lines(), self.shape[0].len());
         for line in 1..sampling.lines() {
             let omega = TAU * line as f64 * self.rate_hz / period as f64;
-            let mut row = self.response(omega, &self.participation) * forces.row(line).transpose();
+            self.add_response(omega, &self.participation, &forces, line, &mut motion);
             if self.unmeasured > 0.0 {
-                row += self.response(omega, &hidden) * disturbance.row(line).transpose();
+                self.add_response(omega, &hidden, &disturbance, line, &mut motion);
             }
-            motion.row_mut(line).copy_from(&row.transpose());
         }
         let cut = |lines: DMatrix<C>| {
             let all = Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap();
@@ -258,6 +281,15 @@ pub fn pair(outputs: usize) -> Case {
         [outputs, 2],
         8192,
     )
+}
+
+/// Structure with `modes` modes from 20 to 400 Hz, at random distances, and random forces.
+pub fn large([outputs, inputs]: [usize; 2], samples: usize, modes: usize) -> Case {
+    let mut normal = Normal::new(5);
+    let place = |k: usize, shift: f64| 25.0 * 15f64.powf((k as f64 + 0.4 * shift) / modes as f64);
+    let frequency_hz: Vec<f64> = (0..modes).map(|k| place(k, normal.uniform())).collect();
+    let damping: Vec<f64> = (0..modes).map(|_| 0.002 + 0.004 * normal.uniform()).collect();
+    case("large", &frequency_hz, &damping, [outputs, inputs], samples)
 }
 
 /// Hits at one point, twelve accelerometers.
