@@ -152,7 +152,7 @@ impl<'a> Identification<'a> {
         self.remove_impossible();
         self.remove_insignificant(required);
         let most = self.settings.modes.unwrap_or(self.settings.max_modes);
-        while self.fit.model.modes() < most {
+        while self.modes_in_band() < most {
             let least = if self.settings.modes.is_some() { 0.0 } else { required };
             let before = self.fit.model.modes();
             match add_best(&mut self.fit, least) {
@@ -178,21 +178,32 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Takes out roots that left the band or are damped too much for a resonance.
-    fn remove_impossible(&mut self) {
-        let (low, high) = self.lines.band();
-        let reason = |pole: Complex<f64>| {
+    /// Returns the number of modes in the band.
+    fn modes_in_band(&self) -> usize {
+        self.fit.model.poles.iter().filter(|pole| self.lines.holds(**pole)).count()
+    }
+
+    /// Takes out roots that are damped too much for a resonance, and roots outside the band that
+    /// are not worth their parameters; returns whether there were any.
+    ///
+    /// A strong mode outside the band stays: residual terms alone would bias the modes near the
+    /// edge.
+    fn remove_impossible(&mut self) -> bool {
+        let required = required_gain(self.lines);
+        let losses = removal_losses(&self.fit);
+        let reason = |(pole, loss): (&Complex<f64>, &f64)| {
             if -pole.re / pole.norm() > MAX_DAMPING {
                 Some(DropReason::TooDamped)
-            } else if pole.im < low || pole.im > high {
+            } else if !self.lines.reaches(*pole) || !self.lines.holds(*pole) && *loss < required {
                 Some(DropReason::OutsideBand)
             } else {
                 None
             }
         };
         let reasons: Vec<Option<DropReason>> =
-            self.fit.model.poles.iter().map(|pole| reason(*pole)).collect();
+            self.fit.model.poles.iter().zip(&losses).map(reason).collect();
         self.remove(&reasons);
+        reasons.iter().any(Option::is_some)
     }
 
     /// Takes out modes whose removal costs less than their parameters, until none is left.
@@ -235,9 +246,11 @@ impl<'a> Identification<'a> {
 
     /// Keeps the modes that bring most, up to a stated number.
     fn remove_beyond(&mut self, most: usize) {
-        while self.fit.model.modes() > most {
+        while self.modes_in_band() > most {
             let losses = removal_losses(&self.fit);
-            let least = (0..losses.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+            let inside = |mode: &usize| self.lines.holds(self.fit.model.poles[*mode]);
+            let least =
+                (0..losses.len()).filter(inside).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
             let Some(mode) = least else { return };
             let mut reasons = vec![None; losses.len()];
             reasons[mode] = Some(DropReason::BeyondNumber { gain: losses[mode] });
@@ -293,7 +306,7 @@ impl<'a> Identification<'a> {
     /// Takes out modes that the likelihood keeps for a reason other than a resonance.
     fn apply_rules(&mut self) {
         while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
-            let Some(covariance) = Covariance::new(&self.fit, &self.noise) else { return };
+            let Some(covariance) = self.covariance_of_all() else { return };
             let mut reasons = doubtful_modes(&self.fit, &self.noise, &covariance);
             for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
                 *reason = reason.filter(|_| !protected);
@@ -305,6 +318,21 @@ impl<'a> Identification<'a> {
             self.remove_impossible();
             self.update_noise();
         }
+    }
+
+    /// Returns the covariance of the fit. Modes outside the band that make it singular are taken
+    /// out: the band says too little of them.
+    fn covariance_of_all(&mut self) -> Option<Covariance> {
+        let covariance = Covariance::new(&self.fit, &self.noise);
+        if covariance.is_some() || self.modes_in_band() == self.fit.model.modes() {
+            return covariance;
+        }
+        let reason = |pole| (!self.lines.holds(pole)).then_some(DropReason::OutsideBand);
+        let reasons: Vec<_> = self.fit.model.poles.iter().map(|pole| reason(*pole)).collect();
+        self.remove(&reasons);
+        self.update_noise();
+        self.fit.search();
+        Covariance::new(&self.fit, &self.noise)
     }
 
     fn no_mode(&self) -> ModalError {
@@ -320,13 +348,16 @@ impl<'a> Identification<'a> {
         self.update_noise();
         self.update_noise();
         self.fit.search();
-        if self.fit.model.modes() == 0 {
-            return Err(self.no_mode());
+        while self.remove_impossible() {
+            self.update_noise();
+            self.fit.search();
         }
         let size = self.fit.model.parameters(self.lines);
-        let covariance = Covariance::new(&self.fit, &self.noise)
-            .ok_or(ModalError::Decomposition { what: "the curvature of the likelihood", size })?;
-        let stated = stated_modes(&self.fit.model.poles, &self.settings.near_hz);
+        let failed = ModalError::Decomposition { what: "the curvature of the likelihood", size };
+        let covariance = self.covariance_of_all().ok_or(failed)?;
+        let poles = &self.fit.model.poles;
+        let mut stated = stated_modes(poles, &self.settings.near_hz);
+        stated.iter_mut().zip(poles).for_each(|(stated, pole)| *stated &= self.lines.holds(*pole));
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }

@@ -86,3 +86,6 @@ pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
 /// Least noise of a sensor, relative to the root-mean-square of its output: what is below it is
 /// rounding, and data without noise would otherwise hold modes without end.
 pub const LEAST_NOISE: f64 = 1e-6;
+/// Largest distance of a pole from the band, in widths of the band, at which it may stand for a mode
+/// outside; the likelihood decides whether it is worth its parameters.
+pub const OUTSIDE_REACH: f64 = 0.5;

@@ -6,7 +6,7 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::Complex;
 
 use crate::ModalError;
-use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS};
+use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS, OUTSIDE_REACH};
 
 /// One column of the extended inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,6 +97,20 @@ impl Lines {
     pub(crate) fn band(&self) -> (f64, f64) {
         let fold = |(low, high): (f64, f64), w: &f64| (low.min(*w), high.max(*w));
         self.omega.iter().fold((f64::INFINITY, 0.0), fold)
+    }
+
+    /// Returns whether a pole lies in the band.
+    pub(crate) fn holds(&self, pole: Complex<f64>) -> bool {
+        let (low, high) = self.band();
+        pole.im >= low && pole.im <= high
+    }
+
+    /// Returns whether a pole lies in the band or so near to it that its resonance may show there
+    /// as more than a residual term.
+    pub(crate) fn reaches(&self, pole: Complex<f64>) -> bool {
+        let (low, high) = self.band();
+        let margin = OUTSIDE_REACH * (high - low);
+        pole.im > (low - margin).max(0.0) && pole.im < high + margin
     }
 
     /// Returns the amplitude of a load on a line of a block in which it acts.

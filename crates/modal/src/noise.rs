@@ -166,6 +166,10 @@ impl Noise {
     ) -> Vec<f64> {
         let of_mode = |mode: usize| {
             let (pole, shape) = (model.poles[mode], &shapes[mode]);
+            if !lines.holds(pole) {
+                // What it does in the band is smooth, as the noise of the sensors is.
+                return 0.0;
+            }
             let nearest = lines.omega.iter().map(|w| (w - pole.im).abs()).fold(f64::MAX, f64::min);
             let reach = (-pole.re).max(nearest);
             let (mut sum, mut count) = (0.0, 0.0);

@@ -226,8 +226,7 @@ pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candi
         trial.search_roughly();
         let gain = fit.cost() - trial.cost();
         let pole = trial.model.poles[fit.model.modes()];
-        let (low, high) = fit.lines.band();
-        let possible = -pole.re / pole.norm() < MAX_DAMPING && pole.im > low && pole.im < high;
+        let possible = -pole.re / pole.norm() < MAX_DAMPING && fit.lines.reaches(pole);
         log::debug!(
             "candidate {:.3} Hz, gain {:.0} by the scan, {gain:.0} after {} steps, required {required:.0}",
             pole.im / std::f64::consts::TAU,

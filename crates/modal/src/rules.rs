@@ -22,6 +22,9 @@ pub(crate) fn doubtful_modes(
 ) -> Vec<Option<DropReason>> {
     let model = &fit.model;
     let of_mode = |mode: usize| {
+        if !fit.lines.holds(model.poles[mode]) {
+            return None;
+        }
         let (_, damping, _) = natural_frequency_and_damping(model.poles[mode], mode, covariance);
         if damping.value < MIN_DAMPING_ERRORS * damping.standard_error {
             let standard_error = damping.standard_error;
@@ -40,7 +43,8 @@ pub(crate) fn doubtful_modes(
         for b in a + 1..model.modes() {
             let width = TWIN_HALF_WIDTHS * (-model.poles[a].re).max(-model.poles[b].re);
             let near = (model.poles[a].im - model.poles[b].im).abs() < width;
-            if near && reasons[a].is_none() && reasons[b].is_none() {
+            let inside = [a, b].iter().all(|mode| fit.lines.holds(model.poles[*mode]));
+            if near && inside && reasons[a].is_none() && reasons[b].is_none() {
                 let differ = differ(fit, covariance, [&shapes[a], &shapes[b]], [a, b]);
                 let (weak, strong) = if losses[a] < losses[b] { (a, b) } else { (b, a) };
                 let other_hz = model.poles[strong].norm() / TAU;

@@ -283,6 +283,20 @@ pub fn pair(outputs: usize) -> Case {
     )
 }
 
+/// Three modes with little noise and a strong one 5 % above the band.
+pub fn beyond_the_edge() -> Case {
+    let mut case = case(
+        "8x2, strong mode outside",
+        &[50.0, 110.0, 185.0, 210.0],
+        &[0.008, 0.006, 0.007, 0.01],
+        [8, 2],
+        16384,
+    );
+    case.band_hz = [20.0, 200.0];
+    case.noise = 1e-3;
+    case
+}
+
 /// Structure with `modes` modes from 20 to 400 Hz, at random distances, and random forces.
 pub fn large([outputs, inputs]: [usize; 2], samples: usize, modes: usize) -> Case {
     let mut normal = Normal::new(5);
@@ -318,6 +332,7 @@ pub fn cases() -> Vec<Case> {
         hammer(),
         pair(8),
         pair(30),
+        beyond_the_edge(),
         with("8x2, unmeasured forces 5 %", &|case| case.unmeasured = 0.05),
         with("8x2, noise 3 % on the forces", &|case| case.force_noise = 0.03),
         with("8x2, 2 s instead of 8 s", &|case| case.samples = 2048),
