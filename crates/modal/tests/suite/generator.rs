@@ -47,6 +47,8 @@ pub struct Case {
     pub unmeasured: f64,
     /// Noise of the measured forces, relative to their root-mean-square.
     pub force_noise: f64,
+    /// One record for each struck point in place of one record of all forces.
+    pub roving: bool,
 }
 
 /// Draws standard normal numbers.
@@ -129,11 +131,7 @@ impl Case {
         let mut normal = Normal::new(seed);
         let period = 4 * self.samples;
         let sampling = Sampling::from_rate_hz(self.rate_hz, period).unwrap();
-        let inputs = self.participation[0].len();
-        let forces = match self.excitation {
-            Excitation::Random => self.random_lines(&mut normal, sampling, inputs),
-            Excitation::Hammer { hits } => self.hits(&mut normal, sampling, hits),
-        };
+        let forces = self.forces(&mut normal, sampling);
         let hidden = self.hidden(&mut normal);
         let disturbance = self.random_lines(&mut normal, sampling, 2);
         let mut motion = DMatrix::zeros(sampling.lines(), self.shape[0].len());
@@ -166,8 +164,26 @@ impl Case {
         (noisy(forces, self.force_noise, &mut normal), motion)
     }
 
-    /// Returns the lines of one record in the band.
+    fn forces(&self, normal: &mut Normal, sampling: Sampling) -> DMatrix<C> {
+        match self.excitation {
+            Excitation::Random => self.random_lines(normal, sampling, self.participation[0].len()),
+            Excitation::Hammer { hits } => self.hits(normal, sampling, hits),
+        }
+    }
+
+    /// Returns the participations of the unmeasured forces of a record.
+    pub fn hidden_participation(&self, seed: u64) -> Vec<Vec<f64>> {
+        let mut normal = Normal::new(seed);
+        let sampling = Sampling::from_rate_hz(self.rate_hz, 4 * self.samples).unwrap();
+        self.forces(&mut normal, sampling);
+        self.hidden(&mut normal)
+    }
+
+    /// Returns the lines of one record in the band, or of one record for each struck point.
     pub fn lines(&self, seed: u64) -> LineData {
+        if self.roving {
+            return self.roving_lines(seed);
+        }
         let (forces, motion) = self.record(seed);
         LineData::from_open_record(Some(&forces), &motion, self.band_hz).unwrap()
     }
@@ -254,6 +270,7 @@ fn case(
         colour: 0.5,
         unmeasured: 0.0,
         force_noise: 0.0,
+        roving: false,
     }
 }
 
@@ -330,6 +347,7 @@ pub fn cases() -> Vec<Case> {
     vec![
         one_by_one(),
         hammer(),
+        roving(12),
         pair(8),
         pair(30),
         beyond_the_edge(),
@@ -346,6 +364,7 @@ pub fn roving(points: usize) -> Case {
     let mut normal = Normal::new(7);
     case.name = "1 accelerometer, roving hammer";
     case.samples = 4096;
+    case.roving = true;
     for (shape, participation) in case.shape.iter_mut().zip(&mut case.participation) {
         *participation = (0..points).map(|_| 0.4 + normal.uniform()).collect();
         *shape = vec![C::from(participation[0])];
@@ -354,15 +373,22 @@ pub fn roving(points: usize) -> Case {
 }
 
 impl Case {
+    /// Returns the test of one struck point.
+    pub fn at_point(&self, point: usize) -> Self {
+        let participation = self.participation.iter().map(|all| vec![all[point]]).collect();
+        Self { participation, roving: false, ..self.clone() }
+    }
+
+    /// Returns the seed of the record of a struck point.
+    pub fn seed_at(&self, seed: u64, point: usize) -> u64 {
+        100 * seed + point as u64
+    }
+
     /// Returns one record for each struck point, stacked; the other inputs are zero in it.
-    pub fn roving_lines(&self, seed: u64) -> LineData {
+    fn roving_lines(&self, seed: u64) -> LineData {
         let points = self.participation[0].len();
         let of_point = |point: usize| {
-            let mut one = self.clone();
-            for participation in &mut one.participation {
-                *participation = vec![participation[point]];
-            }
-            let (force, motion) = one.record(100 * seed + point as u64);
+            let (force, motion) = self.at_point(point).record(self.seed_at(seed, point));
             let mut forces = DMatrix::zeros(force.len(), points);
             forces.column_mut(point).copy_from(&force.data().column(0));
             let forces = Record::new(force.sampling(), forces).unwrap();

@@ -5,7 +5,11 @@ use std::ops::Range;
 
 use mechid_modal::{IdentifiedMode, ModalSettings, identify_modes};
 
+use nalgebra::Complex;
+
 use crate::generator::Case;
+
+type C = Complex<f64>;
 
 /// Errors and standard errors of one quantity: `[mode][record]`.
 #[derive(Debug, Clone, Default)]
@@ -27,6 +31,11 @@ impl Errors {
     /// Returns bias over scatter of each mode.
     pub fn bias(&self) -> Vec<f64> {
         self.each(|mean, scatter, _| mean / scatter)
+    }
+
+    /// Returns the standard deviation of the errors of each mode.
+    pub fn deviation(&self) -> Vec<f64> {
+        self.each(|_, scatter, _| scatter)
     }
 
     fn each(&self, value: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
@@ -59,6 +68,11 @@ pub struct Score {
 impl Score {
     /// Identifies the records of `seeds` and compares with the truth.
     pub fn of(case: &Case, seeds: Range<u64>) -> Self {
+        Self::with(case, seeds, &ModalSettings::default())
+    }
+
+    /// Identifies the records of `seeds` with some settings and compares with the truth.
+    pub fn with(case: &Case, seeds: Range<u64>, settings: &ModalSettings) -> Self {
         let modes = case.in_band();
         let mut score = Self::default();
         score.frequency.0 = vec![Vec::new(); modes.len()];
@@ -66,7 +80,7 @@ impl Score {
         for seed in seeds {
             score.records += 1;
             score.wanted += modes.len();
-            let Ok(estimate) = identify_modes(&case.lines(seed), &ModalSettings::default()) else {
+            let Ok(estimate) = identify_modes(&case.lines(seed), settings) else {
                 score.refused += 1;
                 continue;
             };
@@ -107,15 +121,32 @@ impl Score {
         let (f, z) = (mode.natural_frequency_hz, mode.damping_ratio);
         self.frequency.0[place].push((f.value - case.frequency_hz[truth], f.standard_error));
         self.damping.0[place].push((z.value - case.damping[truth], z.standard_error));
+        if case.roving {
+            // The residues at the struck points are the shape.
+            let scale = C::new(0.0, 2.0 * case.poles()[truth].im);
+            let residue = |participation: &f64| case.shape[truth][0] * *participation / scale;
+            let s = case.poles()[truth];
+            let values = case.participation[truth].iter().map(|p| residue(p) * s * s);
+            let pairs = mode.participation.iter().zip(&mode.participation_standard_error);
+            for ((value, spread), truth) in pairs.zip(values) {
+                self.add_shape(value - truth, *spread);
+            }
+            return;
+        }
         let largest = mode.shape.iter().position(|value| (value - 1.0).norm() < 1e-12).unwrap_or(0);
         let shape = &case.shape[truth];
         for (output, value) in mode.shape.iter().enumerate().filter(|(k, _)| *k != largest) {
-            let error = value - shape[output] / shape[largest];
-            let spread = mode.shape_standard_error[output];
-            self.shape_count += 2;
-            self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re);
-            self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im);
+            self.add_shape(
+                value - shape[output] / shape[largest],
+                mode.shape_standard_error[output],
+            );
         }
+    }
+
+    fn add_shape(&mut self, error: C, spread: C) {
+        self.shape_count += 2;
+        self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re);
+        self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im);
     }
 
     /// Returns the percentage of 95 % intervals of shapes that hold the truth.

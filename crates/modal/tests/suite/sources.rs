@@ -46,7 +46,7 @@ fn free_decay_without_forces() {
 #[test]
 fn one_accelerometer_and_a_roving_hammer_give_shapes_and_masses() {
     let case = roving(5);
-    let estimate = identify_modes(&case.roving_lines(1), &ModalSettings::default()).unwrap();
+    let estimate = identify_modes(&case.lines(1), &ModalSettings::default()).unwrap();
     let deviation = largest_deviation(&case, &estimate);
     assert!(deviation < BOUND, "{deviation}");
     for (mode, truth) in estimate.modes().iter().zip(&case.participation) {
