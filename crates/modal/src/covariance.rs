@@ -9,11 +9,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2};
 use rayon::prelude::*;
 
 use crate::dense::transposed_product;
 use crate::lines::{Block, Lines};
+use crate::mode_parameters::ModeParameters;
 use crate::model::Model;
 use crate::noise::{Noise, noise_window};
 use crate::normal::{
@@ -134,38 +135,58 @@ impl Covariance {
         &by_reference * sum * by_reference.transpose()
     }
 
-    /// Returns the covariance of real and imaginary part of a participation times the shape's entry
-    /// `reference`.
-    pub(crate) fn of_participation(
-        &self,
-        fit: &Fit<'_>,
-        mode: usize,
-        reference: usize,
-        input: usize,
-        entry: C,
-        level: f64,
-    ) -> DMatrix<f64> {
-        let value = fit.model.participation[mode][input];
-        let by_value = rotation(value);
-        let mut response = &by_value * self.response_of_unknowns(mode, reference) * -level;
-        if input != fit.model.gauge[mode] {
-            let pair = fit.model.pair_of(mode, input, fit.lines.loads.len());
-            let mut own = response.columns_mut(2 * pair, 2);
-            own += rotation(entry);
+    /// Returns pole, shape and participations of a mode with their joint covariance.
+    ///
+    /// To first order the shape of output i is A⁺ times its noise − B_i dθ, and an unmeasured force
+    /// on the mode itself turns and scales all its entries alike.
+    pub(crate) fn of_mode(&self, fit: &Fit<'_>, mode: usize, shape: &[C]) -> ModeParameters {
+        let (model, levels) = (&fit.model, &fit.weights.level);
+        let (outputs, inputs, loads) = (shape.len(), fit.lines.inputs(), fit.lines.loads.len());
+        let (size, gauge) = (2 + 2 * outputs + 2 * inputs, model.gauge[mode]);
+        let mut values = DVector::zeros(size);
+        let mut response = DMatrix::zeros(size, self.scale.len());
+        let mut own = DMatrix::zeros(size, size);
+        // Response to the common factor that the mode's own unmeasured force puts on the shape.
+        let mut common = DMatrix::zeros(size, 2);
+        let mut cross = DMatrix::zeros(size, self.scale.len());
+        let pole = model.poles[mode];
+        (values[0], values[1]) = ((-pole.re).ln(), pole.im.ln());
+        (response[(0, 2 * mode)], response[(1, 2 * mode + 1)]) = (1.0, 1.0);
+        for (output, value) in shape.iter().enumerate() {
+            let at = ModeParameters::shape_index(output);
+            let level = levels[output];
+            let direction = value / level;
+            (values[at], values[at + 1]) = (value.re, value.im);
+            let followed = self.response_of_unknowns(mode, output) * -level;
+            response.rows_mut(at, 2).copy_from(&followed);
+            let noise = self.own[output].view((2 * mode, 2 * mode), (2, 2)) * level.powi(2);
+            own.view_mut((at, at), (2, 2)).copy_from(&noise);
+            common.rows_mut(at, 2).copy_from(&(rotation(direction) * level));
+            let with_score = self.process[mode].cross.map(|value| (value * direction).re * level);
+            cross.rows_mut(at, 2).copy_from(&with_score);
         }
-        let outputs = self.own.len();
-        let part = |row: usize| self.shapes[row * outputs + reference];
-        let direction = C::new(part(2 * mode), part(2 * mode + 1));
-        let effect = &self.process[mode];
-        let own = self.own[reference].view((2 * mode, 2 * mode), (2, 2))
-            + &effect.own * direction.norm_sqr();
-        let cross = effect.cross.map(|value| (value * direction).re);
-        let by_value = by_value * level;
-        let between = &by_value * cross * &self.inverse * response.transpose();
-        &by_value * own * by_value.transpose()
-            + &response * &self.parameters * response.transpose()
+        for input in 0..inputs {
+            let at = 2 + 2 * outputs + 2 * input;
+            let value = model.participation[mode][input];
+            (values[at], values[at + 1]) = (value.re, value.im);
+            if input != gauge {
+                let pair = 2 * model.pair_of(mode, input, loads);
+                (response[(at, pair)], response[(at + 1, pair + 1)]) = (1.0, 1.0);
+            }
+        }
+        let between = cross * &self.inverse * response.transpose();
+        let covariance = &response * &self.parameters * response.transpose()
+            + own
+            + &common * &self.process[mode].own * common.transpose()
             + &between
-            + between.transpose()
+            + between.transpose();
+        let degrees_of_freedom = self.degrees_of_freedom;
+        ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
+    }
+
+    /// Returns the covariance of ln(−Re λ) and ln Im λ of a mode.
+    pub(crate) fn of_pole(&self, mode: usize) -> Matrix2<f64> {
+        self.parameters.fixed_view::<2, 2>(2 * mode, 2 * mode).into_owned()
     }
 }
 

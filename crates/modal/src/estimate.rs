@@ -1,13 +1,18 @@
 //! The identified modes of a record, and what they predict.
 
+use mechid_numerics::Uncertain;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
 use crate::ModalError;
+use crate::compare::{ComparedMode, Comparison, Measured, PairingRule, compare};
+use crate::constraint::{self, ConstraintTest, ModalConstraint};
 use crate::covariance::Covariance;
+use crate::indicators::IndicatorError;
 use crate::lines::Lines;
 use crate::mode::{DroppedCandidate, IdentifiedMode};
+use crate::mode_parameters::ModeParameters;
 use crate::model::ResidualPowers;
 use crate::noise::{Noise, shapes};
 use crate::order::removal_losses;
@@ -21,6 +26,9 @@ type C = Complex<f64>;
 #[derive(Debug, Clone)]
 pub struct ModalEstimate {
     modes: Vec<IdentifiedMode>,
+    /// Parameters of `modes` with their joint covariances.
+    parameters: Vec<ModeParameters>,
+    constraint_tests: Vec<ConstraintTest>,
     /// Modes of the model that were not asked for.
     others: Vec<IdentifiedMode>,
     dropped: Vec<DroppedCandidate>,
@@ -43,14 +51,25 @@ impl ModalEstimate {
         covariance: &Covariance,
         dropped: Vec<DroppedCandidate>,
         stated: &[bool],
+        constraints: &[ModalConstraint],
     ) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
         let gains = removal_losses(fit);
-        let identified =
-            |mode: usize| identified_mode(fit, noise, covariance, &shapes[mode], mode, gains[mode]);
         let (asked, rest): (Vec<usize>, Vec<usize>) =
             (0..model.modes()).partition(|mode| stated[*mode]);
+        let parameters = |mode: usize| covariance.of_mode(fit, mode, &shapes[mode]);
+        let constrained = |(index, &mode): (usize, &usize)| {
+            let free = parameters(mode);
+            let tests = constraint::test(constraints, &free, index);
+            let imposed = constraint::impose(constraints, &free).map(|(_, _, mode)| mode);
+            let parameters = imposed.unwrap_or(free);
+            let identified = identified_mode(fit, noise, &parameters, mode, gains[mode]);
+            (identified, (parameters, tests))
+        };
+        let (modes, (parameters_of_modes, tests)): (Vec<_>, (Vec<_>, Vec<_>)) =
+            asked.par_iter().enumerate().map(constrained).unzip();
+        let other = |mode| identified_mode(fit, noise, &parameters(mode), mode, gains[mode]);
         let columns = model.residual_columns(lines);
         let inputs = lines.inputs();
         let residuals = (0..lines.outputs.len())
@@ -61,8 +80,10 @@ impl ModalEstimate {
             .collect();
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
-            modes: asked.into_par_iter().map(identified).collect(),
-            others: rest.into_par_iter().map(identified).collect(),
+            modes,
+            parameters: parameters_of_modes,
+            constraint_tests: tests.concat(),
+            others: rest.into_par_iter().map(other).collect(),
             dropped,
             powers: model.powers.clone(),
             reference: model.reference,
@@ -79,6 +100,38 @@ impl ModalEstimate {
     /// Returns the modes, by rising frequency.
     pub fn modes(&self) -> &[IdentifiedMode] {
         &self.modes
+    }
+
+    /// Returns the modes with the joint covariance of their shapes, for comparisons.
+    pub fn compared_modes(&self) -> Vec<ComparedMode> {
+        let measured = |value: Uncertain| Measured {
+            value: value.value,
+            standard_error: value.standard_error,
+        };
+        let compared = |(mode, parameters): (&IdentifiedMode, &ModeParameters)| {
+            let shape = parameters.shape_with_covariance()?;
+            Some(ComparedMode {
+                natural_frequency_hz: measured(mode.natural_frequency_hz),
+                damping_ratio: Some(measured(mode.damping_ratio)),
+                shape,
+            })
+        };
+        self.modes.iter().zip(&self.parameters).filter_map(compared).collect()
+    }
+
+    /// Compares these modes with those of another record, or of another part of the same record:
+    /// what a structure that changes, warms up or comes loose does to each mode, with p-values.
+    ///
+    /// # Errors
+    /// [`IndicatorError::Size`] if the numbers of outputs differ.
+    pub fn changes_to(&self, other: &Self) -> Result<Comparison, IndicatorError> {
+        compare(&self.compared_modes(), &other.compared_modes(), PairingRule::default())
+    }
+
+    /// Returns the test of each constraint of the settings on each mode, against the fit without
+    /// constraints.
+    pub fn constraint_tests(&self) -> &[ConstraintTest] {
+        &self.constraint_tests
     }
 
     /// Returns the candidates that are no modes of the result, with the reason.

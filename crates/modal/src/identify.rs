@@ -6,6 +6,7 @@ use mechid_spectra::LineData;
 use nalgebra::Complex;
 
 use crate::ModalError;
+use crate::constraint::ModalConstraint;
 use crate::covariance::Covariance;
 use crate::estimate::ModalEstimate;
 use crate::initial_poles::initial_poles;
@@ -34,6 +35,9 @@ pub struct ModalSettings {
     pub unmeasured_forces: bool,
     /// Powers of jω for what lies outside the band; `None` chooses them by the data.
     pub residual_powers: Option<ResidualPowers>,
+    /// Constraints that the modes meet; each is also tested alone
+    /// ([`ModalEstimate::constraint_tests`]).
+    pub constraints: Vec<ModalConstraint>,
 }
 
 impl Default for ModalSettings {
@@ -44,6 +48,7 @@ impl Default for ModalSettings {
             max_modes: 100,
             unmeasured_forces: true,
             residual_powers: None,
+            constraints: Vec::new(),
         }
     }
 }
@@ -67,6 +72,9 @@ pub fn identify_modes(
     check_settings(settings)?;
     let lines = Lines::new(data);
     lines.check()?;
+    for constraint in &settings.constraints {
+        constraint.check(lines.outputs.len(), lines.inputs())?;
+    }
     let mut search = Identification::start(&lines, settings)?;
     search.choose_modes();
     search.choose_powers();
@@ -361,7 +369,9 @@ impl<'a> Identification<'a> {
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
-        Ok(ModalEstimate::new(&self.fit, &self.noise, &covariance, self.dropped, &stated))
+        let constraints = &self.settings.constraints;
+        let (fit, noise) = (&self.fit, &self.noise);
+        Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))
     }
 }
 

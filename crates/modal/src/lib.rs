@@ -14,12 +14,14 @@
 //! | first poles (subspace method, clusters over orders) | `initial_poles.rs` |
 //! | first participations (free residues) | `residues.rs` |
 //! | sensor noise and unmeasured forces | `noise.rs`, `unmeasured.rs` |
-//! | covariance of poles, participations and shapes | `covariance.rs`, `scores.rs` |
+//! | covariance of poles, participations and shapes | `covariance.rs`, `scores.rs`, `mode_parameters.rs` |
+//! | real shapes, reciprocity | `constraint.rs` |
 //! | number of modes: candidates, likelihood, rules | `order.rs`, `rules.rs` |
 //! | prediction of other records | `estimate.rs`, `synthesis.rs` |
 
 pub mod ambient;
 pub mod compare;
+mod constraint;
 mod covariance;
 mod decomposition;
 mod dense;
@@ -32,6 +34,7 @@ mod initial_poles;
 mod limits;
 mod lines;
 mod mode;
+mod mode_parameters;
 mod model;
 mod noise;
 mod normal;
@@ -49,6 +52,7 @@ mod unmeasured;
 
 pub use mechid_numerics::Uncertain;
 
+pub use constraint::{ConstraintTest, DrivingPoint, ModalConstraint};
 pub use error::ModalError;
 pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};

@@ -89,3 +89,9 @@ pub const LEAST_NOISE: f64 = 1e-6;
 /// Largest distance of a pole from the band, in widths of the band, at which it may stand for a mode
 /// outside; the likelihood decides whether it is worth its parameters.
 pub const OUTSIDE_REACH: f64 = 0.5;
+/// Number of steps to the estimate that meets a constraint: its equations are nearly linear over a
+/// standard error, so that the second step is exact to a few digits.
+pub const CONSTRAINT_STEPS: usize = 4;
+/// Eigenvalue of the covariance of a constraint's equations, over the largest, at or below which an
+/// equation follows from the others.
+pub const DEPENDENT_EQUATION: f64 = 1e-9;

@@ -10,8 +10,9 @@ use crate::limits::{
     DIFFERENCE_PROBABILITY, MAX_UNMEASURED_RATIO, MIN_DAMPING_ERRORS, TWIN_HALF_WIDTHS,
 };
 use crate::mode::DropReason;
+use crate::mode_parameters::natural_frequency_and_damping;
 use crate::noise::{Noise, shapes};
-use crate::results::{natural_frequency_and_damping, unmeasured_ratio};
+use crate::results::unmeasured_ratio;
 use crate::search::Fit;
 
 /// Returns, for each mode, the reason to take it out, if there is one.
@@ -25,7 +26,11 @@ pub(crate) fn doubtful_modes(
         if !fit.lines.holds(model.poles[mode]) {
             return None;
         }
-        let (_, damping, _) = natural_frequency_and_damping(model.poles[mode], mode, covariance);
+        let (_, damping, _) = natural_frequency_and_damping(
+            model.poles[mode],
+            &covariance.of_pole(mode),
+            covariance.degrees_of_freedom,
+        );
         if damping.value < MIN_DAMPING_ERRORS * damping.standard_error {
             let standard_error = damping.standard_error;
             return Some(DropReason::UndeterminedDamping { standard_error });

@@ -13,7 +13,7 @@ mod score;
 
 use std::time::Instant;
 
-use mechid_modal::ModalSettings;
+use mechid_modal::{DrivingPoint, ModalConstraint, ModalSettings};
 
 use bound::Bound;
 use generator::Case;
@@ -45,9 +45,20 @@ fn main() {
     );
     let all = ModalSettings::default();
     let sensors = ModalSettings { unmeasured_forces: false, ..all.clone() };
+    let points = [(0, 0), (3, 1)].map(|(output, input)| DrivingPoint { output, input });
+    let known = ModalSettings {
+        constraints: vec![
+            ModalConstraint::RealShapes { derivative: 2 },
+            ModalConstraint::Reciprocity { points: points.to_vec() },
+        ],
+        ..all.clone()
+    };
     for case in generator::cases() {
         if case.name.contains(&wanted) {
             print_row(case.name, &case, first..first + seeds, &all);
+            if case.name.contains("reciprocal") {
+                print_row("  the same, constraints imposed", &case, first..first + seeds, &known);
+            }
             if case.unmeasured > 0.0 {
                 print_row("  the same, sensor noise only", &case, first..first + seeds, &sensors);
             }
@@ -88,4 +99,8 @@ fn print_row(name: &str, case: &Case, seeds: std::ops::Range<u64>, settings: &Mo
         score.refused,
         seconds,
     );
+    let [tests, rejected] = score.tests;
+    if tests > 0 {
+        println!("  {tests} tests of constraints, {rejected} reject at 5 %");
+    }
 }

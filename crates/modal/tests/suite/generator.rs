@@ -314,6 +314,19 @@ pub fn beyond_the_edge() -> Case {
     case
 }
 
+/// Two forces that act where accelerometers 0 and 3 stand, on a structure with real shapes.
+pub fn reciprocal() -> Case {
+    let mut case = pair(8);
+    case.name = "8x2, real and reciprocal";
+    for (shape, participation) in case.shape.iter_mut().zip(&mut case.participation) {
+        // No force acts on a node.
+        for (point, value) in [0, 3].into_iter().zip(&*participation) {
+            shape[point] = C::from(*value);
+        }
+    }
+    case
+}
+
 /// Structure with `modes` modes from 20 to 400 Hz, at random distances, and random forces.
 pub fn large([outputs, inputs]: [usize; 2], samples: usize, modes: usize) -> Case {
     let mut normal = Normal::new(5);
@@ -350,6 +363,7 @@ pub fn cases() -> Vec<Case> {
         roving(12),
         pair(8),
         pair(30),
+        reciprocal(),
         beyond_the_edge(),
         with("8x2, unmeasured forces 5 %", &|case| case.unmeasured = 0.05),
         with("8x2, noise 3 % on the forces", &|case| case.force_noise = 0.03),

@@ -2,6 +2,7 @@
 
 mod ambient;
 mod ambient_generator;
+mod constraints;
 mod forced;
 mod generator;
 mod refusals;

@@ -33,6 +33,11 @@ impl Errors {
         self.each(|mean, scatter, _| mean / scatter)
     }
 
+    /// Returns the root-mean-square standard error of each mode.
+    pub fn standard_error(&self) -> Vec<f64> {
+        self.each(|_, _, spread| spread)
+    }
+
     /// Returns the standard deviation of the errors of each mode.
     pub fn deviation(&self) -> Vec<f64> {
         self.each(|_, scatter, _| scatter)
@@ -63,6 +68,8 @@ pub struct Score {
     pub false_modes: usize,
     /// Records that were refused.
     pub refused: usize,
+    /// Tests of constraints, and those that reject at 5 %.
+    pub tests: [usize; 2],
 }
 
 impl Score {
@@ -84,6 +91,10 @@ impl Score {
                 score.refused += 1;
                 continue;
             };
+            for test in estimate.constraint_tests() {
+                score.tests[0] += 1;
+                score.tests[1] += usize::from(test.p_value < 0.05);
+            }
             let pairs = score.pair(case, &modes, estimate.modes());
             score.false_modes += estimate.modes().len() - pairs.len();
             score.found += pairs.len();
@@ -144,9 +155,11 @@ impl Score {
     }
 
     fn add_shape(&mut self, error: C, spread: C) {
+        // What a constraint fixes has no error but rounding.
+        const ROUNDING: f64 = 1e-9;
         self.shape_count += 2;
-        self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re);
-        self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im);
+        self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re + ROUNDING);
+        self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im + ROUNDING);
     }
 
     /// Returns the percentage of 95 % intervals of shapes that hold the truth.

@@ -1,0 +1,224 @@
+//! Errors of the usual tools over those of maximum likelihood, on the same records.
+//!
+//! `cargo run --release -p mechid-modal --example modal_rivals -- SEEDS` compares root-mean-square
+//! errors of f and ζ, mode by mode:
+//!
+//! - random forces: responses by H1 from Hann-windowed segments with half of each in the next one,
+//!   then pLSCF, at the best of three lengths of segments;
+//! - hits: blocks from every hit on, with an exponential window whose damping is taken off again, H1
+//!   over the hits, then pLSCF, at the best of four windows.
+//!
+//! The usual tools are helped: their poles are chosen with the truth in hand, the cluster nearest to
+//! each true pole, and the best setting is chosen mode by mode by the errors themselves.
+#![allow(clippy::print_stdout, reason = "a study prints its table")]
+
+#[allow(dead_code, reason = "the other study uses the rest")]
+#[path = "../../tests/suite/generator.rs"]
+mod generator;
+
+use std::f64::consts::TAU;
+
+use mechid_modal::plscf::{ResponseTable, plscf};
+use mechid_modal::{ModalSettings, identify_modes};
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use generator::{Case, Excitation};
+
+type C = Complex<f64>;
+
+/// Damping ratio above which a pole of the usual tools is not one of a mode.
+const MAX_DAMPING: f64 = 0.2;
+
+fn main() {
+    let seeds: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);
+    for case in
+        [generator::one_by_one(), generator::pair(8), generator::pair(30), generator::hammer()]
+    {
+        compare(&case, seeds);
+    }
+}
+
+/// Prints one line for each mode of a case.
+fn compare(case: &Case, seeds: u64) {
+    let settings = case.settings();
+    let modes = case.in_band();
+    let mut own = vec![Squares::default(); modes.len()];
+    let mut usual = vec![vec![Squares::default(); modes.len()]; settings.len()];
+    for seed in 0..seeds {
+        let estimate = identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();
+        let poles: Vec<C> = estimate.modes().iter().map(|mode| mode.pole).collect();
+        add(case, &modes, &poles, &mut own);
+        let (forces, motion) = case.record(seed);
+        for (setting, squares) in settings.iter().zip(&mut usual) {
+            add(case, &modes, &setting.poles(case, &forces, &motion), squares);
+        }
+    }
+    println!(
+        "{}, {seeds} records: RMS errors of the usual tool over those of identify_modes",
+        case.name
+    );
+    // All modes together: each error over the half-width of its mode, at the best setting of all.
+    let widths: Vec<f64> =
+        modes.iter().map(|mode| case.damping[*mode] * case.frequency_hz[*mode]).collect();
+    let pooled = |squares: &[Squares]| {
+        let f = squares.iter().zip(&widths).map(|(s, width)| (s.frequency() / width).powi(2));
+        let dampings = modes.iter().map(|mode| case.damping[*mode]);
+        let z = squares.iter().zip(dampings).map(|(s, z)| (s.damping() / z).powi(2));
+        [f.sum::<f64>().sqrt(), z.sum::<f64>().sqrt()]
+    };
+    let ours = pooled(&own);
+    let best = usual.iter().map(|squares| pooled(squares));
+    let best = best.fold([f64::INFINITY; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
+    println!("   all       f {:7.1}  zeta {:7.1}", best[0] / ours[0], best[1] / ours[1]);
+    for (k, mode) in modes.iter().enumerate() {
+        let best = |part: fn(&Squares) -> f64| {
+            let values = usual.iter().map(|squares| part(&squares[k]));
+            values.fold(f64::INFINITY, f64::min) / part(&own[k])
+        };
+        println!(
+            "{:8.1} Hz  f {:7.1}  zeta {:7.1}   (ours: f {:.1e} Hz, zeta {:.3} %; missed {} of {})",
+            case.frequency_hz[*mode],
+            best(Squares::frequency),
+            best(Squares::damping),
+            own[k].frequency(),
+            100.0 * own[k].damping() / case.damping[*mode],
+            seeds as usize - usual.iter().map(|squares| squares[k].count).max().unwrap_or(0),
+            seeds,
+        );
+    }
+}
+
+/// Sums of squared errors.
+#[derive(Debug, Clone, Copy, Default)]
+struct Squares {
+    frequency: f64,
+    damping: f64,
+    count: usize,
+}
+
+impl Squares {
+    fn frequency(&self) -> f64 {
+        (self.frequency / self.count as f64).sqrt()
+    }
+
+    fn damping(&self) -> f64 {
+        (self.damping / self.count as f64).sqrt()
+    }
+}
+
+/// Adds the errors of the poles nearest to the true ones, each used once, within five half-widths.
+fn add(case: &Case, modes: &[usize], poles: &[C], squares: &mut [Squares]) {
+    let mut rest = poles.to_vec();
+    for (mode, square) in modes.iter().zip(squares) {
+        let truth = case.poles()[*mode];
+        let distance = |pole: &C| (pole - truth).norm() / -truth.re;
+        let nearest =
+            (0..rest.len()).min_by(|a, b| distance(&rest[*a]).total_cmp(&distance(&rest[*b])));
+        if let Some(pole) =
+            nearest.filter(|k| distance(&rest[*k]) < 5.0).map(|k| rest.swap_remove(k))
+        {
+            let size = pole.norm();
+            square.frequency += (size / TAU - case.frequency_hz[*mode]).powi(2);
+            square.damping += (-pole.re / size - case.damping[*mode]).powi(2);
+            square.count += 1;
+        }
+    }
+}
+
+/// Way to frequency responses of the usual tools.
+enum Setting {
+    /// Hann-windowed segments of a length in samples.
+    Hann(usize),
+    /// Blocks of a length in samples from each hit, and what the exponential window leaves at the end.
+    Exponential(usize, f64),
+}
+
+impl Case {
+    fn settings(&self) -> Vec<Setting> {
+        match self.excitation {
+            Excitation::Random => {
+                vec![Setting::Hann(1024), Setting::Hann(2048), Setting::Hann(4096)]
+            }
+            Excitation::Hammer { .. } => {
+                let ends = [0.01, 0.1, 0.5, 1.0].into_iter();
+                ends.map(|end| Setting::Exponential(800, end)).collect()
+            }
+        }
+    }
+}
+
+impl Setting {
+    /// Returns the clusters of poles of all orders.
+    fn poles(&self, case: &Case, forces: &Record, motion: &Record) -> Vec<C> {
+        let (starts, len, decay) = match *self {
+            Self::Hann(len) => (
+                (0..).map(|k| k * len / 2).take_while(|k| k + len <= case.samples).collect(),
+                len,
+                0.0,
+            ),
+            Self::Exponential(len, end) => {
+                (hits(forces, len), len, -f64::ln(end) / (len as f64 / case.rate_hz))
+            }
+        };
+        let window = |k: usize| match self {
+            Self::Hann(len) => (std::f64::consts::PI * k as f64 / *len as f64).sin().powi(2),
+            Self::Exponential(..) => (-decay * k as f64 / case.rate_hz).exp(),
+        };
+        let table = responses(case, [forces, motion], &starts, len, window);
+        let orders: Vec<usize> = (4..=40).step_by(2).collect();
+        let Ok(models) = plscf(&table, &orders) else { return Vec::new() };
+        let clusters = models.clusters(MAX_DAMPING, 0.2);
+        clusters.iter().map(|cluster| cluster.pole.pole + decay).collect()
+    }
+}
+
+/// Returns the starts of blocks, a few samples before each hit.
+fn hits(forces: &Record, len: usize) -> Vec<usize> {
+    let force = forces.channel(0);
+    let largest = force.iter().copied().fold(0.0, f64::max);
+    let mut starts: Vec<usize> = Vec::new();
+    for (k, value) in force.iter().enumerate() {
+        let is_new = starts.last().is_none_or(|last| k > last + len);
+        if *value > 0.2 * largest && is_new && k >= 5 && k - 5 + len <= force.len() {
+            starts.push(k - 5);
+        }
+    }
+    starts
+}
+
+/// Returns the responses by H1 in the band.
+fn responses(
+    case: &Case,
+    [forces, motion]: [&Record; 2],
+    starts: &[usize],
+    len: usize,
+    window: impl Fn(usize) -> f64,
+) -> ResponseTable {
+    let lines = |record: &Record, start: usize| {
+        let part = record.window(start, len).unwrap();
+        let mut data = part.data().clone();
+        for (k, mut row) in data.row_iter_mut().enumerate() {
+            row *= window(k);
+        }
+        Spectrum::of(&Record::new(part.sampling(), data).unwrap()).lines().clone()
+    };
+    let spacing = case.rate_hz / len as f64;
+    let first = (case.band_hz[0] / spacing).ceil() as usize;
+    let last = (case.band_hz[1] / spacing).floor() as usize;
+    let (inputs, outputs) = (forces.channels(), motion.channels());
+    let mut power = vec![DMatrix::<C>::zeros(inputs, inputs); last - first + 1];
+    let mut cross = vec![DMatrix::<C>::zeros(outputs, inputs); last - first + 1];
+    for &start in starts {
+        let (f, y) = (lines(forces, start), lines(motion, start));
+        for line in first..=last {
+            let (f, y) = (f.row(line).transpose(), y.row(line).transpose());
+            power[line - first] += &f * f.adjoint();
+            cross[line - first] += &y * f.adjoint();
+        }
+    }
+    let omega = (first..=last).map(|line| TAU * spacing * line as f64).collect();
+    let responses = power.into_iter().zip(cross);
+    let responses = responses.map(|(power, cross)| cross * power.try_inverse().unwrap()).collect();
+    ResponseTable::new(omega, responses).unwrap()
+}

@@ -1,0 +1,155 @@
+//! Pole, shape and participations of one mode with their joint covariance, and the numbers that are
+//! derived from them.
+
+use std::f64::consts::TAU;
+
+use mechid_numerics::Uncertain;
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
+
+use crate::indicators::ShapeWithCovariance;
+use crate::mode::IdentifiedMode;
+
+type C = Complex<f64>;
+
+/// Parameters of one mode: ln(−Re λ), ln Im λ, real and imaginary part of each entry of the shape
+/// (in the units of the outputs), then of the participation of each input.
+#[derive(Debug, Clone)]
+pub(crate) struct ModeParameters {
+    pub(crate) outputs: usize,
+    pub(crate) inputs: usize,
+    /// Load whose participation is 1; beyond the inputs if it is a transient.
+    pub(crate) gauge: usize,
+    pub(crate) values: DVector<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) degrees_of_freedom: usize,
+}
+
+impl ModeParameters {
+    /// Returns the index of the first parameter of an entry of the shape.
+    pub(crate) fn shape_index(output: usize) -> usize {
+        2 + 2 * output
+    }
+
+    /// Returns the index of the first parameter of a participation.
+    pub(crate) fn participation_index(&self, input: usize) -> usize {
+        2 + 2 * self.outputs + 2 * input
+    }
+
+    fn complex(&self, index: usize) -> C {
+        C::new(self.values[index], self.values[index + 1])
+    }
+
+    /// Returns the pole, in rad/s.
+    pub(crate) fn pole(&self) -> C {
+        C::new(-self.values[0].exp(), self.values[1].exp())
+    }
+
+    /// Returns an entry of the shape.
+    pub(crate) fn shape(&self, output: usize) -> C {
+        self.complex(Self::shape_index(output))
+    }
+
+    /// Returns a participation.
+    pub(crate) fn participation(&self, input: usize) -> C {
+        self.complex(self.participation_index(input))
+    }
+
+    /// Returns the input that fixes the phase of the forces: the gauge, or the strongest input of a
+    /// mode whose gauge is a transient.
+    pub(crate) fn phase_input(&self) -> usize {
+        if self.gauge < self.inputs {
+            return self.gauge;
+        }
+        let size = |input: &usize| self.participation(*input).norm();
+        (0..self.inputs).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
+    }
+
+    fn block(&self, a: usize, b: usize) -> Matrix2<f64> {
+        self.covariance.fixed_view::<2, 2>(a, b).into_owned()
+    }
+
+    /// Returns the covariance of real and imaginary part of Σ_k f_k z_k, for complex parameters z_k
+    /// at `index`.
+    fn of_sum(&self, terms: &[(usize, C)]) -> Matrix2<f64> {
+        let mut sum = Matrix2::zeros();
+        for &(a, f) in terms {
+            for &(b, g) in terms {
+                sum += rotation(f) * self.block(a, b) * rotation(g).transpose();
+            }
+        }
+        sum
+    }
+
+    /// Returns the shape with its covariance; `None` if an entry is not finite.
+    pub(crate) fn shape_with_covariance(&self) -> Option<ShapeWithCovariance> {
+        let p = self.outputs;
+        let index = |row: usize| Self::shape_index(row % p) + row / p;
+        let covariance =
+            DMatrix::from_fn(2 * p, 2 * p, |i, j| self.covariance[(index(i), index(j))]);
+        let shape = DVector::from_fn(p, |output, _| self.shape(output));
+        ShapeWithCovariance::new(shape, covariance).ok()
+    }
+
+    /// Returns the mode with these parameters: its shape over the largest entry, and participations
+    /// times this entry.
+    pub(crate) fn mode(&self) -> IdentifiedMode {
+        let pole = self.pole();
+        let (frequency, damping, between) =
+            natural_frequency_and_damping(pole, &self.block(0, 0), self.degrees_of_freedom);
+        let shape: Vec<C> = (0..self.outputs).map(|output| self.shape(output)).collect();
+        let largest = |a: &usize, b: &usize| shape[*a].norm().total_cmp(&shape[*b].norm());
+        let reference = (0..self.outputs).max_by(largest).unwrap_or(0);
+        let (scale, at) = (shape[reference], Self::shape_index(reference));
+        let errors = |covariance: Matrix2<f64>| {
+            C::new(covariance[(0, 0)].max(0.0).sqrt(), covariance[(1, 1)].max(0.0).sqrt())
+        };
+        let of_entry = |output: usize| {
+            let by_reference = (at, -shape[output] / (scale * scale));
+            let terms = [(Self::shape_index(output), 1.0 / scale), by_reference];
+            if output == reference { C::default() } else { errors(self.of_sum(&terms)) }
+        };
+        let of_input = |input: usize| {
+            let terms = [(self.participation_index(input), scale), (at, self.participation(input))];
+            errors(self.of_sum(&terms))
+        };
+        IdentifiedMode {
+            pole,
+            natural_frequency_hz: frequency,
+            damping_ratio: damping,
+            frequency_damping_covariance: between,
+            shape: shape.iter().map(|value| value / scale).collect(),
+            shape_standard_error: (0..self.outputs).map(of_entry).collect(),
+            participation: (0..self.inputs).map(|k| self.participation(k) * scale).collect(),
+            participation_standard_error: (0..self.inputs).map(of_input).collect(),
+            driven_share: None,
+            unmeasured_ratio: None,
+            gain: 0.0,
+            near_edge: false,
+        }
+    }
+}
+
+/// Multiplication by a complex number, as a matrix of real and imaginary parts.
+fn rotation(z: C) -> Matrix2<f64> {
+    Matrix2::new(z.re, -z.im, z.im, z.re)
+}
+
+/// Returns natural frequency (Hz), damping ratio and their covariance, from those of ln(−Re λ) and
+/// ln Im λ.
+pub(crate) fn natural_frequency_and_damping(
+    pole: C,
+    covariance: &Matrix2<f64>,
+    degrees_of_freedom: usize,
+) -> (Uncertain, Uncertain, f64) {
+    let (size, re, im) = (pole.norm(), pole.re, pole.im);
+    let by_frequency = Vector2::new(re * re, im * im) / (size * TAU);
+    let by_damping = Vector2::new(-re, re) * (im * im / size.powi(3));
+    let uncertain = |value: f64, by: Vector2<f64>| Uncertain {
+        value,
+        standard_error: by.dot(&(covariance * by)).max(0.0).sqrt(),
+        degrees_of_freedom,
+    };
+    let frequency = uncertain(size / TAU, by_frequency);
+    let damping = uncertain(-re / size, by_damping);
+    (frequency, damping, by_frequency.dot(&(covariance * by_damping)))
+}
