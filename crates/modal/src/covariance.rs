@@ -58,13 +58,19 @@ impl Covariance {
         let scale = parameter_scale(&pairs, model);
         let shapes = whitened_shapes(projection, modes);
         let (followed, rows) = followed(lines, model, projection, &pairs);
+        // Near a resonance, where unmeasured forces raise the weights, the sensors' noise is far
+        // below these.
+        let mean = mean_sensor(fit, noise);
+        let weights = mean.iter().zip(&fit.weights.shape);
+        let deviation: Vec<f64> = weights.map(|(mean, shape)| mean.sqrt() / shape).collect();
         let products = |(block, arrays): (&Block, &BlockArrays)| {
-            BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows)
+            let deviation = &deviation[block.rows.clone()];
+            BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows, deviation)
         };
         let blocks: Vec<BlockProducts> =
             lines.blocks.par_iter().zip(&projection.blocks).map(products).collect();
         let outputs = lines.outputs.len();
-        let (mut meat, own) = sensor_variance(fit, noise, &blocks, &pairs, &shapes, &scale);
+        let (mut meat, own) = sensor_variance(fit, noise, &mean, &blocks, &pairs, &shapes, &scale);
         let scores = Scores { pairs: &pairs, shapes: &shapes, scale: &scale };
         let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut meat);
         let process: Vec<ProcessEffect> = (0..modes).map(add).collect();
@@ -241,6 +247,7 @@ fn followed(
 fn sensor_variance(
     fit: &Fit<'_>,
     noise: &Noise,
+    mean: &[f64],
     blocks: &[BlockProducts],
     pairs: &[(usize, Option<usize>)],
     shapes: &[f64],
@@ -251,7 +258,7 @@ fn sensor_variance(
     let mut meat = vec![0.0; size * size];
     let mut own = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
     for (block, products) in fit.lines.blocks.iter().zip(blocks) {
-        let ratios = noise_ratios(fit, noise, block);
+        let ratios = noise_ratios(fit, noise, mean, block);
         let weighted: Vec<f64> =
             shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
         let turned = turn(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
@@ -263,12 +270,23 @@ fn sensor_variance(
     (meat, own)
 }
 
-/// Returns the variance of each output's sensor noise over that of the fit's weights, averaged over
-/// a block.
-fn noise_ratios(fit: &Fit<'_>, noise: &Noise, block: &Block) -> Vec<f64> {
+/// Returns the mean over the outputs of their sensors' variance over the square of their level, on
+/// every line.
+fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
+    let levels = &fit.weights.level;
+    let mut mean = vec![0.0; fit.lines.len()];
+    for (sensor, level) in noise.sensor.iter().zip(levels) {
+        let scale = 1.0 / (level * level * levels.len() as f64);
+        mean.iter_mut().zip(sensor).for_each(|(mean, variance)| *mean += scale * variance);
+    }
+    mean
+}
+
+/// Returns the variance of each output's sensor noise over the mean of all, averaged over a block.
+fn noise_ratios(fit: &Fit<'_>, noise: &Noise, mean: &[f64], block: &Block) -> Vec<f64> {
     let ratio = |(sensor, level): (&Vec<f64>, &f64)| {
         let rows: Range<usize> = block.rows.clone();
-        let sum: f64 = rows.map(|row| sensor[row] / fit.weights.shape[row].powi(2)).sum();
+        let sum: f64 = rows.map(|row| sensor[row] / mean[row]).sum();
         sum / (block.len() as f64 * level * level)
     };
     noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()

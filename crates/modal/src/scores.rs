@@ -16,9 +16,9 @@ type C = Complex<f64>;
 
 /// Products of one block after projection.
 pub(crate) struct BlockProducts {
-    /// C̃ᵀC̃, lower triangle, of the whole problem's parameters.
+    /// C̃ᵀRC̃, lower triangle, of the whole problem's parameters, with the relative variances R.
     pub(crate) gram: Vec<f64>,
-    /// Rows of modes of A⁺ times its transpose.
+    /// Rows of modes of A⁺ times R and their transpose.
     pub(crate) inverse: Vec<f64>,
     /// Rows of modes of A⁺ as columns of 2n rows.
     influence: Vec<f64>,
@@ -41,7 +41,15 @@ fn local_rows(all: &[f64], columns: usize, places: &[usize]) -> Vec<f64> {
     chunks.flat_map(|column| places.iter().map(|place| column[*place])).collect()
 }
 
+/// Returns columns with the real and the imaginary part of each line times a factor of the line.
+fn scaled(columns: &[f64], factors: &[f64]) -> Vec<f64> {
+    columns.iter().zip(factors.iter().cycle()).map(|(value, factor)| value * factor).collect()
+}
+
 impl BlockProducts {
+    /// Computes the products of a block; `deviation` is the root of the variance of the sensors'
+    /// noise on each line over that of the weights.
+    #[allow(clippy::too_many_arguments, reason = "one call, all of it the same fit")]
     pub(crate) fn new(
         lines: &Lines,
         model: &Model,
@@ -50,6 +58,7 @@ impl BlockProducts {
         pairs: &[(usize, Option<usize>)],
         followed: &[f64],
         inverse_rows: &[f64],
+        deviation: &[f64],
     ) -> Self {
         let (rows, size) = (2 * block.len(), 2 * pairs.len());
         let columns = followed.len() / size.max(1);
@@ -64,11 +73,12 @@ impl BlockProducts {
         let part = local_rows(followed, columns, &arrays.columns);
         add_product(&mut derivatives, &arrays.design, &part, rows, inner, -1.0);
         let mut product = vec![0.0; size * size];
-        gram(&derivatives, rows, &mut product);
+        gram(&scaled(&derivatives, deviation), rows, &mut product);
         let own_rows = local_rows(inverse_rows, columns, &arrays.columns);
         let mut influence = vec![0.0; rows * 2 * model.modes()];
         add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
-        let inverse = transposed_product(&influence, &influence, rows);
+        let relative = scaled(&influence, deviation);
+        let inverse = transposed_product(&relative, &relative, rows);
         Self { gram: product, inverse, influence, derivatives }
     }
 }

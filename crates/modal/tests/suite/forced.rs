@@ -5,7 +5,7 @@ use crate::score::Score;
 
 /// Identifies a few records of a case: every mode, no other, and intervals that hold about as often
 /// as stated.
-fn check(case: &Case, seeds: u64) {
+fn check(case: &Case, seeds: u64) -> Score {
     let score = Score::of(case, 0..seeds);
     assert_eq!(score.found_share(), 100.0, "{}", case.name);
     assert_eq!(score.false_modes, 0, "{}", case.name);
@@ -13,6 +13,7 @@ fn check(case: &Case, seeds: u64) {
     for coverage in [score.frequency.coverage(), score.damping.coverage()] {
         assert!((85.0..=100.0).contains(&coverage), "{}: {coverage} %", case.name);
     }
+    score
 }
 
 #[test]
@@ -33,7 +34,11 @@ fn hits_with_decays_that_are_cut() {
 #[test]
 fn unmeasured_forces_are_in_the_intervals() {
     let case = Case { unmeasured: 0.05, ..pair(8) };
-    check(&case, 10);
+    let score = check(&case, 10);
+    // Intervals are no wider than they must be: the squared errors over the squared standard errors
+    // are 1 on average, 0.13 either way by chance.
+    let mean = 0.5 * (score.frequency.mean_square() + score.damping.mean_square());
+    assert!((0.75..1.4).contains(&mean), "{mean}");
 }
 
 /// With residual terms alone, 61 % of the intervals of f and 51 % of those of the shapes hold.

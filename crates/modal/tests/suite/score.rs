@@ -23,6 +23,12 @@ impl Errors {
         100.0 * holds as f64 / all.len().max(1) as f64
     }
 
+    /// Returns the mean of the squared errors over their squared standard errors.
+    pub fn mean_square(&self) -> f64 {
+        let all = self.0.iter().flatten().map(|(error, spread)| (error / spread).powi(2));
+        all.clone().sum::<f64>() / all.count().max(1) as f64
+    }
+
     /// Returns scatter over mean standard error of each mode.
     pub fn scatter(&self) -> Vec<f64> {
         self.each(|_, scatter, spread| scatter / spread)
