@@ -90,10 +90,11 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
     let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
     let root = (1.0 - zeta.value * zeta.value).sqrt();
     let omega = TAU * f.value;
-    let errors = mode.shape.standard_errors();
-    let entries = mode.shape.shape().iter().enumerate().map(|(at, value)| ShapeEntry {
+    let (shape, covariance) = (mode.shape.shape(), mode.shape.covariance());
+    let error = |part: usize| covariance[(part, part)].max(0.0).sqrt();
+    let entries = shape.iter().enumerate().map(|(at, value)| ShapeEntry {
         value: [value.re, value.im],
-        standard_error: Some([errors[at], errors[at + mode.shape.shape().len()]]),
+        standard_error: Some([error(at), error(shape.len() + at)]),
     });
     // The damping ratio changes the damped frequency by less than its error.
     let damped = |value: &ModalValue| {
