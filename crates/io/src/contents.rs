@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use nalgebra::Complex;
+
 use crate::limits::{Limit, Limits};
 use crate::{IoError, Quantity, Unit};
 
@@ -41,6 +43,10 @@ pub(crate) struct Contents {
     pub samples: usize,
     /// Single numbers beside the columns.
     pub scalars: Vec<(String, f64)>,
+    /// Arrays of complex numbers, which are frequency responses and no channels.
+    pub complex: Vec<ComplexArray>,
+    /// Texts of MATLAB beside the columns, by their names.
+    pub texts: Vec<(String, String)>,
     /// Further information from the file.
     pub remarks: Vec<String>,
     /// Last line of a text, if no line break ends it.
@@ -70,6 +76,43 @@ impl Contents {
         self.samples = runs.max_by_key(|run| (run.len(), run[0])).map_or(0, |run| run[0]);
         self
     }
+}
+
+/// An array of complex numbers of any number of dimensions.
+#[derive(Debug)]
+pub(crate) struct ComplexArray {
+    pub name: String,
+    /// Lengths of its dimensions, in the order in which its file's programs write its indices.
+    pub lengths: Vec<usize>,
+    /// Distance of two neighbours in `values`, along each dimension.
+    pub strides: Vec<usize>,
+    pub values: Vec<Complex<f64>>,
+}
+
+impl ComplexArray {
+    /// An array whose first index runs fastest, as MATLAB and Fortran store it.
+    pub fn first_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
+        let strides = strides(lengths.iter());
+        Self { name, strides, lengths, values }
+    }
+
+    /// An array whose last index runs fastest, as C and Python store it.
+    #[cfg(feature = "hdf5")]
+    pub fn last_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
+        let mut strides = strides(lengths.iter().rev());
+        strides.reverse();
+        Self { name, strides, lengths, values }
+    }
+}
+
+/// Distances of neighbours along dimensions of which the first runs fastest.
+fn strides<'a>(lengths: impl Iterator<Item = &'a usize>) -> Vec<usize> {
+    let next = |stride: &mut usize, len: &usize| {
+        let this = *stride;
+        *stride *= len;
+        Some(this)
+    };
+    lengths.scan(1, next).collect()
 }
 
 /// A column of a file.

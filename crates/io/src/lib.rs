@@ -27,6 +27,7 @@ mod geometry;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 mod json;
+mod labels;
 mod limits;
 mod line_spec;
 mod mat;
@@ -35,6 +36,7 @@ mod number_text;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod response_arrays;
 mod response_columns;
 mod responses;
 mod standard;

@@ -151,7 +151,7 @@ fn original(name: &str, lower: &str) -> String {
 }
 
 /// Points of response and force: `h_2_1`, `H21`, `frf_12+Z_1+Z`, or none.
-fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
+pub(crate) fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
     if let [word] = &words[..] {
         let digits: Vec<char> = word.trim_start_matches(['h', 'H']).chars().collect();
         if let [a, b] = digits[..]
@@ -170,14 +170,33 @@ fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
     words.next().is_none().then_some(points)
 }
 
+/// Column of the frequencies, by its name or by that of a field of a struct.
+fn frequency_column(table: &Table) -> Option<usize> {
+    let names = || FREQUENCY.iter().chain(&IN_RADIANS);
+    let of_struct = |at: &usize| {
+        let leaf = table.names()[*at].rsplit_once(['.', '/']).map(|(_, leaf)| leaf.to_lowercase());
+        leaf.is_some_and(|leaf| names().any(|name| *name == leaf))
+    };
+    names().find_map(|name| table.find(name).ok()).or_else(|| (0..table.width()).find(of_struct))
+}
+
 /// Returns the frequencies of a table, in Hz; what is not sure about their unit is added to `doubts`.
 pub(crate) fn frequencies(
     table: &Table,
     doubts: &mut Vec<(String, StatedUnit, Quantity)>,
 ) -> Result<Vec<f64>, IoError> {
-    let named = FREQUENCY.iter().chain(&IN_RADIANS).find_map(|name| table.find(name).ok());
+    let named = frequency_column(table);
     let column = match named {
         Some(column) => column,
+        None if !table.complex().is_empty() => {
+            return Err(IoError::Description {
+                file: table.file().into(),
+                what: format!(
+                    "it has responses, and no vector of their frequencies: save it as {}",
+                    FREQUENCY[..4].join(" or ")
+                ),
+            });
+        }
         None if ORDERS.iter().any(|name| table.find(name).is_ok()) => {
             return Err(IoError::Description {
                 file: table.file().into(),

@@ -8,7 +8,7 @@ use nalgebra::Complex;
 
 use crate::limits::ReadOptions;
 use crate::table::source::{Kind, Source};
-use crate::{IoError, Quantity, StatedUnit, Table, response_columns, uff};
+use crate::{IoError, Quantity, StatedUnit, Table, response_arrays, response_columns, uff};
 
 /// Frequency responses of a file, at common frequencies and in SI units.
 ///
@@ -22,6 +22,9 @@ use crate::{IoError, Quantity, StatedUnit, Table, response_columns, uff};
 /// measured (0 displacement, 1 velocity, 2 acceleration), `added_decay` what an exponential window adds to the decay
 /// of every mode, in 1/s, and `segment_samples`, `segment_hop`, `segments`, `segment_window` (0 whole periods,
 /// 1 Hann, 2 Hamming, 3 Blackman, 4 rectangular) and `sample_rate_hz` what the responses are averages over.
+///
+/// A MATLAB or HDF5 file has a vector of frequencies by one of these names, and arrays of complex numbers over them, points of
+/// the response by points of the force, in any order with the frequencies.
 ///
 /// A universal file has a dataset 58 or 58b per response (function type 4) and coherence (6); its
 /// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 become SI units.
@@ -168,7 +171,10 @@ impl FrequencyResponses {
     fn of_table(table: &Table) -> Result<Self, IoError> {
         let mut responses = Self { file: table.file().into(), ..Self::default() };
         responses.frequency_hz = response_columns::frequencies(table, &mut responses.doubts)?;
-        response_columns::add_functions(table, &mut responses)?;
+        match table.complex() {
+            [] => response_columns::add_functions(table, &mut responses)?,
+            arrays => response_arrays::add_functions(table, arrays, &mut responses)?,
+        }
         for name in table.names() {
             let name = name.trim();
             let is_coherence = name.to_lowercase().starts_with("coherence");

@@ -9,12 +9,15 @@ mod values;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use hdf5_pure::{File, Group};
+use hdf5_pure::{Dataset, File, Group, Object};
 
 use self::attributes::Attributes;
+use self::values::{Array, Content};
 use crate::IoError;
-use crate::contents::{Axis, Column, Contents, Fault, Place};
+use crate::contents::{Axis, Column, ComplexArray, Contents, Fault, Place};
+use crate::labels::with_labels;
 use crate::limits::{Budget, Limits};
+use crate::mat::COMPLEX_NUMBERS;
 use crate::stated_rates::{step, with_own_times, with_stated_rates};
 
 /// Largest depth of groups in groups; deeper ones are refused as forged, as cycles of links are.
@@ -37,7 +40,7 @@ pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Conten
     let read = catch_unwind(AssertUnwindSafe(|| Reader::read(bytes, is_matlab, budget)));
     let read = read.unwrap_or_else(|_| Err(Fault::new(0, "its structure is damaged")));
     let contents = read.map_err(|fault| fault.error(file, Place::Byte(1)))?;
-    let contents = with_own_times(with_stated_rates(contents));
+    let contents = with_labels(with_own_times(with_stated_rates(contents)));
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no data set of numbers" });
     }
@@ -97,7 +100,10 @@ impl Reader {
         for name in names {
             self.budget.take_column().map_err(|limit| Fault::too_large(0, limit))?;
             let at = self.path(path, &name);
-            self.add_dataset(group, &name, at, &attributes)?;
+            match group.dataset(&name) {
+                Ok(dataset) => self.add_dataset(&dataset, at, &attributes, depth)?,
+                Err(error) => self.add_unusable(at, format!("data that cannot be read ({error})")),
+            }
         }
         let mut names = group.groups().map_err(damaged)?;
         names.sort_by_key(|a| natural(a));
@@ -107,38 +113,94 @@ impl Reader {
             match group.group(&name) {
                 Ok(inner) => self.add_group(&inner, &at, depth + 1)?,
                 Err(error) => {
-                    let what = format!("a group that cannot be read ({error})");
-                    self.contents.columns.push(Column::unusable(at, what));
+                    self.add_unusable(at, format!("a group that cannot be read ({error})"));
                 }
             }
         }
         Ok(())
     }
 
+    fn add_unusable(&mut self, path: String, what: String) {
+        self.contents.columns.push(Column::unusable(path, what));
+    }
+
     fn add_dataset(
         &mut self,
-        group: &Group,
-        name: &str,
+        dataset: &Dataset,
         path: String,
         of_group: &Attributes,
+        depth: usize,
     ) -> Result<(), Fault> {
-        let unusable = |what: String| Column::unusable(path.clone(), what);
-        let dataset = match group.dataset(name) {
-            Ok(dataset) => dataset,
-            Err(error) => {
-                self.contents.columns.push(unusable(format!("data that cannot be read ({error})")));
-                return Ok(());
+        let attributes = Attributes::of_dataset(dataset);
+        match values::read(dataset, &attributes, self.len, &mut self.budget) {
+            Ok(Content::Numbers(array)) => self.add_numbers(array, path, &attributes, of_group)?,
+            Ok(Content::Complex { lengths, values }) => {
+                let array = if self.is_matlab {
+                    let lengths = lengths.into_iter().rev().collect();
+                    ComplexArray::first_fastest(path.clone(), lengths, values)
+                } else {
+                    ComplexArray::last_fastest(path.clone(), lengths, values)
+                };
+                self.contents.complex.push(array);
+                self.add_unusable(path, COMPLEX_NUMBERS.into());
             }
-        };
-        let attributes = Attributes::of_dataset(&dataset);
-        let array = match values::read(&dataset, &attributes, self.len, &mut self.budget) {
-            Ok(array) => array,
+            Ok(Content::References(objects)) => {
+                let is_cell = attributes.text("MATLAB_class") == Some("cell");
+                self.add_elements(objects, &path, is_cell, depth + 1)?;
+            }
             Err(values::Trouble::Unusable(what)) => {
-                self.contents.columns.push(unusable(what));
-                return Ok(());
+                if attributes.text("MATLAB_class") == Some("char") {
+                    let text = values::characters(dataset).map(|text| (path.clone(), text));
+                    self.contents.texts.extend(text);
+                }
+                self.add_unusable(path, what);
             }
             Err(values::Trouble::Fault(fault)) => return Err(fault),
-        };
+        }
+        Ok(())
+    }
+
+    /// Adds the elements of a cell array (`name{2}`), or a field of an array of structs (`name(2).field`).
+    fn add_elements(
+        &mut self,
+        objects: Vec<Object>,
+        path: &str,
+        is_cell: bool,
+        depth: usize,
+    ) -> Result<(), Fault> {
+        if depth > MAX_DEPTH {
+            return Err(Fault::new(0, format!("references deeper than {MAX_DEPTH} (a cycle?)")));
+        }
+        let before = (self.contents.columns.len(), self.contents.scalars.len());
+        for (number, object) in (1..).zip(objects) {
+            let at = match path.rsplit_once('.') {
+                Some((of, field)) if !is_cell => format!("{of}({number}).{field}"),
+                _ => format!("{path}{{{number}}}"),
+            };
+            match object {
+                Object::Dataset(dataset) => {
+                    self.add_dataset(&dataset, at, &Attributes::default(), depth)?;
+                }
+                Object::Group(group) => self.add_group(&group, &at, depth)?,
+                _ => self.add_unusable(at, "no data set and no group".into()),
+            }
+        }
+        let (columns, scalars) = before;
+        let added = &self.contents.columns[columns..];
+        if self.contents.scalars.len() == scalars && added.iter().all(|c| c.values.is_err()) {
+            self.contents.columns.truncate(columns);
+            self.add_unusable(path.into(), "a cell array without vectors of numbers".into());
+        }
+        Ok(())
+    }
+
+    fn add_numbers(
+        &mut self,
+        array: Array,
+        path: String,
+        attributes: &Attributes,
+        of_group: &Attributes,
+    ) -> Result<(), Fault> {
         if let [value] = array.values[..] {
             self.contents.scalars.push((path, value));
             return Ok(());

@@ -1,15 +1,44 @@
 //! Numbers of a data set.
 
-use hdf5_pure::{DType, Dataset};
+use hdf5_pure::{CompoundField, CompoundType, DType, Dataset, Datatype, FormatError, Object};
 use mechid_signal::message;
+use nalgebra::Complex;
 
 use super::attributes::Attributes;
 use super::take_numbers;
 use crate::contents::Fault;
 use crate::limits::Budget;
+use crate::mat::COMPLEX_NUMBERS;
 
 /// Number of channels above which an array is refused as transposed.
 const MAX_CHANNELS: usize = 4096;
+
+/// What a data set holds.
+pub(super) enum Content {
+    Numbers(Array),
+    /// Complex numbers, the last index fastest, with the lengths of the dimensions.
+    Complex {
+        lengths: Vec<usize>,
+        values: Vec<Complex<f64>>,
+    },
+    /// Other data sets and groups, as a cell array of MATLAB refers to.
+    References(Vec<Object>),
+}
+
+/// Largest number of characters of a text of MATLAB that is read.
+const MAX_TEXT: u64 = 256;
+
+/// Returns a line of text of MATLAB, which has a number for each character.
+pub(super) fn characters(dataset: &Dataset) -> Option<String> {
+    let count = dataset.shape().ok()?.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
+    if count? > MAX_TEXT || dataset.dtype().ok()? != DType::U16 {
+        return None;
+    }
+    String::from_utf16(&dataset.read_u16().ok()?).ok()
+}
+
+/// Numbers whose memory an open object takes, estimated.
+const OBJECT_NUMBERS: u64 = 64;
 
 /// Numbers of a data set, in the order of the file.
 pub(super) struct Array {
@@ -26,13 +55,13 @@ pub(super) enum Trouble {
     Fault(Fault),
 }
 
-/// Reads a data set of real numbers.
+/// Reads a data set of numbers or of references.
 pub(super) fn read(
     dataset: &Dataset,
     attributes: &Attributes,
     len: u64,
     budget: &mut Budget,
-) -> Result<Array, Trouble> {
+) -> Result<Content, Trouble> {
     let unusable = |what: &str| Err(Trouble::Unusable(what.into()));
     let failed =
         |error: hdf5_pure::Error| Trouble::Unusable(format!("data that cannot be read ({error})"));
@@ -41,11 +70,11 @@ pub(super) fn read(
     }
     match attributes.text("MATLAB_class") {
         Some("char") => return unusable("text"),
-        Some("cell") => return unusable("a cell array"),
         Some("function_handle") => return unusable("a function"),
         _ if attributes.has("MATLAB_object_decode") => {
             return unusable(
-                "an object of MATLAB, such as a timetable or a string: save its columns as vectors",
+                "an object of MATLAB, such as a timetable or a string: save S = struct('time', \
+                 seconds(T.Time - T.Time(1)), 'x', T.x) of it",
             );
         }
         _ if attributes.has("MATLAB_sparse") => return unusable("a sparse matrix"),
@@ -56,11 +85,11 @@ pub(super) fn read(
         DType::I8 | DType::I16 | DType::I32 | DType::I64 => {}
         DType::U8 | DType::U16 | DType::U32 | DType::U64 => {}
         DType::String | DType::VariableLengthString => return unusable("text"),
-        DType::Compound(fields) if is_complex(&fields) => return unusable("complex numbers"),
-        DType::Compound(_) => return unusable("records of several fields"),
-        DType::ObjectReference => {
-            return unusable("references to other data (a cell array, or an array of structs)");
+        DType::Compound(fields) if is_complex(&fields) => {
+            return complex(dataset, len, budget);
         }
+        DType::Compound(_) => return unusable("records of several fields"),
+        DType::ObjectReference => return references(dataset, len, budget),
         _ => return unusable("no numbers"),
     }
     let dimensions = dataset.shape().map_err(failed)?;
@@ -98,7 +127,89 @@ pub(super) fn read(
             return Err(Trouble::Unusable(format!("an array of {many}")));
         }
     }
-    Ok(Array { values, shape })
+    Ok(Content::Numbers(Array { values, shape }))
+}
+
+/// Lengths of the dimensions of a data set of elements that are held as `numbers` numbers each; room is taken for them.
+fn lengths(
+    dataset: &Dataset,
+    numbers: u64,
+    len: u64,
+    budget: &mut Budget,
+) -> Result<Vec<usize>, Trouble> {
+    let failed =
+        |error: hdf5_pure::Error| Trouble::Unusable(format!("data that cannot be read ({error})"));
+    let shape = dataset.shape().map_err(failed)?;
+    let each = dataset.element_size().map_err(failed)?;
+    let count = shape.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
+    let Some(count) = count.filter(|count| *count > 0) else {
+        return Err(Trouble::Unusable("an empty array".into()));
+    };
+    take_numbers(count.saturating_mul(numbers), each.div_ceil(numbers), len, budget)
+        .map_err(Trouble::Fault)?;
+    if let Some(chunk) = dataset.chunk_shape().map_err(failed)? {
+        let count = chunk.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
+        let mut room = *budget;
+        take_numbers(count.unwrap_or(u64::MAX), each, len, &mut room).map_err(Trouble::Fault)?;
+    }
+    Ok(shape.iter().map(|len| usize::try_from(*len).unwrap_or(usize::MAX)).collect())
+}
+
+/// Real and imaginary part of an element, by the names of its two fields.
+struct Pair(Complex<f64>);
+
+impl CompoundType for Pair {
+    fn datatype() -> Result<Datatype, FormatError> {
+        <(f64, f64) as CompoundType>::datatype()
+    }
+
+    fn encode(&self, output: &mut Vec<u8>) {
+        (self.0.re, self.0.im).encode(output);
+    }
+
+    fn decode(datatype: &Datatype, bytes: &[u8]) -> Result<Self, FormatError> {
+        let Datatype::Compound { members, .. } = datatype else {
+            return Err(FormatError::CompoundFieldMissing("real".into()));
+        };
+        let part = |at: usize| {
+            let missing = || FormatError::CompoundFieldMissing("a part".into());
+            let member = members.get(at).ok_or_else(missing)?;
+            let start = usize::try_from(member.byte_offset).map_err(|_| missing())?;
+            let end = start.saturating_add(member.datatype.type_size() as usize);
+            let bytes = bytes.get(start..end).ok_or_else(missing)?;
+            f64::decode_field(&member.datatype, bytes)
+                .or_else(|_| f32::decode_field(&member.datatype, bytes).map(f64::from))
+        };
+        Ok(Self(Complex::new(part(0)?, part(1)?)))
+    }
+}
+
+/// Reads complex numbers.
+fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
+    // The bytes are there beside the numbers while they are decoded.
+    let lengths = lengths(dataset, 4, len, budget)?;
+    let pairs = dataset.read_compound::<Pair>();
+    let pairs = pairs.map_err(|error| {
+        Trouble::Unusable(format!("complex numbers that cannot be read ({error})"))
+    })?;
+    let values: Vec<Complex<f64>> = pairs.into_iter().map(|pair| pair.0).collect();
+    if values.len() != lengths.iter().product::<usize>() {
+        return Err(Trouble::Unusable(COMPLEX_NUMBERS.into()));
+    }
+    Ok(Content::Complex { lengths, values })
+}
+
+/// Finds what a data set of references refers to.
+fn references(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
+    // An open object takes far more memory than a number.
+    let lengths = lengths(dataset, OBJECT_NUMBERS, len, budget)?;
+    for _ in 0..lengths.iter().product() {
+        budget.take_column().map_err(|limit| Trouble::Fault(Fault::too_large(0, limit)))?;
+    }
+    let objects = dataset.dereference();
+    let objects = objects
+        .map_err(|error| Trouble::Unusable(format!("references that lead nowhere ({error})")))?;
+    Ok(Content::References(objects))
 }
 
 fn is_complex(fields: &[(String, DType)]) -> bool {

@@ -1,6 +1,7 @@
 //! The variables of a MATLAB file.
 
 use mechid_signal::message;
+use nalgebra::Complex;
 
 use super::element::{Element, Elements, Endian, MATRIX};
 use crate::contents::Fault;
@@ -18,14 +19,23 @@ pub(crate) struct Array {
 pub(crate) enum Value {
     /// Real numbers, column by column.
     Real { rows: usize, columns: usize, values: Vec<f64> },
+    /// Complex numbers, the first index fastest.
+    Complex { lengths: Vec<usize>, values: Vec<Complex<f64>> },
+    /// A line of text.
+    Text(String),
     /// Its fields.
     Struct(Vec<Array>),
+    /// Elements of a cell array or of an array of structs, each with its index as a name.
+    Elements { kind: &'static str, elements: Vec<Array> },
     /// No channel; its name, for people.
     Other(&'static str),
 }
 
-/// Depth to which structs in structs are read; deeper ones are refused as forged.
+/// Depth to which arrays in arrays are read; deeper ones are refused as forged.
 const MOST_NESTED: usize = 32;
+
+/// Largest number of characters of a text that is read: longer ones are no names and no units.
+const MAX_TEXT: usize = 256;
 
 /// Number of dimensions beyond which a size is refused as damaged.
 const MOST_DIMENSIONS: usize = 64;
@@ -34,6 +44,17 @@ const MOST_DIMENSIONS: usize = 64;
 const COMPLEX: u32 = 0x0800;
 
 impl Array {
+    /// Returns whether it holds numbers at any depth.
+    pub fn has_numbers(&self) -> bool {
+        match &self.value {
+            Value::Real { .. } | Value::Complex { .. } => true,
+            Value::Struct(inner) | Value::Elements { elements: inner, .. } => {
+                inner.iter().any(Self::has_numbers)
+            }
+            Value::Text(_) | Value::Other(_) => false,
+        }
+    }
+
     /// Reads the variable in the data of an element, which begin at byte `at` of the file.
     pub fn read(
         data: &[u8],
@@ -56,19 +77,18 @@ impl Array {
         if class > 15 {
             // Objects have no size here, but their name comes next.
             let name = text(elements.required("name")?.data);
-            return Ok(Self { name, value: Value::Other("an object") });
+            return Ok(Self { name, value: Value::Other(object(&mut elements)) });
         }
         let size = elements.required("size")?;
         let lengths = lengths(&size, endian)?;
         let name = text(elements.required("name")?.data);
         let value = match class {
-            1 => Value::Other("a cell array"),
-            2 if lengths.iter().any(|len| *len != 1) => Value::Other("an array of structs"),
-            2 => fields(&mut elements, endian, depth, budget)?,
+            1 => cells(&mut elements, endian, depth, budget)?,
+            2 => structs(&mut elements, &lengths, endian, depth, budget)?,
             3 => Value::Other("an object"),
-            4 => Value::Other("text"),
+            4 => characters(&mut elements, endian),
             5 => Value::Other("a sparse matrix"),
-            _ if flags & COMPLEX != 0 => Value::Other("complex numbers"),
+            _ if flags & COMPLEX != 0 => complex(&mut elements, endian, lengths, budget)?,
             _ => real(&mut elements, endian, &lengths, budget)?,
         };
         Ok(Self { name, value })
@@ -92,14 +112,24 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     lengths.iter().map(length).collect()
 }
 
-/// The real numbers of a full matrix.
-fn real(
-    elements: &mut Elements<'_>,
-    endian: Endian,
-    lengths: &[usize],
-    budget: &mut Budget,
-) -> Result<Value, Fault> {
-    let part = elements.required("numbers")?;
+/// What an object is; of those that hold records it says how they are saved.
+fn object(elements: &mut Elements<'_>) -> &'static str {
+    // The kind of the object comes next, then its class.
+    let mut words = [(); 2].map(|()| elements.next().ok().flatten().map(|word| text(word.data)));
+    match words[1].take().as_deref() {
+        Some("timetable") => {
+            "a timetable: save S = struct('time', seconds(T.Time - T.Time(1)), 'x', T.x) of it"
+        }
+        Some("table") => "a table: save table2struct(T, 'ToScalar', true)",
+        Some("timeseries") => "a timeseries: save struct('time', T.Time, 'x', T.Data)",
+        Some("string") => "text",
+        Some("datetime" | "duration") => "instants: save seconds(t - t(1))",
+        _ => "an object",
+    }
+}
+
+/// Number of numbers of a full matrix; the place of its data is for messages.
+fn count_of(part: &Element<'_>, lengths: &[usize]) -> Result<usize, Fault> {
     let Some(count) = part.count() else {
         let what = format!("a variable holds data of type {}, no numbers", part.kind);
         return Err(Fault::new(part.at, what));
@@ -110,6 +140,18 @@ fn real(
         let what = format!("a variable of {} numbers holds {count}", sizes.join(" × "));
         return Err(Fault::new(part.at, what));
     }
+    Ok(count)
+}
+
+/// The real numbers of a full matrix.
+fn real(
+    elements: &mut Elements<'_>,
+    endian: Endian,
+    lengths: &[usize],
+    budget: &mut Budget,
+) -> Result<Value, Fault> {
+    let part = elements.required("numbers")?;
+    let count = count_of(&part, lengths)?;
     match *lengths {
         _ if count == 0 => Ok(Value::Other("nothing")),
         [rows, columns] => {
@@ -121,18 +163,88 @@ fn real(
     }
 }
 
-/// The fields of a single struct.
-fn fields(
+/// The complex numbers of a full matrix of any number of dimensions.
+fn complex(
     elements: &mut Elements<'_>,
+    endian: Endian,
+    lengths: Vec<usize>,
+    budget: &mut Budget,
+) -> Result<Value, Fault> {
+    let real = elements.required("real parts")?;
+    let imaginary = elements.required("imaginary parts")?;
+    let count = count_of(&real, &lengths)?;
+    count_of(&imaginary, &lengths)?;
+    if count == 0 {
+        return Ok(Value::Other("nothing"));
+    }
+    // The parts are copied once more on their way into pairs.
+    let room = budget.take_numbers(count.saturating_mul(2));
+    room.map_err(|limit| Fault::too_large(real.at, limit))?;
+    let [re, im] = [real, imaginary].map(|part| part.numbers(endian).unwrap_or_default());
+    let values = re.into_iter().zip(im).map(|(re, im)| Complex::new(re, im)).collect();
+    Ok(Value::Complex { lengths, values })
+}
+
+/// A text of one line.
+fn characters(elements: &mut Elements<'_>, endian: Endian) -> Value {
+    let Ok(part) = elements.required("characters") else { return Value::Other("text") };
+    if part.data.len() > 2 * MAX_TEXT {
+        return Value::Other("text");
+    }
+    let text = match part.kind {
+        // MATLAB stores characters as 16-bit integers, or as UTF-8 or UTF-16.
+        4 | 17 => {
+            let words = part.data.as_chunks::<2>().0.iter().map(|word| endian.u16(*word));
+            String::from_utf16_lossy(&words.collect::<Vec<u16>>())
+        }
+        _ => String::from_utf8_lossy(part.data).into_owned(),
+    };
+    Value::Text(text.trim_matches(['\0', ' ']).to_owned())
+}
+
+/// Reads an array within another one.
+fn inner(
+    elements: &mut Elements<'_>,
+    endian: Endian,
+    depth: usize,
+    budget: &mut Budget,
+) -> Result<Array, Fault> {
+    let element = elements.required("elements")?;
+    if element.kind != MATRIX {
+        return Err(Fault::new(element.at, "an element of an array is no variable"));
+    }
+    if depth == MOST_NESTED {
+        let what = format!("arrays are nested more than {MOST_NESTED} deep");
+        return Err(Fault::new(element.at, what));
+    }
+    Array::read(element.data, element.at, endian, depth + 1, budget)
+}
+
+/// The elements of a cell array.
+fn cells(
+    elements: &mut Elements<'_>,
+    endian: Endian,
+    depth: usize,
+    budget: &mut Budget,
+) -> Result<Value, Fault> {
+    let mut cells = Vec::new();
+    while !elements.is_at_end() {
+        let Array { value, .. } = inner(elements, endian, depth, budget)?;
+        cells.push(Array { name: format!("{{{}}}", cells.len() + 1), value });
+    }
+    Ok(Value::Elements { kind: "a cell array", elements: cells })
+}
+
+/// The fields of a struct, or of each struct of an array.
+fn structs(
+    elements: &mut Elements<'_>,
+    lengths: &[usize],
     endian: Endian,
     depth: usize,
     budget: &mut Budget,
 ) -> Result<Value, Fault> {
     let length = elements.required("length of field names")?;
     let at = length.at;
-    if depth == MOST_NESTED {
-        return Err(Fault::new(at, format!("structs are nested more than {MOST_NESTED} deep")));
-    }
     let length = match length.count() {
         Some(1) => length.numbers(endian).map_or(0.0, |n| n[0]),
         _ => 0.0,
@@ -141,16 +253,28 @@ fn fields(
         return Err(Fault::new(at, "the field names of a struct have no length"));
     }
     let names = elements.required("field names")?;
-    let mut fields = Vec::new();
-    for name in names.data.chunks_exact(length as usize) {
-        let field = elements.required("fields")?;
-        if field.kind != MATRIX {
-            return Err(Fault::new(field.at, "a field of a struct is no variable"));
+    let names: Vec<String> = names.data.chunks_exact(length as usize).map(text).collect();
+    let mut fields = |budget: &mut Budget| -> Result<Value, Fault> {
+        let fields = names.iter().map(|name| {
+            let Array { value, .. } = inner(elements, endian, depth, budget)?;
+            Ok(Array { name: name.clone(), value })
+        });
+        Ok(Value::Struct(fields.collect::<Result<_, Fault>>()?))
+    };
+    let count = lengths.iter().try_fold(1_usize, |product, len| product.checked_mul(*len));
+    match count {
+        Some(1) => fields(budget),
+        // Structs without fields hold nothing, however many there are.
+        _ if names.is_empty() => Ok(Value::Other("nothing")),
+        Some(count) => {
+            let mut structs = Vec::new();
+            for number in 1..=count {
+                structs.push(Array { name: format!("({number})"), value: fields(budget)? });
+            }
+            Ok(Value::Elements { kind: "an array of structs", elements: structs })
         }
-        let Array { value, .. } = Array::read(field.data, field.at, endian, depth + 1, budget)?;
-        fields.push(Array { name: text(name), value });
+        None => Err(Fault::new(at, "an array of structs has no size")),
     }
-    Ok(Value::Struct(fields))
 }
 
 /// A name, which ends at the first zero.

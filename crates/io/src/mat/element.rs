@@ -68,6 +68,11 @@ impl<'a> Elements<'a> {
         self.padded(|_| true)
     }
 
+    /// Returns whether no element follows.
+    pub fn is_at_end(&self) -> bool {
+        self.next >= self.bytes.len()
+    }
+
     /// Reads the next element of the file itself, where compressed ones are not padded.
     pub fn next_at_top(&mut self) -> Result<Option<Element<'a>>, Fault> {
         self.padded(|kind| kind != COMPRESSED)

@@ -18,7 +18,8 @@ use mechid_signal::message;
 use self::array::{Array, Value};
 use self::element::{COMPRESSED, Elements, Endian, MATRIX};
 use crate::IoError;
-use crate::contents::{Column, Contents, Fault, Place};
+use crate::contents::{Column, ComplexArray, Contents, Fault, Place};
+use crate::labels::with_labels;
 use crate::limits::{Budget, Limit};
 use crate::stated_rates::{with_own_times, with_stated_rates};
 
@@ -29,13 +30,16 @@ const HEADER: usize = 128;
 /// transposed.
 const WIDEST: usize = 256;
 
+/// What complex numbers are in a message about a channel.
+pub(crate) const COMPLEX_NUMBERS: &str = "complex numbers (`frf_table` reads frequency responses)";
+
 /// Reads the variables of a file as columns.
 pub(crate) fn read(file: &str, bytes: &[u8], budget: Budget) -> Result<Contents, IoError> {
     let contents = contents(bytes, budget).map_err(|fault| {
         let at = Place::Byte(fault.at + 1);
         fault.error(file, at)
     })?;
-    let contents = with_own_times(with_stated_rates(contents));
+    let contents = with_labels(with_own_times(with_stated_rates(contents)));
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
     }
@@ -93,38 +97,66 @@ fn add(
     at: usize,
     budget: &mut Budget,
 ) -> Result<(), Fault> {
-    let unusable = match value {
+    match value {
         Value::Struct(fields) => {
             for field in fields {
                 let name = format!("{name}.{}", field.name);
                 add(contents, Array { name, ..field }, at, budget)?;
             }
-            return Ok(());
+        }
+        Value::Elements { kind, elements } if !elements.iter().any(Array::has_numbers) => {
+            contents.columns.push(Column::unusable(name, kind));
+        }
+        Value::Elements { elements, .. } => {
+            for element in elements {
+                let name = name.clone() + &element.name;
+                add(contents, Array { name, ..element }, at, budget)?;
+            }
         }
         Value::Real { values, .. } if values.len() == 1 => {
             contents.scalars.push((name, values[0]));
-            return Ok(());
         }
         Value::Real { rows, columns, values } => {
-            if rows == 1 || columns == 1 {
-                contents.columns.push(Column::of_numbers(name, values));
-                return Ok(());
-            }
-            if columns <= WIDEST || columns <= rows {
-                for (number, column) in (1..).zip(values.chunks_exact(rows)) {
-                    budget.take_column().map_err(|limit| Fault::too_large(at, limit))?;
-                    let name = format!("{name}[{number}]");
-                    contents.columns.push(Column::of_numbers(name, column.to_vec()));
-                }
-                return Ok(());
-            }
-            format!(
-                "a matrix of {} and {columns} columns (transpose it: a channel is a column)",
-                message::count(rows, "row")
-            )
+            add_matrix(contents, name, [rows, columns], values, at, budget)?;
         }
-        Value::Other(what) => what.into(),
-    };
-    contents.columns.push(Column::unusable(name, unusable));
+        Value::Complex { lengths, values } => {
+            let array = ComplexArray::first_fastest(name.clone(), lengths, values);
+            contents.complex.push(array);
+            contents.columns.push(Column::unusable(name, COMPLEX_NUMBERS));
+        }
+        Value::Text(text) => {
+            contents.texts.push((name.clone(), text));
+            contents.columns.push(Column::unusable(name, "text"));
+        }
+        Value::Other(what) => contents.columns.push(Column::unusable(name, what)),
+    }
+    Ok(())
+}
+
+/// Adds a matrix of so many rows and columns: a vector as one column, otherwise each column.
+fn add_matrix(
+    contents: &mut Contents,
+    name: String,
+    [rows, columns]: [usize; 2],
+    values: Vec<f64>,
+    at: usize,
+    budget: &mut Budget,
+) -> Result<(), Fault> {
+    if rows == 1 || columns == 1 {
+        contents.columns.push(Column::of_numbers(name, values));
+        return Ok(());
+    }
+    if columns > WIDEST && columns > rows {
+        let what = format!(
+            "a matrix of {} and {columns} columns (transpose it: a channel is a column)",
+            message::count(rows, "row")
+        );
+        contents.columns.push(Column::unusable(name, what));
+        return Ok(());
+    }
+    for (number, column) in (1..).zip(values.chunks_exact(rows)) {
+        budget.take_column().map_err(|limit| Fault::too_large(at, limit))?;
+        contents.columns.push(Column::of_numbers(format!("{name}[{number}]"), column.to_vec()));
+    }
     Ok(())
 }

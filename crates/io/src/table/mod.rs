@@ -31,7 +31,7 @@ pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source, Stored};
 use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
-use crate::contents::{Axis, Column, Contents, DecimalSign, Override, Place};
+use crate::contents::{Axis, Column, ComplexArray, Contents, DecimalSign, Override, Place};
 use crate::limits::ReadOptions;
 use crate::units::{
     Evidence, Quantity, StatedUnit, Unit, names_without_unit, stated, without_unit,
@@ -215,6 +215,11 @@ impl Table {
         let encoding = if self.utf16 { ", in UTF-16" } else { "" };
         let around = if self.gzip { ", in gzip" } else { "" };
         format!("{}{encoding}{around}", self.contents.format)
+    }
+
+    /// Arrays of complex numbers beside the columns.
+    pub(crate) fn complex(&self) -> &[ComplexArray] {
+        &self.contents.complex
     }
 
     /// Number of columns, nameless ones included.

@@ -5,5 +5,6 @@ mod experiment;
 mod limits;
 mod output;
 mod responses;
+mod responses_arrays;
 mod table;
 mod units;

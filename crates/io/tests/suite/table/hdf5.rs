@@ -72,7 +72,6 @@ fn what_is_no_array_of_real_numbers_is_named() {
         (&groups, "cube", "3 dimensions"),
         (&groups, "nothing", "an empty array"),
         (&matlab, "rig.label", "text"),
-        (&matlab, "cells", "a cell array"),
         (&matlab, "nothing", "an empty array"),
     ] {
         let error = table.column(column).unwrap_err().to_string();

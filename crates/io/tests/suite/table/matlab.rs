@@ -28,7 +28,9 @@ fn vectors_matrices_and_structs_are_columns() {
         assert_eq!(table.column("rig.limits.low").unwrap(), low);
         assert_eq!(table.column("counts").unwrap(), low);
         assert_eq!(table.len(), 8);
-        assert_eq!(table.scalars(), [("fs".to_string(), 4.0)]);
+        let scalars =
+            [("fs", 4.0), ("cells{1}", 1.0)].map(|(name, value)| (name.to_string(), value));
+        assert_eq!(table.scalars(), scalars);
         assert_eq!(table.format(), "MATLAB level 5");
     }
 }
@@ -39,8 +41,8 @@ fn what_makes_no_channel_is_named_when_it_is_asked_for() {
         for (column, what) in [
             ("note", "text"),
             ("rig.label", "text"),
-            ("analytic", "complex numbers"),
-            ("cells", "a cell array"),
+            ("analytic", "complex numbers (`frf_table` reads frequency responses)"),
+            ("cells{2}", "text"),
             ("cube", "an array of more than two dimensions"),
             ("nothing", "nothing"),
         ] {

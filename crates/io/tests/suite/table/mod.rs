@@ -1,5 +1,6 @@
 //! Tables in every dialect and format, and what is said about those that are wrong.
 
+mod arrays;
 mod dialects;
 #[cfg(feature = "hdf5")]
 mod hdf5;

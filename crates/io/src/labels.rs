@@ -1,0 +1,34 @@
+//! Texts of a struct that name the unit and the channel of the numbers beside them.
+
+use std::collections::HashMap;
+
+use crate::contents::Contents;
+use crate::table::is_time;
+
+/// Names of a field with a unit, in lower case.
+const UNITS: [&str; 5] = ["unit", "units", "yunit", "y_unit", "eu"];
+
+/// Names of a field with the name of a channel, in lower case.
+const NAMES: [&str; 5] = ["name", "label", "channel", "channelname", "description"];
+
+/// Gives the columns of a struct the unit and the name that texts in the same struct state.
+pub(crate) fn with_labels(mut contents: Contents) -> Contents {
+    let mut labels: HashMap<&str, [&str; 2]> = HashMap::new();
+    for (path, text) in &contents.texts {
+        let Some((place, leaf)) = path.rsplit_once('.') else { continue };
+        let leaf = leaf.to_lowercase();
+        for (label, words) in labels.entry(place).or_default().iter_mut().zip([UNITS, NAMES]) {
+            if words.contains(&leaf.as_str()) {
+                *label = text;
+            }
+        }
+    }
+    for column in &mut contents.columns {
+        let Some((place, leaf)) = column.name.rsplit_once('.') else { continue };
+        let Some([unit, about]) = labels.get(place).filter(|_| !is_time(leaf)) else { continue };
+        if column.unit.is_empty() && column.about.is_empty() {
+            (column.unit, column.about) = (unit.to_string(), about.to_string());
+        }
+    }
+    contents
+}

@@ -1,0 +1,188 @@
+//! Frequency responses in arrays of complex numbers: points × references, along one dimension the frequencies.
+
+use mechid_model::ResponseQuantity;
+use nalgebra::Complex;
+
+use crate::contents::ComplexArray;
+use crate::response_columns::points_of;
+use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use crate::{IoError, Table};
+
+/// Words of the names of an array of coherences, in lower case.
+const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
+
+/// Adds the responses of the complex arrays of a file that run over its frequencies.
+///
+/// The frequencies run along the dimension of their number, the first one if several have it; the dimensions that are left are
+/// points of the response and points of the force. A matrix of frequencies and one dimension more has the responses to
+/// one force.
+///
+/// # Errors
+/// [`IoError::Description`] for arrays none of which has a dimension of as many entries, for one with too many
+/// dimensions, one that is not finite, and for two of the same response.
+pub(crate) fn add_functions(
+    table: &Table,
+    arrays: &[ComplexArray],
+    responses: &mut FrequencyResponses,
+) -> Result<(), IoError> {
+    let wrong = |what: String| IoError::Description { file: table.file().into(), what };
+    let count = responses.frequency_hz.len();
+    let (over_frequency, others): (Vec<&ComplexArray>, Vec<_>) =
+        arrays.iter().partition(|array| array.lengths.contains(&count));
+    if over_frequency.is_empty() {
+        let sizes: Vec<String> = arrays.iter().map(sizes).collect();
+        let sizes = sizes.join(", ");
+        return Err(wrong(format!(
+            "no dimension of {sizes} has as many entries as there are frequencies, {count}"
+        )));
+    }
+    for array in over_frequency {
+        if let Some(at) = array.values.iter().position(|value| !value.is_finite()) {
+            return Err(wrong(format!("entry {} of {} is not finite", at + 1, array.name)));
+        }
+        let shape = Shape::new(array, count).map_err(wrong)?;
+        add_array(array, &shape, responses).map_err(wrong)?;
+    }
+    if !others.is_empty() {
+        let names: Vec<&str> = others.iter().map(|array| array.name.as_str()).collect();
+        responses
+            .remarks
+            .push(format!("left out: {} (no dimension is frequency)", names.join(", ")));
+    }
+    add_coherence(table, responses);
+    Ok(())
+}
+
+/// Adds the responses of one array.
+fn add_array(
+    array: &ComplexArray,
+    shape: &Shape,
+    responses: &mut FrequencyResponses,
+) -> Result<(), String> {
+    let [points, references] = shape.points.map(|dimension| dimension.len);
+    let leaf = array.name.rsplit_once(['.', '/']).map_or(array.name.as_str(), |(_, leaf)| leaf);
+    let words: Vec<String> =
+        leaf.split('_').filter(|word| !word.is_empty()).map(String::from).collect();
+    // `H_2_1` and `H21`; `H` and `H1` name an estimator.
+    let has_points =
+        words.len() > 2 || leaf.len() > 2 && leaf.ends_with(|c: char| c.is_ascii_digit());
+    let named = points_of(words).filter(|_| has_points && points * references == 1);
+    for response in 0..points {
+        for reference in 0..references {
+            let numbers = [response, reference].map(|index| (index + 1).to_string());
+            let [to, from] = named.clone().unwrap_or(numbers);
+            if responses.functions.iter().any(|f| f.response == to && f.reference == from) {
+                return Err(format!(
+                    "{} and another array have the response at {to} to a force at {from}: leave one out",
+                    array.name
+                ));
+            }
+            responses.functions.push(ResponseFunction {
+                response: to,
+                reference: from,
+                quantity: quantity_of_name(leaf),
+                values: shape.values(array, [response, reference]),
+                standard_error: None,
+            });
+        }
+    }
+    responses.remarks.push(format!(
+        "{}: {points} by {references} responses (points of the response by points of the force) in SI units, for \
+         none are stated",
+        array.name
+    ));
+    Ok(())
+}
+
+/// A dimension of an array.
+#[derive(Debug, Clone, Copy)]
+struct Dimension {
+    len: usize,
+    stride: usize,
+}
+
+/// Dimensions of an array of responses.
+#[derive(Debug)]
+struct Shape {
+    frequency: Dimension,
+    /// Points of the response, and of the force.
+    points: [Dimension; 2],
+}
+
+impl Shape {
+    fn new(array: &ComplexArray, frequencies: usize) -> Result<Self, String> {
+        let all = array.lengths.iter().zip(&array.strides);
+        let mut others: Vec<Dimension> =
+            all.map(|(len, stride)| Dimension { len: *len, stride: *stride }).collect();
+        let at = others.iter().position(|dimension| dimension.len == frequencies).unwrap_or(0);
+        let frequency = others.remove(at);
+        let one = Dimension { len: 1, stride: 0 };
+        let points = match others[..] {
+            [] => [one, one],
+            // A vector is a matrix of one row or one column.
+            [points] => [points, one],
+            [points, references] => [points, references],
+            _ => {
+                return Err(format!(
+                    "{} has more dimensions than frequencies, points and references",
+                    sizes(array)
+                ));
+            }
+        };
+        Ok(Self { frequency, points })
+    }
+
+    fn values(&self, array: &ComplexArray, [response, reference]: [usize; 2]) -> Vec<Complex<f64>> {
+        let start = response * self.points[0].stride + reference * self.points[1].stride;
+        (0..self.frequency.len).map(|k| array.values[start + k * self.frequency.stride]).collect()
+    }
+}
+
+/// Name and size of an array.
+fn sizes(array: &ComplexArray) -> String {
+    let sizes: Vec<String> = array.lengths.iter().map(usize::to_string).collect();
+    format!("{} ({})", array.name, sizes.join(" × "))
+}
+
+/// Words that say what a response is, in lower case.
+const QUANTITIES: [(&str, ResponseQuantity); 5] = [
+    ("accelerance", ResponseQuantity::Acceleration),
+    ("inertance", ResponseQuantity::Acceleration),
+    ("mobility", ResponseQuantity::Velocity),
+    ("receptance", ResponseQuantity::Displacement),
+    ("compliance", ResponseQuantity::Displacement),
+];
+
+/// Quantity that the name of an array states.
+fn quantity_of_name(name: &str) -> Option<ResponseQuantity> {
+    let lower = name.to_lowercase();
+    QUANTITIES.iter().find(|(word, _)| lower.contains(word)).map(|(_, quantity)| *quantity)
+}
+
+/// Adds columns of coherences, one for each point of the response.
+fn add_coherence(table: &Table, responses: &mut FrequencyResponses) {
+    let is_coherence = |name: &String| {
+        let leaf = name.rsplit_once(['.', '/']).map_or(name.as_str(), |(_, leaf)| leaf);
+        let stem = leaf.split('[').next().unwrap_or_default().to_lowercase();
+        COHERENCE.contains(&stem.as_str())
+    };
+    let columns = (0..table.width()).filter(|at| is_coherence(&table.names()[*at]));
+    let columns = columns.filter_map(|at| table.values(at).ok());
+    let columns: Vec<&[f64]> =
+        columns.filter(|values| values.len() == responses.frequency_hz.len()).collect();
+    let mut points: Vec<&String> = Vec::new();
+    for function in &responses.functions {
+        if !points.contains(&&function.response) {
+            points.push(&function.response);
+        }
+    }
+    if points.len() != columns.len() {
+        return;
+    }
+    let coherence = points.into_iter().zip(columns).map(|(point, values)| CoherenceFunction {
+        response: point.clone(),
+        reference: None,
+        values: values.to_vec(),
+    });
+    responses.coherence = coherence.collect();
+}
