@@ -50,6 +50,25 @@ pub fn bytes(random: &mut impl Rng) -> Vec<u8> {
     input
 }
 
+/// An input with other digits, and in a binary file other numbers: most of them pass the reader.
+pub fn renumbered(corpus: &[Vec<u8>], random: &mut impl Rng) -> Vec<u8> {
+    let mut input = corpus[random.random_range(0..corpus.len())].clone();
+    let is_text = !input.iter().take(1 << 9).any(|byte| *byte == 0 || *byte >= 0x80);
+    let most = 1 << random.random_range(0..10);
+    for _ in 0..random.random_range(1..=most) {
+        let at = random.random_range(0..input.len().max(1));
+        match input.get_mut(at) {
+            Some(byte) if is_text && byte.is_ascii_digit() => {
+                *byte = b'0' + random.random_range(0..10_u8);
+            }
+            // The end of a binary file is its numbers, mostly.
+            Some(byte) if !is_text && 2 * at > most => *byte = random.random(),
+            _ => {}
+        }
+    }
+    input
+}
+
 /// An input that follows from others and from random numbers, with fewer than 2^`most` changes.
 pub fn mutated(corpus: &[Vec<u8>], words: &[&str], random: &mut impl Rng, most: u32) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();

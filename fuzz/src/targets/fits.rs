@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 
 use mechid_analysis::fleet::{Fleet, TrendAxis, Trends};
 use mechid_analysis::identify::{Method, Nonlinear};
+use mechid_analysis::modes::{ModalTest, ModesSettings, modes, modes_of_responses};
 use mechid_analysis::{
     AnalysisError, BearingData, Channels, DecaySettings, FrfSettings, Identify, IdentifyBearing,
-    InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading, ResponseQuantity,
-    SavedAnalysis, Window, decay, frf, identify, identify_bearing, inspect, predict,
+    IdentifyResponses, InspectSettings, Machine, Measurement, ModalSummary, Predict, Reading,
+    ResponseQuantity, SavedAnalysis, Window, decay, frf, identify, identify_bearing,
+    identify_responses, inspect, predict,
 };
-use mechid_io::{RecordFile, escaped};
+use mechid_io::{FrequencyResponses, RecordFile, escaped};
 
 use crate::depth::{Depth, reached};
 use crate::{Input, Target};
@@ -39,12 +41,44 @@ const TERMS: &[&str] = &[
     ";",
 ];
 
-pub const TARGETS: [Target; 7] = [
+/// Words of tables of frequency responses.
+const TABLES: &[&str] = &[
+    "frequency_hz",
+    "omega",
+    "h_1_2_real",
+    "h_2_1_imag",
+    "magnitude [dB]",
+    "phase_deg",
+    "coherence",
+    "standard_error",
+    "real [g/N]",
+    "apparent mass",
+    "segments",
+    "0",
+    "-1",
+    "1e308",
+    "NaN",
+    "\n",
+    ",",
+    "    58\n",
+    "         4",
+];
+
+pub const TARGETS: [Target; 10] = [
     fit("identify", identified),
     fit("decay", decayed),
     fit("bearing", bearings),
     fit("predict", predicted),
-    fit("modes", modes),
+    fit("modes", modes_of_matrices),
+    fit("modal", modal),
+    fit("ambient", ambient),
+    Target {
+        name: "tables",
+        corpus: "tables",
+        input: Input::Few(TABLES),
+        memory: [256 << 20, 4000],
+        run: tables,
+    },
     Target {
         name: "terms",
         corpus: "terms",
@@ -172,13 +206,14 @@ fn decayed(bytes: &[u8]) -> Result<(), String> {
 
 fn bearings(bytes: &[u8]) -> Result<(), String> {
     let Some(record) = Record::new(bytes)? else { return Ok(()) };
-    let columns = &record.columns;
-    let [a, b, c, d] = [0, 1, 2, 3].map(|at| columns.get(at % columns.len().max(1)));
-    let (Some(a), Some(b), Some(c), Some(d)) = (a, b, c, d) else { return Ok(()) };
-    let names = |one: &str, other: &str| format!("{one},{other}");
-    let channels = Channels::new(&names(a, b), ResponseQuantity::Displacement, &names(c, d));
+    let [.., fx, fy, ax, ay, dx, dy] = record.columns.as_slice() else { return Ok(()) };
+    let both = |one: &str, other: &str| format!("{one},{other}");
+    let channels = Channels::new(&both(fx, fy), ResponseQuantity::Acceleration, &both(ax, ay))
+        .and(ResponseQuantity::Displacement, &both(dx, dy));
     let opened = Measurement::open_with(&record.path, &channels, &record.reading);
-    let Some(measurement) = passed(opened)? else { return Ok(()) };
+    let Some(opened) = passed(opened)? else { return Ok(()) };
+    let window = Window { period: Some(opened.sampling().len() / 2), ..Window::default() };
+    let Some(measurement) = passed(opened.window(window))? else { return Ok(()) };
     reached(Depth::Reached);
     let how = IdentifyBearing { stator_mass: 1.0, ..IdentifyBearing::default() };
     let Some(data) = passed(BearingData::of_records(&[measurement], &how))? else { return Ok(()) };
@@ -202,12 +237,72 @@ fn predicted(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-fn modes(bytes: &[u8]) -> Result<(), String> {
+/// Modes of the identified matrices.
+fn modes_of_matrices(bytes: &[u8]) -> Result<(), String> {
     let Some(record) = Record::new(bytes)? else { return Ok(()) };
     let Some(measurement) = record.measurement(true)? else { return Ok(()) };
     let Some(found) = passed(identify(&[measurement], &record.settings()))? else { return Ok(()) };
     let Some(machine) = passed(found.machine())? else { return Ok(()) };
     match passed(ModalSummary::of(&machine))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+/// Modes of a structure under the force, with a number of modes that ends in time.
+fn modal(bytes: &[u8]) -> Result<(), String> {
+    fitted_modes(bytes, true, ModalTest::default())
+}
+
+/// Modes of a structure under forces that are not measured.
+fn ambient(bytes: &[u8]) -> Result<(), String> {
+    let without_hz = Vec::new();
+    fitted_modes(bytes, false, ModalTest::Ambient { without_hz, without_harmonics: false })
+}
+
+fn fitted_modes(bytes: &[u8], forced: bool, test: ModalTest) -> Result<(), String> {
+    let Some(record) = Record::new(bytes)? else { return Ok(()) };
+    let Some(measurement) = record.measurement(forced)? else { return Ok(()) };
+    let modes_wanted = [None, Some(1), Some(2)][record.choice % 3];
+    let settings =
+        ModesSettings { test, modes: modes_wanted, max_modes: Some(3), ..ModesSettings::default() };
+    match passed(modes(&[measurement], &settings))? {
+        Some(found) => printed(&found),
+        None => Ok(()),
+    }
+}
+
+/// A table of frequency responses, of which the matrices and the modes are asked for.
+fn tables(bytes: &[u8]) -> Result<(), String> {
+    let table = match FrequencyResponses::parse("a\u{1b}", bytes) {
+        Ok(table) => table,
+        Err(error) if escaped(&error.to_string()) == error.to_string() => return Ok(()),
+        Err(error) => return Err(format!("a message is not escaped: {:?}", error.to_string())),
+    };
+    reached(Depth::Read);
+    let lens = table.functions.iter().map(|function| function.values.len());
+    if lens.clone().any(|len| len != table.frequency_hz.len()) {
+        return Err(format!(
+            "{} frequencies, and {:?}",
+            table.frequency_hz.len(),
+            Vec::from_iter(lens)
+        ));
+    }
+    let choice: usize = bytes.iter().map(|byte| usize::from(*byte)).sum();
+    let quantity = Some(ResponseQuantity::ALL[choice % 3]);
+    let tables = [table];
+    if choice.is_multiple_of(4) {
+        reached(Depth::Reached);
+        let settings =
+            ModesSettings { modes: Some(1 + choice % 2), max_modes: Some(3), ..Default::default() };
+        return match passed(modes_of_responses(&tables, &settings))? {
+            Some(found) => printed(&found),
+            None => Ok(()),
+        };
+    }
+    reached(Depth::Reached);
+    let how = IdentifyResponses { quantity, ..IdentifyResponses::default() };
+    match passed(identify_responses(&tables, &how))? {
         Some(found) => printed(&found),
         None => Ok(()),
     }

@@ -9,6 +9,7 @@ use mechid_io::{
 };
 use mechid_signal::Sampling;
 
+use crate::depth::{Depth, reached};
 use crate::{Input, Target};
 
 /// Words of delimited text.
@@ -93,7 +94,43 @@ const JSON: &[&str] = &[
     "[[[[",
 ];
 
-pub const TARGETS: [Target; 8] = [
+/// Words of HDF5 files.
+const HDF5: &[&str] = &[
+    "\u{89}HDF",
+    "MATLAB_class",
+    "MATLAB_empty",
+    "TREE",
+    "SNOD",
+    "HEAP",
+    "OHDR",
+    "units",
+    "\u{7f}\u{7f}\u{7f}\u{7f}",
+    "\0\0\0\0\0\0\0\0",
+];
+
+/// Words of LabVIEW measurement files.
+const LABVIEW: &[&str] = &[
+    "LabVIEW Measurement\n",
+    "***End_of_Header***\n",
+    "X_Value",
+    "X0\t0\t0\n",
+    "Delta_X\t",
+    "Samples\t",
+    "Channels\t65536\n",
+    "X_Columns\tMulti\n",
+    "X_Columns\tNo\n",
+    "Multi_Headings\tYes\n",
+    "Separator\tComma\n",
+    "Decimal_Separator\t,\n",
+    "Y_Unit_Label\tN\tg\n",
+    "Comment",
+    "\t",
+    "\r\n",
+    "-1",
+    "1e308",
+];
+
+pub const TARGETS: [Target; 10] = [
     Target {
         name: "text",
         corpus: "text",
@@ -125,19 +162,22 @@ pub const TARGETS: [Target; 8] = [
     Target {
         name: "hdf5",
         corpus: "hdf5",
-        input: Input::Mutations(&[
-            "\u{89}HDF",
-            "MATLAB_class",
-            "MATLAB_empty",
-            "TREE",
-            "SNOD",
-            "HEAP",
-            "OHDR",
-            "units",
-            "\u{7f}\u{7f}\u{7f}\u{7f}",
-            "\0\0\0\0\0\0\0\0",
-        ]),
+        input: Input::Mutations(HDF5),
         memory: [16 << 20, 400],
+        run: record,
+    },
+    Target {
+        name: "matlab73",
+        corpus: "matlab73",
+        input: Input::Few(HDF5),
+        memory: [16 << 20, 400],
+        run: record,
+    },
+    Target {
+        name: "labview",
+        corpus: "labview",
+        input: Input::Mutations(LABVIEW),
+        memory: [4 << 20, 100],
         run: record,
     },
     Target {
@@ -223,6 +263,7 @@ fn matrix(bytes: &[u8]) -> Result<(), String> {
     let Some(matrix) = told(parse_matrix_market("k\u{1b}.mtx", bytes, &OPTIONS.limits))? else {
         return Ok(());
     };
+    reached(Depth::Fitted);
     ensure(matrix.nrows() == matrix.ncols(), "the matrix is not square")?;
     ensure(matrix.nnz() <= 2 * bytes.len(), "there are more entries than can stand in the file")
 }
@@ -232,6 +273,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
     let Some(table) = told(Table::parse_with("a\u{1b}.csv", bytes, &OPTIONS))? else {
         return Ok(());
     };
+    reached(Depth::Read);
     for text in [table.file().to_owned(), table.format(), table.available()] {
         shown(&text)?;
     }
@@ -254,6 +296,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
         let number = (column + 1).to_string();
         for axis in axes.iter().flatten() {
             if let Some(record) = told(table.record(axis, &[&number]))? {
+                reached(Depth::Fitted);
                 ensure(record.sampling().dt() > 0.0, "the time step is not positive")?;
             }
         }
@@ -278,6 +321,7 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
     let (Some(held), Some(part)) = (told(open(usize::MAX))?, told(open(1))?) else {
         return Ok(());
     };
+    reached(Depth::Read);
     ensure(held.head().names() == part.head().names(), "the names of the columns differ")?;
     let time = held.head().time_column().map_or(TimeAxis::RateHz(10.0), TimeAxis::Column);
     let columns: Vec<usize> = (0..held.head().width().min(8)).collect();
@@ -291,6 +335,7 @@ fn chunks(bytes: &[u8]) -> Result<(), String> {
                         "{:?} {:?} {:?}",
                         survey.sampling, survey.means, survey.peaks
                     ));
+                    reached(Depth::Fitted);
                     let len = survey.sampling.len();
                     let mut all = Vec::new();
                     let read = file.blocks(&[&name], 0..len, 7, 7, &mut |block| {
@@ -333,9 +378,11 @@ fn described(path: &Path) -> Result<(), String> {
         ensure(covariance.matrix().shape() == (n, n), "the covariance is not square")?;
     }
     if let Some(system) = told(read_system(path))? {
+        reached(Depth::Fitted);
         ensure(system.stiffness().iter().all(|k| k.is_finite()), "the system is not finite")?;
     }
     let Some(experiment) = told(Experiment::read(path))? else { return Ok(()) };
+    reached(Depth::Fitted);
     told(experiment.system())?;
     told(experiment.initial_state())?;
     if experiment.samples() <= MOST_SAMPLES && experiment.periods <= 4 {
@@ -352,6 +399,7 @@ fn described(path: &Path) -> Result<(), String> {
 fn lines(bytes: &[u8]) -> Result<(), String> {
     let text = String::from_utf8_lossy(bytes);
     let Some(lines) = told(text.parse::<LineSpec>())? else { return Ok(()) };
+    reached(Depth::Fitted);
     ensure(lines.to_string() == text, "it is written in another way")?;
     for len in [1, 2, 3, 16, 1000] {
         let period = Sampling::new(0.01, len).map_err(|e| e.to_string())?;
