@@ -8,7 +8,8 @@ use mechid_fuzz::{Cases, run, targets};
 
 const USAGE: &str = "\
 Options: --target NAME (default: all), --cases COUNT (default: 1000000 of each), --seed NUMBER (1),
---case NUMBER (that one alone), --seconds COUNT (of each target at most)";
+--case NUMBER (that one alone), --seconds COUNT (of each target at most), --case-seconds COUNT (after which a
+case hangs: 10; more beside other work)";
 
 fn main() -> ExitCode {
     match options() {
@@ -53,6 +54,7 @@ fn options() -> Result<(Vec<String>, Cases), String> {
             "--cases" => cases.count = number()?,
             "--seed" => cases.seed = number()?,
             "--case" => (cases.first, cases.count) = (number()?, 1),
+            "--case-seconds" => cases.time_limit = Duration::from_secs(number()?),
             "--seconds" => cases.total_time = Duration::from_secs(number()?),
             _ => return Err(format!("there is no option {option}")),
         }

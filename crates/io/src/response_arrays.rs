@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use crate::contents::ComplexArray;
 use crate::response_columns::points_of;
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
-use crate::{IoError, Table};
+use crate::{IoError, Table, escaped};
 
 /// Words of the names of an array of coherences, in lower case.
 const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
@@ -38,13 +38,14 @@ pub(crate) fn add_functions(
     }
     for array in over_frequency {
         if let Some(at) = array.values.iter().position(|value| !value.is_finite()) {
-            return Err(wrong(format!("entry {} of {} is not finite", at + 1, array.name)));
+            let name = escaped(&array.name);
+            return Err(wrong(format!("entry {} of {name} is not finite", at + 1)));
         }
         let shape = Shape::new(array, count).map_err(wrong)?;
         add_array(array, &shape, responses).map_err(wrong)?;
     }
     if !others.is_empty() {
-        let names: Vec<&str> = others.iter().map(|array| array.name.as_str()).collect();
+        let names: Vec<_> = others.iter().map(|array| escaped(&array.name)).collect();
         responses
             .remarks
             .push(format!("left out: {} (no dimension is frequency)", names.join(", ")));
@@ -73,8 +74,10 @@ fn add_array(
             let [to, from] = named.clone().unwrap_or(numbers);
             if responses.functions.iter().any(|f| f.response == to && f.reference == from) {
                 return Err(format!(
-                    "{} and another array have the response at {to} to a force at {from}: leave one out",
-                    array.name
+                    "{} and another array have the response at {} to a force at {}: leave one out",
+                    escaped(&array.name),
+                    escaped(&to),
+                    escaped(&from)
                 ));
             }
             responses.functions.push(ResponseFunction {
@@ -89,7 +92,7 @@ fn add_array(
     responses.remarks.push(format!(
         "{}: {points} by {references} responses (points of the response by points of the force) in SI units, for \
          none are stated",
-        array.name
+        escaped(&array.name)
     ));
     Ok(())
 }
@@ -141,7 +144,7 @@ impl Shape {
 /// Name and size of an array.
 fn sizes(array: &ComplexArray) -> String {
     let sizes: Vec<String> = array.lengths.iter().map(usize::to_string).collect();
-    format!("{} ({})", array.name, sizes.join(" × "))
+    format!("{} ({})", escaped(&array.name), sizes.join(" × "))
 }
 
 /// Words that say what a response is, in lower case.

@@ -8,7 +8,9 @@ use nalgebra::Complex;
 
 use crate::limits::ReadOptions;
 use crate::table::source::{Kind, Source};
-use crate::{IoError, Quantity, StatedUnit, Table, response_arrays, response_columns, uff};
+use crate::{
+    IoError, Quantity, StatedUnit, Table, escaped, response_arrays, response_columns, uff,
+};
 
 /// Frequency responses of a file, at common frequencies and in SI units.
 ///
@@ -159,13 +161,23 @@ impl FrequencyResponses {
     fn of_source(mut source: Source<'_>) -> Result<Self, IoError> {
         let options = ReadOptions::default();
         let file = source.file.clone();
-        match source.kind() {
+        let mut responses = match source.kind() {
             Kind::Uff => {
                 let bytes = source.bytes(&options.limits)?;
-                uff::read_responses(&file, &bytes, source.budget(&options.limits))
+                uff::read_responses(&file, &bytes, source.budget(&options.limits))?
             }
-            _ => Self::of_table(&Table::of_source(source, &options)?),
+            _ => Self::of_table(&Table::of_source(source, &options)?)?,
+        };
+        // Names of points are shown in results and messages.
+        let shown = |point: &mut String| *point = escaped(point).into_owned();
+        for function in &mut responses.functions {
+            [&mut function.response, &mut function.reference].into_iter().for_each(shown);
         }
+        for coherence in &mut responses.coherence {
+            shown(&mut coherence.response);
+            coherence.reference.as_mut().map(shown);
+        }
+        Ok(responses)
     }
 
     fn of_table(table: &Table) -> Result<Self, IoError> {
