@@ -362,11 +362,13 @@ fn find_faults(all: &mut [Hit], force: &[f64], push: &[f64], dt: f64, floor: f64
         let least = floor.max(0.01 * rule.double_percent * peak);
         let window = hit.window.clone();
         let main = largest_of(push, hit.pulse.clone());
-        let second = peaks(&push[window.clone()], least)
-            .into_iter()
-            .map(|at| window.start + at)
-            .filter(|at| push[*at] >= least && *at != main)
-            .max_by(|a, b| push[*a].total_cmp(&push[*b]));
+        let maxima: Vec<usize> =
+            peaks(&push[window.clone()], least).into_iter().map(|at| window.start + at).collect();
+        let candidates = (0..maxima.len()).filter(|at| {
+            let peak = maxima[*at];
+            push[peak] >= least && peak != main && !rings(push, &maxima, *at, main, floor)
+        });
+        let second = candidates.map(|at| maxima[at]).max_by(|a, b| push[*a].total_cmp(&push[*b]));
         if let Some(at) = second {
             let after_s = (at as f64 - main as f64) * dt;
             hit.faults.push(HitFault::Double { percent: 100.0 * push[at] / peak, after_s });
@@ -379,6 +381,39 @@ fn find_faults(all: &mut [Hit], force: &[f64], push: &[f64], dt: f64, floor: f64
             hit.faults.push(HitFault::Weak { percent: 100.0 * peak / usual });
         }
     }
+}
+
+/// Returns whether a maximum is the ringing of an anti-alias filter: the next lobe towards the main pulse pulls as much as it
+/// pushes, but for noise. A hammer does not pull, and ringing falls off on both sides of a pulse.
+fn rings(push: &[f64], maxima: &[usize], at: usize, main: usize, noise: f64) -> bool {
+    let peak = maxima[at];
+    let inner = if peak > main {
+        at.checked_sub(1).map_or(main, |at| maxima[at].max(main))
+    } else {
+        maxima.get(at + 1).map_or(main, |at| (*at).min(main))
+    };
+    let lobe = peak.min(inner)..=peak.max(inner);
+    let steps = lobe.clone().flat_map(|sample| {
+        (0..limits::RINGING_STEPS)
+            .map(move |step| (sample, step as f64 / limits::RINGING_STEPS as f64))
+    });
+    let pull = steps.map(|(sample, part)| -between_samples(push, sample, part)).fold(0.0, f64::max);
+    push[peak] < pull + noise
+}
+
+/// Returns a band-limited signal `part` of a step after a sample.
+///
+/// # Source
+/// Whittaker's interpolation under a raised cosine.
+fn between_samples(values: &[f64], sample: usize, part: f64) -> f64 {
+    let reach = limits::INTERPOLATION_REACH;
+    let range = (sample + 1).saturating_sub(reach)..(sample + 1 + reach).min(values.len());
+    let weight = |k: usize| {
+        let t = std::f64::consts::PI * (k as f64 - sample as f64 - part);
+        let sinc = if t == 0.0 { 1.0 } else { t.sin() / t };
+        sinc * (0.5 * t / reach as f64).cos().powi(2)
+    };
+    range.map(|k| values[k] * weight(k)).sum()
 }
 
 /// Returns the indices of the maxima after which, and between which, the values fall by at least
