@@ -22,6 +22,14 @@ pub const WHOLE_BYTES: usize = 640;
 /// Bytes that a prediction, or the fit of a free decay, takes for each number of its window.
 pub const PREDICT_BYTES: usize = 800;
 
+/// Bytes that the covariances of the noise take for each line and pair of channels: eight copies of a complex number, the
+/// most that were measured (periods of 500 forces and 500 responses).
+pub const PAIR_BYTES: usize = 128;
+
+/// Number of channels up to which the noise of the spectra takes no more than [`STRETCH_BYTES`] for each sample of each: lines
+/// are half of the samples.
+pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
+
 /// Number of bytes in the unit of the setting `memory_gb`.
 const GIGABYTE: f64 = 1e9;
 

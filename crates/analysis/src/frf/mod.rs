@@ -92,6 +92,9 @@ pub fn frf_of_records(
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
     }
     let records = held_of(measurements, hold)?;
+    for record in &records {
+        record.check_spectra(how.segments.segment.unwrap_or(record.held.period) / 2)?;
+    }
     if let [recorded] = &records[..]
         && let Some(found) = interleaved(recorded, how, lines)?
     {

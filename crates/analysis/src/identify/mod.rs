@@ -10,6 +10,7 @@
 //! | `nonlinear` | whole periods with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
+//! | `counts` | equations and memory that a fit needs, before any work |
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
 //! | `mass`, `structure` | what is known of M, C and K |
@@ -24,6 +25,7 @@
 mod added_decay;
 pub mod checks;
 mod coherence;
+mod counts;
 mod derivatives;
 pub(crate) mod fitted;
 mod fitted_lines;
@@ -120,6 +122,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         let cut = hits::cut(&records, rule)?;
         (records, hits, hit_noise, of_hits) = (cut.hits, cut.rows, cut.noise, cut.remarks);
     }
+    counts::check(how, &records, &unknowns, period_given)?;
     let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given, &hit_noise);
     let driven: Vec<usize> = records.iter().flat_map(|r| r.held.driven.iter().copied()).collect();
     let fitted = match how.finds_modes_alone() {

@@ -25,7 +25,7 @@ use self::units::ToSi;
 pub(crate) use self::window::Hold;
 pub use self::window::{Window, Windowed};
 use crate::AnalysisError;
-use crate::limits::{PREDICT_BYTES, check_memory};
+use crate::limits::{FEW_CHANNELS, PAIR_BYTES, PREDICT_BYTES, check_memory};
 
 /// Number of samples held in memory of a window of which not all samples are needed at once.
 pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
@@ -415,6 +415,16 @@ impl Source {
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
         let numbers = samples.saturating_mul(self.channels.roles().len());
         check_memory(&self.name, numbers, bytes, self.memory)
+    }
+
+    /// Refuses work on the noise of so many spectral lines of all columns used that takes too much memory.
+    pub fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
+        let channels = self.channels.roles().len();
+        if channels <= FEW_CHANNELS {
+            return Ok(());
+        }
+        let pairs = lines.saturating_mul(channels).saturating_mul(channels);
+        check_memory(&self.name, pairs, PAIR_BYTES, self.memory)
     }
 
     /// Passes the samples `window` of the columns used on in blocks of `rows` rows (samples ×

@@ -133,6 +133,19 @@ impl Windowed {
         Ok(Self { held, source, window: start..start + len })
     }
 
+    /// Number of samples in the window, held or not.
+    pub(crate) fn samples(&self) -> usize {
+        self.window.len()
+    }
+
+    /// Refuses work on the noise of so many spectral lines that takes too much memory.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Memory`].
+    pub(crate) fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
+        self.source.check_spectra(lines)
+    }
+
     /// Returns the samples held in memory and drops the rest.
     pub fn into_held(self) -> Block {
         self.held

@@ -1,0 +1,39 @@
+//! Equations and memory that a fit needs, counted before any work.
+
+use mechid_estimate::Unknowns;
+use mechid_numerics::NumericsError;
+
+use super::options::{Identify, Source};
+use crate::AnalysisError;
+use crate::measurement::Windowed;
+
+/// Refuses a fit with fewer equations than unknowns, and one whose spectra take too much memory.
+///
+/// # Errors
+/// [`NumericsError::TooFewRows`] and [`AnalysisError::Memory`].
+pub(super) fn check(
+    how: &Identify,
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    period_given: bool,
+) -> Result<(), AnalysisError> {
+    let samples = |record: &Windowed| match how.source {
+        Source::Segments(_) | Source::Samples(_) => record.samples(),
+        // Periods are averaged, and a line is two real equations.
+        _ if period_given => record.held.period,
+        _ => record.samples(),
+    };
+    let rows: usize = records.iter().map(samples).sum();
+    // Each equation of motion has at least as many unknowns of its own.
+    let needed = unknowns.independent() / unknowns.dof().max(1);
+    if rows < needed {
+        return Err(NumericsError::TooFewRows { rows, unknowns: needed }.into());
+    }
+    let lines = |record: &Windowed| match &how.source {
+        Source::Samples(_) => 0,
+        Source::Segments(fit) => fit.segments.segment.unwrap_or(record.held.period) / 2,
+        _ if period_given => record.held.period / 2,
+        _ => record.held.force.len() / 2,
+    };
+    records.iter().try_for_each(|record| record.check_spectra(lines(record)))
+}
