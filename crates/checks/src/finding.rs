@@ -99,6 +99,8 @@ findings! {
     Quantisation in quantisation,
     /// One sample of a channel stands far outside its neighbours.
     Spike in spike,
+    /// A channel keeps one value for some samples within its motion.
+    DropOut in drop_out,
     /// Two measured response quantities of one degree of freedom are not derivatives of each other.
     Kinematics in kinematics,
     /// The forces take power out of the machine.
@@ -119,6 +121,8 @@ findings! {
     Misfit in misfit,
     /// Motion that a fit leaves and takes for the response to forces that were not measured.
     UnmeasuredForce in unmeasured_force,
+    /// The response does not follow the force.
+    Unrelated in unrelated,
     /// Correlation of a residual with the square or the cube of a displacement as a force.
     Linearity in linearity,
     /// Nonlinear term that explains most of what a linear model leaves of whole periods.

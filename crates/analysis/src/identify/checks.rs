@@ -3,8 +3,8 @@
 use mechid_checks::UnmeasuredForce;
 use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
-    constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, negative_mass, power,
-    quantised_channels, spiked_channels,
+    constant_channels, dropped_channels, gain_symmetry, instability, kinematics, mass_symmetry,
+    negative_mass, power, quantised_channels, spiked_channels, unrelated_response,
 };
 use mechid_estimate::IdentifiedMode;
 use mechid_model::ResponseQuantity;
@@ -81,7 +81,13 @@ pub(crate) fn rows(
     }
     add(When::After, None, &fitted.after_all);
     add(When::After, None, instability(modes).as_slice());
+    let unknowns =
+        fitted.estimate.unknowns().independent().div_ceil(fitted.estimate.unknowns().dof());
+    let unrelated = unexplained
+        .filter(|_| fitted.nonlinear.is_none())
+        .and_then(|part| unrelated_response(part, fitted.equations, unknowns));
     add(When::After, None, unmeasured_force(fitted, unexplained).as_slice());
+    add(When::After, None, unrelated.as_slice());
     if scaled {
         add(When::After, None, negative_mass(&fitted.estimate).as_slice());
         add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
@@ -124,6 +130,7 @@ pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
         findings.extend(constant_channels(Quantity::Response(kind), motion));
         findings.extend(quantised_channels(Quantity::Response(kind), motion));
         findings.extend(spiked_channels(Quantity::Response(kind), motion, &measured.force));
+        findings.extend(dropped_channels(Quantity::Response(kind), motion));
     }
     findings
 }

@@ -160,6 +160,20 @@ impl Fitted {
         }
     }
 
+    /// Returns a remark where the residual is too short for its tests.
+    pub(crate) fn short_residual(&self) -> Option<String> {
+        let untested = |residual: &Residual| match residual {
+            Residual::Samples(residual) if residual.lags() == 0 => Some(residual.samples.len()),
+            _ => None,
+        };
+        let samples = self.residuals.iter().find_map(untested)?;
+        Some(format!(
+            "the residual of {} is too short for the tests of its colour and of its correlation with the force: nothing \
+             judges the model",
+            mechid_signal::message::count(samples, "sample")
+        ))
+    }
+
     /// Returns the system that was fitted, which has the responses to the forces that acted.
     ///
     /// # Errors

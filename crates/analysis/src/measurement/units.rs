@@ -162,7 +162,10 @@ pub(crate) fn doubtful_time(
     if !(is_slow || is_fast) || table.says_unit_of_time(column) {
         return None;
     }
-    let (unit, factor) = if is_slow { ("ms", 1e-3) } else { ("days", DAY_S) };
+    // The largest unit that makes the record no slow one.
+    let small = [("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
+    let small = small.into_iter().find(|(_, size)| rate_hz / size > SLOW_HZ);
+    let (unit, factor) = if is_slow { small.unwrap_or(("ms", 1e-3)) } else { ("days", DAY_S) };
     let column = table.label(column);
     Some(Finding::TimeUnit(TimeUnit { column, rate_hz, duration_s, unit, factor }))
 }

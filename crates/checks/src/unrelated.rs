@@ -1,0 +1,85 @@
+//! Responses of which the force explains no more than chance does.
+
+use std::fmt::{self, Formatter};
+
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::limits::SIGNIFICANCE;
+use super::{Subject, Verdict};
+
+/// The response does not follow the force: a fit explains as little of it as it would of noise.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Unrelated {
+    /// Part of the power of the response that the fit explains, a ratio.
+    pub explained: f64,
+    /// Bound on the probability that it explains as much of a response that has nothing to do with the force.
+    pub p_value: f64,
+}
+
+/// Finds a response that does not follow the force ([`Finding::Unrelated`]) by what a fit of `unknowns` parameters to
+/// `equations` real equations (each of one degree of freedom) leaves, `unexplained` (ratio of RMS values); `None` where
+/// the response follows.
+///
+/// The F test of the regression, times the number of lines: a fit looks for the resonance among all of them.
+///
+/// # Source
+/// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1; Bonferroni's bound.
+pub fn unrelated_response(unexplained: f64, equations: usize, unknowns: usize) -> Option<Finding> {
+    let freedom = equations.checked_sub(unknowns).filter(|spare| *spare > 0 && unknowns > 0)?;
+    let (freedom, unknowns) = (freedom as f64, unknowns as f64);
+    let left = unexplained * unexplained;
+    let explained = (1.0 - left).max(0.0);
+    if !left.is_finite() || left == 0.0 {
+        return None;
+    }
+    let ratio = (explained / unknowns) / (left / freedom);
+    let lines = 0.5 * equations as f64;
+    let tail = FisherSnedecor::new(unknowns, freedom).ok()?.sf(ratio);
+    let p_value = (lines * tail).min(1.0);
+    (p_value > SIGNIFICANCE).then_some(Finding::Unrelated(Unrelated { explained, p_value }))
+}
+
+impl Check for Unrelated {
+    fn subject(&self) -> Subject {
+        Subject::Misfit
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.explained
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the response does not follow the force: the fit explains {} % of its power, no more than of noise; the \
+             parameters mean nothing. Check columns, cables and units",
+            three_digits(100.0 * self.explained)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_named_and_a_weak_response_is_not() {
+        // 3 of 2000 equations explain 0.15 % of noise on average, the best of 1000 lines some 1 %.
+        assert!(unrelated_response(0.9985_f64.sqrt(), 2000, 3).is_some());
+        assert!(unrelated_response(0.99_f64.sqrt(), 2000, 3).is_some());
+        assert!(unrelated_response(1.2, 2000, 3).is_some());
+        // A response in as much noise as response is still one.
+        assert_eq!(unrelated_response(0.5_f64.sqrt(), 2000, 3), None);
+        assert_eq!(unrelated_response(0.97_f64.sqrt(), 2000, 3), None);
+        // Nothing can be said without equations to spare.
+        assert_eq!(unrelated_response(0.5, 3, 3), None);
+        assert_eq!(unrelated_response(f64::NAN, 100, 3), None);
+    }
+}
