@@ -30,6 +30,9 @@ pub const PAIR_BYTES: usize = 128;
 /// are half of the samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
+/// Relative error of the standard errors from which a fit says so: that of 12 equations to spare.
+pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
+
 /// Number of bytes in the unit of the setting `memory_gb`.
 const GIGABYTE: f64 = 1e9;
 

@@ -4,7 +4,6 @@ use std::fmt::{self, Formatter};
 
 use mechid_signal::{Record, message};
 
-use super::digits::six_digits;
 use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::limits::SIGNIFICANCE;
 use super::{Subject, Verdict};
@@ -103,7 +102,7 @@ impl Check for DropOut {
             "{} is {} from sample {} on, {} in a row, while it moves before and after: a drop-out of the transmission; \
              leave it out of the window",
             names.channel(self.channel),
-            six_digits(self.level),
+            message::number(self.level),
             self.sample + 1,
             message::count(self.samples, "sample")
         )

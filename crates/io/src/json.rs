@@ -60,8 +60,24 @@ pub(crate) fn deserialized<'de, T: Deserialize<'de>>(
             root if root == "." => String::new(),
             field => format!("{field}: "),
         };
-        IoError::Json { file: file.into(), field, source: error.into_inner() }
+        IoError::Json { file: file.into(), field, source: shortened(error.into_inner()) }
     })
+}
+
+/// Largest number of bytes of a message of the parser, which repeats the value that it found.
+const MAX_MESSAGE: usize = 1000;
+
+/// Leaves the middle of a long message out.
+fn shortened(error: serde_json::Error) -> serde_json::Error {
+    let text = error.to_string();
+    if text.len() <= MAX_MESSAGE {
+        return error;
+    }
+    let (start, end) = (
+        text.floor_char_boundary(MAX_MESSAGE / 2),
+        text.ceil_char_boundary(text.len() - MAX_MESSAGE / 4),
+    );
+    serde_json::Error::custom(format!("{} … {}", &text[..start], &text[end..]))
 }
 
 /// Reads a word, one of the variants of an enum. Without this a value of another shape is refused

@@ -7,7 +7,7 @@ use mechid_checks::{Finding, SpectralResidual};
 use mechid_estimate::Estimate;
 use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
-use mechid_signal::Record;
+use mechid_signal::{Record, message};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 
 use super::coherence::ResponseCoherence;
@@ -17,7 +17,9 @@ use super::prediction::{Model, Prediction};
 use super::selection::SelectionSummary;
 use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
+use crate::limits::UNCERTAIN_ERROR;
 use crate::machine::NonlinearPart;
+use crate::text::significant;
 
 /// An estimate and how it came about.
 #[derive(Debug)]
@@ -160,18 +162,22 @@ impl Fitted {
         }
     }
 
-    /// Returns a remark where the residual is too short for its tests.
-    pub(crate) fn short_residual(&self) -> Option<String> {
-        let untested = |residual: &Residual| match residual {
-            Residual::Samples(residual) if residual.lags() == 0 => Some(residual.samples.len()),
-            _ => None,
-        };
-        let samples = self.residuals.iter().find_map(untested)?;
-        Some(format!(
-            "the residual of {} is too short for the tests of its colour and of its correlation with the force: nothing \
-             judges the model",
-            mechid_signal::message::count(samples, "sample")
-        ))
+    /// Returns a remark where so few equations are to spare that the standard errors are hardly known.
+    pub(crate) fn few_equations(&self) -> Option<String> {
+        let unknowns = self.estimate.unknowns();
+        let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));
+        let spare = self.equations.saturating_sub(of_one);
+        // Relative standard deviation of the root of a mean of squares of as many values.
+        let error = 1.0 / (2.0 * spare as f64).sqrt();
+        (error > UNCERTAIN_ERROR).then(|| {
+            format!(
+                "{} for {}: the standard errors themselves are known to {} % only, and the checks can hardly fail; \
+                 use a longer record",
+                message::count(self.equations, "equation"),
+                message::count(of_one, "unknown"),
+                significant(100.0 * error, 2)
+            )
+        })
     }
 
     /// Returns the system that was fitted, which has the responses to the forces that acted.

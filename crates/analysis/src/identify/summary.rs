@@ -195,7 +195,7 @@ impl IdentificationSummary {
             .chain(of_units)
             .chain(fitted.remarks.iter().cloned())
             .chain(looked_at)
-            .chain(fitted.short_residual())
+            .chain(fitted.few_equations())
             .chain(self.doubts())
             .chain(of_least_squares(fitted, &self.checks))
             .chain(rows::of_covariance(&fitted.estimate))

@@ -15,7 +15,7 @@ pub use self::measured::Drawn;
 use self::measured::{OnTheWay, Shown, Span, measured};
 pub use self::summary::RecordSummary;
 use crate::AnalysisError;
-use crate::measurement::units::{contradicted_rate, doubtful_time};
+use crate::measurement::units::{contradicted_rate, doubtful_time, doubtful_unit};
 use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
 
 /// Number of columns drawn at most.
@@ -143,6 +143,8 @@ impl Inspection<'_> {
             doubtful_time(table, &time, sampling).map(|finding| finding.to_string())
         }));
         summary.remarks.extend(contradicted_rate(table, self.reading));
+        let signals = asked.iter().filter(|column| Some(**column) != instants);
+        summary.remarks.extend(signals.filter_map(|column| doubtful_unit(table, *column)));
         let mut drawn = Vec::new();
         if let (Some(window), false) = (window, shown.is_empty()) {
             summary.remarks.extend(window.looked_at(table.file()));

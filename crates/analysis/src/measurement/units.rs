@@ -98,6 +98,31 @@ pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Opti
     })
 }
 
+/// Returns a remark on a text in the header of a column that may be a unit, whatever the column measures.
+pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
+    let stated = table.stated_unit(column, None)?;
+    if stated.evidence == Evidence::Stated || table.values(column).is_err() {
+        return None;
+    }
+    let what = match &stated.unit {
+        Some(unit) => format!(
+            "may be a unit with the factor {} to {}, which {}",
+            message::number(unit.in_si),
+            unit.quantity.si(),
+            match stated.evidence {
+                Evidence::Likely => "is taken where the column is used",
+                _ => "is not taken where the column is used",
+            }
+        ),
+        None => "is not understood".into(),
+    };
+    Some(format!(
+        "unit: \"{}\" in the header of column {} {what}: state the unit (`unit`) or the factor (`scale`)",
+        escaped(&stated.text),
+        table.label(column)
+    ))
+}
+
 /// Relative difference of two sampling rates that are one: a time column is printed with some digits.
 const SAME_RATE: f64 = 1e-4;
 

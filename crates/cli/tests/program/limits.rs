@@ -83,6 +83,67 @@ fn a_small_file_of_many_numbers_is_refused_before_they_are_held() {
     assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
 }
 
+/// A record of so many forces and displacements, each of which is noise.
+fn wide_record(channels: usize, samples: usize) -> (String, String) {
+    let names =
+        |kind: &str| (1..=channels).map(|at| format!("{kind}{at}")).collect::<Vec<_>>().join(",");
+    let mut text = format!("time,{},{}\n", names("f"), names("x"));
+    let mut state = 1_u64;
+    for row in 0..samples {
+        text += &format!("{}", row as f64 / 256.0);
+        for _ in 0..2 * channels {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            text += &format!(",{}", (state >> 40) as f64 / 1e7 - 0.8);
+        }
+        text.push('\n');
+    }
+    (text, format!("--force {} --displacement {}", names("f"), names("x")))
+}
+
+#[test]
+fn more_unknowns_than_equations_are_refused_before_any_work() {
+    let home = tempfile::tempdir().unwrap();
+    let (text, columns) = wide_record(500, 300);
+    fs::write(home.path().join("a.csv"), text).unwrap();
+    for more in ["", "--period 100", "--extent open", "--domain time --derivatives spectral"] {
+        let output = limited(home.path(), &format!("identify a.csv {columns} {more}"));
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{more}: {message}");
+        assert!(message.contains("equations do not determine 1500 unknowns"), "{more}: {message}");
+    }
+    refused(home.path(), &format!("frf a.csv {columns}"));
+}
+
+#[test]
+fn a_message_about_a_long_text_is_short() {
+    let home = tempfile::tempdir().unwrap();
+    let terms: Vec<String> = (1..200_000).map(|at| format!("k{at}: x1^3")).collect();
+    let machine = format!(
+        r#"{{"system": {{"mass": 1, "damping": 1, "stiffness": 1}}, "nonlinear": "{}"}}"#,
+        terms.join(", ")
+    );
+    fs::write(home.path().join("m.json"), machine).unwrap();
+    let output = limited(home.path(), "simulate m.json --output a.csv");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{}", message.len());
+    assert!(message.len() < 2000 && message.contains("invalid type"), "{message}");
+}
+
+#[test]
+fn a_matrix_of_comments_in_gzip_is_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+    packed.write_all(b"%%MatrixMarket matrix coordinate real general\n").unwrap();
+    let comments = b"%\n".repeat(1 << 20);
+    (0..60).for_each(|_| packed.write_all(&comments).unwrap());
+    fs::write(home.path().join("k.mtx.gz"), packed.finish().unwrap()).unwrap();
+    let machine = r#"{"system": {"mass": "k.mtx.gz", "damping": "k.mtx.gz", "stiffness": "k.mtx.gz"},
+        "sampling": {"rate": 100, "samples": 10}, "excitation": {"kind": "zero"}}"#;
+    fs::write(home.path().join("m.json"), machine).unwrap();
+    let output = limited(home.path(), "simulate m.json --output a.csv");
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 #[test]
 fn a_text_that_repeats_itself_in_gzip_is_refused() {
     let home = tempfile::tempdir().unwrap();

@@ -13,6 +13,7 @@ mod lines;
 mod modal;
 mod modes;
 mod pictures;
+mod public;
 mod records;
 mod reference;
 mod silverbox;
