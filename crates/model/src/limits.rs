@@ -50,3 +50,11 @@ pub(crate) const UNDAMPED: f64 = 1e-6;
 
 /// Highest exponent of a power law; the backbone resolves its harmonics up to it.
 pub(crate) const HIGHEST_EXPONENT: u32 = 9;
+
+// Machines of named elements
+
+/// Largest order of a matrix of an element: all entries are held, of this order 0.8 GB.
+pub(crate) const MAX_MATRIX_ORDER: usize = 10_000;
+
+/// Number of names that a message lists; more would hide the one that is wrong.
+pub(crate) const LISTED_NAMES: usize = 12;

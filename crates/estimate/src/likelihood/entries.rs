@@ -79,9 +79,9 @@ enum Entry {
 }
 
 impl Entries<'_> {
-    fn push(&mut self, name: String, start: f64) -> usize {
+    fn push(&mut self, name: String, unit: &'static str, start: f64) -> usize {
         let (min, max) = (f64::NEG_INFINITY, f64::INFINITY);
-        self.parameters.push(MachineParameter { name, start, min, max, prior: None });
+        self.parameters.push(MachineParameter { name, unit, start, min, max, prior: None });
         self.parameters.len() - 1
     }
 
@@ -101,7 +101,7 @@ impl Entries<'_> {
             Ok(parameter) => parameter.to_string(),
             Err(_) => format!("{}{}{}", matrix.letter(), row + 1, column + 1),
         };
-        let at = self.push(name, self.near.matrix(matrix)[(row, column)]);
+        let at = self.push(name, matrix.unit(), self.near.matrix(matrix)[(row, column)]);
         self.index.insert(key, at);
         Entry::Unknown(at)
     }
@@ -129,7 +129,7 @@ fn assembly(
         };
     let proportional = unknowns.has_proportional_damping();
     let factors = proportional.then(|| nearest_damping(near)).map(|[alpha, beta]| {
-        [entries.push("alpha".into(), alpha), entries.push("beta".into(), beta)]
+        [entries.push("alpha".into(), "1/s", alpha), entries.push("beta".into(), "s", beta)]
     });
     for row in 0..n {
         for column in 0..n {

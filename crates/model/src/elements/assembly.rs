@@ -11,6 +11,8 @@ use crate::{Matrix, ModelError, SecondOrderSystem};
 pub struct MachineParameter {
     /// Name: that of the shared parameter, or of the element and the coefficient.
     pub name: String,
+    /// SI unit at translations; a rotation has N·m/rad in place of N/m, and so on.
+    pub unit: &'static str,
     /// First value of the search, in the unit of the parameter.
     pub start: f64,
     /// Lower bound, in the unit of the parameter; −∞ without one.

@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 
 use super::assembly::OwnLoad;
+use crate::limits::LISTED_NAMES;
+
 use super::{
     Assembly, Coefficient, Element, FreeCoefficient, Instruments, Machine, MachineError,
     MachineParameter, Pattern, Power, SUPPORT, Speed, Term,
@@ -68,6 +70,14 @@ fn check_names(machine: &Machine, instruments: &Instruments) -> Result<(), Machi
     Ok(())
 }
 
+/// Names with commas between; of many the first ones.
+fn listed(names: &[String]) -> String {
+    match names.get(..LISTED_NAMES) {
+        Some(first) if names.len() > LISTED_NAMES => format!("{} …", first.join(", ")),
+        _ => names.join(", "),
+    }
+}
+
 /// A coefficient, or the index of the unknown that it is.
 #[derive(Clone, Copy)]
 pub(super) enum Factor {
@@ -120,9 +130,9 @@ impl<'a> Builder<'a> {
             }
         }
         let damping = &machine.damping;
-        builder.alpha = builder.factor("alpha", &damping.alpha)?;
-        builder.beta = builder.factor("beta", &damping.beta)?;
-        builder.loss_factor = builder.factor("loss_factor", &damping.loss_factor)?;
+        builder.alpha = builder.factor("alpha", "1/s", &damping.alpha)?;
+        builder.beta = builder.factor("beta", "s", &damping.beta)?;
+        builder.loss_factor = builder.factor("loss_factor", "", &damping.loss_factor)?;
         Ok(builder)
     }
 
@@ -137,7 +147,7 @@ impl<'a> Builder<'a> {
             what,
             name: name.to_owned(),
             dof: dof.to_owned(),
-            known: self.machine.dofs.join(", "),
+            known: listed(&self.machine.dofs),
         })
     }
 
@@ -167,6 +177,7 @@ impl<'a> Builder<'a> {
     pub(super) fn factor(
         &mut self,
         name: &str,
+        unit: &'static str,
         coefficient: &Coefficient,
     ) -> Result<Factor, MachineError> {
         match coefficient {
@@ -174,7 +185,7 @@ impl<'a> Builder<'a> {
                 Err(MachineError::NotFinite { name: name.to_owned(), value: *value })
             }
             Coefficient::Known(value) => Ok(Factor::Known(*value)),
-            Coefficient::Free(free) => Ok(Factor::Unknown(self.unknown(name, free)?)),
+            Coefficient::Free(free) => Ok(Factor::Unknown(self.unknown(name, unit, free)?)),
             Coefficient::Shared(parameter) => {
                 if let Some(at) = self.shared.get(parameter) {
                     return Ok(Factor::Unknown(*at));
@@ -184,21 +195,26 @@ impl<'a> Builder<'a> {
                     name: name.to_owned(),
                     parameter: parameter.clone(),
                 })?;
-                let at = self.unknown(parameter, free)?;
+                let at = self.unknown(parameter, unit, free)?;
                 self.shared.insert(parameter.clone(), at);
                 Ok(Factor::Unknown(at))
             }
         }
     }
 
-    fn unknown(&mut self, name: &str, free: &FreeCoefficient) -> Result<usize, MachineError> {
+    fn unknown(
+        &mut self,
+        name: &str,
+        unit: &'static str,
+        free: &FreeCoefficient,
+    ) -> Result<usize, MachineError> {
         let start = free.checked_start(name)?;
         if self.parameters.iter().any(|parameter| parameter.name == name) {
             return Err(MachineError::Repeated { what: "parameter", name: name.to_owned() });
         }
         let (min, max) = (free.min.unwrap_or(f64::NEG_INFINITY), free.max.unwrap_or(f64::INFINITY));
-        let prior = free.prior;
-        self.parameters.push(MachineParameter { name: name.to_owned(), start, min, max, prior });
+        let (name, prior) = (name.to_owned(), free.prior);
+        self.parameters.push(MachineParameter { name, unit, start, min, max, prior });
         Ok(self.parameters.len() - 1)
     }
 
@@ -222,6 +238,11 @@ impl<'a> Builder<'a> {
             elements.push(format!("{name:?}"));
             *has_mass |= is_mass;
         }
+    }
+
+    /// Allows a degree of freedom to have no mass.
+    pub(super) fn allow_no_mass(&mut self, at: usize) {
+        self.touched[at].1 = true;
     }
 
     fn add(&mut self, name: &str, element: &Element) -> Result<(), MachineError> {

@@ -14,9 +14,14 @@ impl Builder<'_> {
         mass: &Coefficient,
     ) -> Result<(), MachineError> {
         let at = self.dof("element", name, at)?;
-        let factor = self.factor(name, mass)?;
+        let factor = self.factor(name, "kg", mass)?;
         let entries = vec![(at, 1.0)];
-        self.touch(name, &entries, true);
+        // A mass of 0 says that there is none; it does not hold a degree of freedom.
+        if mass.is_zero() {
+            self.allow_no_mass(at);
+        } else {
+            self.touch(name, &entries, true);
+        }
         let relative = vec![(at, 1.0), (self.machine.dofs.len(), -self.direction[at])];
         let pattern = Pattern::Dyad { left: entries.clone(), right: entries.clone() };
         self.push(&pattern, Power::Mass, &[factor]);
@@ -42,11 +47,11 @@ impl Builder<'_> {
             1 => name.to_owned(),
             _ => format!("{name}.{letter}"),
         };
-        let k = self.factor(&named("k"), stiffness)?;
-        let c = self.factor(&named("c"), damping)?;
+        let k = self.factor(&named("k"), "N/m", stiffness)?;
+        let c = self.factor(&named("c"), "N·s/m", damping)?;
         let eta = match loss_factor.is_zero() {
             true => self.loss_factor,
-            false => self.factor(&named("eta"), loss_factor)?,
+            false => self.factor(&named("eta"), "", loss_factor)?,
         };
         let pattern = Pattern::Dyad { left: entries.clone(), right: entries };
         self.push(&pattern, Power::Stiffness, &[k]);
@@ -64,14 +69,14 @@ impl Builder<'_> {
             self.touch(name, &ends[direction], false);
         }
         let matrices = [
-            ("k", Power::Stiffness, &bearing.stiffness),
-            ("c", Power::Damping, &bearing.damping),
-            ("m", Power::Mass, &bearing.mass),
+            ("k", "N/m", Power::Stiffness, &bearing.stiffness),
+            ("c", "N·s/m", Power::Damping, &bearing.damping),
+            ("m", "kg", Power::Mass, &bearing.mass),
         ];
-        for (letter, power, coefficients) in matrices {
+        for (letter, unit, power, coefficients) in matrices {
             let places = [("xx", 0, 0), ("xy", 0, 1), ("yx", 1, 0), ("yy", 1, 1)];
             for ((place, row, column), coefficient) in places.into_iter().zip(coefficients) {
-                let factor = self.factor(&format!("{name}.{letter}{place}"), coefficient)?;
+                let factor = self.factor(&format!("{name}.{letter}{place}"), unit, coefficient)?;
                 let (left, right) = (ends[row].clone(), ends[column].clone());
                 self.push(&Pattern::Dyad { left, right }, power, &[factor]);
             }
@@ -98,7 +103,7 @@ impl Builder<'_> {
         for (what, part, power) in parts {
             let Some((matrix, coefficient)) = part else { continue };
             self.check_matrix(name, what, matrix, dofs.len())?;
-            let factor = self.factor(&format!("{name}.{what}"), coefficient)?;
+            let factor = self.factor(&format!("{name}.{what}"), "", coefficient)?;
             let relative = self.block(&dofs, matrix, true);
             match power {
                 Power::Mass => {
@@ -166,7 +171,7 @@ impl Builder<'_> {
         let at = [self.dof("element", name, &at[0])?, self.dof("element", name, &at[1])?];
         let units = [("real", Complex::new(1.0, 0.0)), ("imaginary", Complex::new(0.0, 1.0))];
         for ((what, unit), part) in units.into_iter().zip(parts) {
-            match self.factor(&format!("{name}.{what}"), part)? {
+            match self.factor(&format!("{name}.{what}"), "kg·m", part)? {
                 Factor::Known(0.0) => {}
                 Factor::Known(value) => {
                     self.loads.push(OwnLoad { at, scale: unit * value, parameter: None });

@@ -54,7 +54,9 @@ pub enum MachineError {
         problem: String,
     },
     /// A coefficient refers to a parameter that is not described.
-    #[error("{name:?} refers to the parameter {parameter:?}, which `parameters` does not describe")]
+    #[error(
+        "{name:?} refers to the parameter {parameter:?}, which \"parameters\" does not describe"
+    )]
     UnknownParameter {
         /// Name of the coefficient.
         name: String,
@@ -77,7 +79,7 @@ pub enum MachineError {
     },
     /// The lower bound is not below the upper one.
     #[error(
-        "the bounds of {name:?} contradict each other: `min` {} is not below `max` {}",
+        "the bounds of {name:?} contradict each other: \"min\" {} is not below \"max\" {}",
         message::number(*min),
         message::number(*max)
     )]
@@ -91,7 +93,7 @@ pub enum MachineError {
     },
     /// The search would start outside the bounds.
     #[error(
-        "`start` {} of {name:?} is outside its bounds, {} to {}",
+        "\"start\" {} of {name:?} is outside its bounds, {} to {}",
         message::number(*start),
         message::number(*min),
         message::number(*max)
@@ -107,7 +109,7 @@ pub enum MachineError {
         max: f64,
     },
     /// An unknown has no value from which the search could start.
-    #[error("{name:?} is unknown: give `start`, both `min` and `max`, or `prior`")]
+    #[error("{name:?} is unknown: give \"start\", both \"min\" and \"max\", or \"prior\"")]
     NoStart {
         /// Name of the coefficient.
         name: String,
@@ -135,7 +137,7 @@ pub enum MachineError {
         elements: String,
     },
     /// No element touches a degree of freedom.
-    #[error("no element is at degree of freedom {dof:?}")]
+    #[error("no element holds degree of freedom {dof:?}")]
     Detached {
         /// Degree of freedom.
         dof: String,
@@ -153,7 +155,7 @@ pub enum MachineError {
         name: String,
     },
     /// Unbalance or gyroscopic terms need a speed.
-    #[error("{what} {name:?} needs the speed of the rotor: give `speed`")]
+    #[error("{what} {name:?} needs the speed of the rotor: give \"speed\"")]
     NoSpeed {
         /// `"element"` or `"input"`.
         what: &'static str,

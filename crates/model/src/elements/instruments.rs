@@ -8,7 +8,8 @@ use crate::ResponseQuantity;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Sensor {
-    /// Name, that of the channel.
+    /// Name, that of the channel; in JSON that of the degree of freedom if it is left out.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub name: String,
     /// Degree of freedom.
     pub at: String,
@@ -19,7 +20,7 @@ pub struct Sensor {
     /// Quantity measured.
     pub quantity: ResponseQuantity,
     /// Reading per unit of the quantity.
-    #[cfg_attr(feature = "serde", serde(default = "one"))]
+    #[cfg_attr(feature = "serde", serde(default = "one", skip_serializing_if = "is_one"))]
     pub gain: f64,
 }
 
@@ -31,7 +32,8 @@ pub struct Sensor {
 pub enum Input {
     /// A force (N), or a moment (N·m) at a rotation.
     Force {
-        /// Name, that of the channel.
+        /// Name, that of the channel; in JSON that of the degree of freedom if it is left out.
+        #[cfg_attr(feature = "serde", serde(default))]
         name: String,
         /// Degree of freedom.
         at: String,
@@ -88,6 +90,11 @@ fn one() -> f64 {
     1.0
 }
 
+#[cfg(feature = "serde")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
 impl Sensor {
     /// Takes a sensor of unit gain with the name of its degree of freedom.
     pub fn new(at: &str, quantity: ResponseQuantity) -> Self {
@@ -105,6 +112,27 @@ impl Sensor {
     #[must_use]
     pub fn relative_to_support(self) -> Self {
         self.relative_to(SUPPORT)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Sensor {
+    /// The same with the name of its degree of freedom if it has none.
+    pub(super) fn named(self) -> Self {
+        if self.name.is_empty() { Self { name: self.at.clone(), ..self } } else { self }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Input {
+    /// The same with the name of its degree of freedom if it is a force without one.
+    pub(super) fn named(self) -> Self {
+        match self {
+            Self::Force { name, at, against } if name.is_empty() => {
+                Self::Force { name: at.clone(), at, against }
+            }
+            other => other,
+        }
     }
 }
 

@@ -35,14 +35,14 @@
 //!     {"name": "coupling", "kind": "link", "between": ["x", "y"], "k": 1e4, "eta": 0.02},
 //!     {"name": "A", "kind": "bearing", "at": ["x", "y"], "kxx": {"start": 1e7}, "kyy": 1e7},
 //!     {"name": "plate", "kind": "matrices", "dofs": ["x", "y"],
-//!      "stiffness": {"size": 2, "entries": [[0, 0, 1e5], [1, 1, 1e5]]}}
+//!      "stiffness": {"size": 2, "rows": [1, 2], "columns": [1, 2], "values": [1e5, 1e5]}}
 //!   ],
 //!   "parameters": {"mass": {"prior": {"mean": 12, "standard_deviation": 0.5}}},
 //!   "damping": {"alpha": 0.1, "beta": 1e-5}
 //! }
 //! ```
 //!
-//! Rows and columns of sparse matrices are counted from 0. Other kinds are `unbalance` (`at` two degrees of
+//! Rows and columns of sparse matrices are counted from 1. Other kinds are `unbalance` (`at` two degrees of
 //! freedom, `real`, `imaginary`); links at one place end at the support.
 
 mod assembly;
@@ -52,10 +52,13 @@ mod channels;
 mod coefficient;
 mod element;
 mod error;
+mod instrumented;
 mod instruments;
 mod machine;
 #[cfg(feature = "serde")]
 mod serde_form;
+#[cfg(feature = "serde")]
+mod serde_instrumented;
 #[cfg(feature = "serde")]
 mod serde_write;
 mod term;
@@ -65,6 +68,7 @@ pub use channels::{InputColumn, SensorRow};
 pub use coefficient::{Coefficient, FreeCoefficient, Prior};
 pub use element::{Bearing, Element, MatrixElement, SUPPORT};
 pub use error::MachineError;
+pub use instrumented::{Candidates, InstrumentedMachine};
 pub use instruments::{Input, Instruments, Sensor, Speed};
 pub use machine::{Machine, ProportionalDamping};
 pub use term::{Pattern, Power, Term};

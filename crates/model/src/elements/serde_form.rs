@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use crate::limits::MAX_MATRIX_ORDER;
+
 use super::{
     Bearing, Coefficient, Element, FreeCoefficient, Machine, MachineError, MatrixElement,
     ProportionalDamping, SUPPORT,
@@ -43,12 +45,15 @@ pub(super) enum Places {
     Several(Vec<String>),
 }
 
-/// Rows of a matrix, or its non-zero entries [row, column, value], counted from 0.
+/// Rows of a matrix, or its non-zero entries by row and column, counted from 1.
 #[derive(Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "a matrix is a list of rows, or the size, rows, columns and values of a sparse one"
+)]
 pub(super) enum MatrixForm {
     Dense(Vec<Vec<f64>>),
-    Sparse { size: usize, entries: Vec<(usize, usize, f64)> },
+    Sparse { size: usize, rows: Vec<usize>, columns: Vec<usize>, values: Vec<f64> },
 }
 
 /// Any element; what does not belong to its kind is absent.
@@ -253,16 +258,32 @@ impl ElementForm {
                 }
                 DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
             }
-            MatrixForm::Sparse { size, entries } => {
+            MatrixForm::Sparse { size, rows, columns, values } => {
+                if size > MAX_MATRIX_ORDER {
+                    let problem = format!(
+                        "`{what}` has {size} rows; all entries are held, of {MAX_MATRIX_ORDER} at most"
+                    );
+                    return Err(self.error(problem));
+                }
+                if rows.len() != values.len() || columns.len() != values.len() {
+                    let problem = format!(
+                        "`{what}` needs a row, a column and a value for each entry, got {}, {} and {}",
+                        rows.len(),
+                        columns.len(),
+                        values.len()
+                    );
+                    return Err(self.error(problem));
+                }
                 let mut matrix = DMatrix::zeros(size, size);
-                for (row, column, value) in entries {
-                    if row >= size || column >= size {
+                for ((row, column), value) in rows.into_iter().zip(columns).zip(values) {
+                    let inside = 1..=size;
+                    if !inside.contains(&row) || !inside.contains(&column) {
                         let problem = format!(
                             "entry ({row}, {column}) of `{what}` is outside a {size}×{size} matrix"
                         );
                         return Err(self.error(problem));
                     }
-                    matrix[(row, column)] += value;
+                    matrix[(row - 1, column - 1)] += value;
                 }
                 matrix
             }

@@ -25,8 +25,22 @@ fn given(coefficient: Coefficient) -> Option<Coefficient> {
 
 fn written(part: Option<(DMatrix<f64>, Coefficient)>) -> (Option<MatrixForm>, Option<Coefficient>) {
     let Some((matrix, factor)) = part else { return (None, None) };
-    let rows = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
     let factor = (factor != Coefficient::Known(1.0)).then_some(factor);
+    let filled = matrix.iter().filter(|value| **value != 0.0).count();
+    // A sparse entry takes three numbers.
+    if matrix.is_square() && 3 * filled < matrix.len() {
+        let size = matrix.nrows();
+        let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, entries) in matrix.row_iter().enumerate() {
+            for (column, value) in entries.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+                rows.push(row + 1);
+                columns.push(column + 1);
+                values.push(*value);
+            }
+        }
+        return (Some(MatrixForm::Sparse { size, rows, columns, values }), factor);
+    }
+    let rows = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
     (Some(MatrixForm::Dense(rows)), factor)
 }
 
@@ -88,7 +102,7 @@ mod tests {
                 {"name": "m", "kind": "mass", "at": "x", "m": "rotor mass"},
                 {"name": "m2", "at": "y", "m": "rotor mass"},
                 {"name": "housing", "dofs": ["u", "v"],
-                 "mass": {"size": 2, "entries": [[0, 0, 30.0], [1, 1, 30.0]]},
+                 "mass": {"size": 2, "rows": [1, 2], "columns": [1, 2], "values": [30.0, 30.0]},
                  "stiffness": [[1e7, 0.0], [0.0, 2e7]]},
                 {"name": "film", "at": ["x", "y"], "to": ["u", "v"],
                  "kxx": {"start": 1e6, "min": 0.0}, "kyy": {"prior": {"mean": 2e6, "standard_deviation": 1e5}},
@@ -137,7 +151,7 @@ mod tests {
         let message = refused(&|v| v["elements"][3]["at"] = json!("x"));
         assert_eq!(message, "element \"film\": `at` must be two degrees of freedom, x and y");
         let message = refused(&|v| v["elements"][2]["mass"]["size"] = json!(1));
-        assert!(message.starts_with("element \"housing\": entry (1, 1) of `mass`"), "{message}");
+        assert!(message.starts_with("element \"housing\": entry (2, 2) of `mass`"), "{message}");
         let message = refused(&|v| v["elements"][1] = json!({"name": "q", "at": "x"}));
         assert!(message.starts_with("element \"q\": `kind` is missing"), "{message}");
         let message = refused(&|v| v["elements"][4]["k"] = json!({"begin": 1.0}));
