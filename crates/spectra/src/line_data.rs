@@ -158,6 +158,30 @@ impl LineData {
         Ok(self)
     }
 
+    /// Returns the lines that `keep` accepts by their angular frequency (rad/s), record by record; `None` if
+    /// none is left.
+    pub fn retained(&self, keep: impl Fn(f64) -> bool) -> Option<Self> {
+        let rows: Vec<usize> = (0..self.len()).filter(|row| keep(self.omega[*row])).collect();
+        if rows.is_empty() {
+            return None;
+        }
+        let mut records = Vec::with_capacity(self.records.len());
+        for (range, transient) in &self.records {
+            let at = |row: usize| rows.partition_point(|kept| *kept < row);
+            let kept = at(range.start)..at(range.end);
+            if !kept.is_empty() {
+                records.push((kept, *transient));
+            }
+        }
+        Some(Self {
+            omega: rows.iter().map(|row| self.omega[*row]).collect(),
+            inputs: self.inputs.select_rows(&rows),
+            outputs: self.outputs.select_rows(&rows),
+            records,
+            noise: self.noise.as_ref().map(|noise| noise.rows(&rows)),
+        })
+    }
+
     /// Returns the number of lines of all records.
     pub fn len(&self) -> usize {
         self.omega.len()
@@ -235,5 +259,10 @@ mod tests {
         assert_eq!(two.len(), 2 * one.len());
         assert_eq!(two.records()[1].0, one.len()..2 * one.len());
         assert_eq!(two.outputs().rows(one.len(), one.len()), one.outputs().rows(0, one.len()));
+        let low = two.retained(|omega| omega < 2.0 * TAU).unwrap();
+        assert_eq!(low.records().len(), 2);
+        assert_eq!(low.records()[1].0, low.len() / 2..low.len());
+        assert_eq!(low.outputs().row(low.len() / 2), one.outputs().row(0));
+        assert_eq!(two.retained(|_| false), None);
     }
 }

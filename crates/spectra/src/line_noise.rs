@@ -16,6 +16,7 @@ use crate::SpectraError;
 pub struct LineNoise {
     covariance: Vec<DMatrix<Complex<f64>>>,
     degrees_of_freedom: f64,
+    total_degrees_of_freedom: f64,
 }
 
 impl LineNoise {
@@ -37,13 +38,15 @@ impl LineNoise {
                 return Err(SpectraError::NotFinite { row, value });
             }
         }
-        Ok(Self { covariance, degrees_of_freedom: f64::INFINITY })
+        let known = f64::INFINITY;
+        Ok(Self { covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
     }
 
-    /// Returns the same as sample covariances of so many degrees of freedom each.
+    /// Returns the same as sample covariances, each the mean over `each` complex deviations; all of them
+    /// together are made of `total` deviations, fewer than of all rows where rows share them.
     #[must_use]
-    pub fn with_degrees_of_freedom(self, degrees_of_freedom: f64) -> Self {
-        Self { degrees_of_freedom, ..self }
+    pub fn with_degrees_of_freedom(self, each: f64, total: f64) -> Self {
+        Self { degrees_of_freedom: each, total_degrees_of_freedom: total, ..self }
     }
 
     /// Returns the covariance of each row.
@@ -56,12 +59,28 @@ impl LineNoise {
         self.degrees_of_freedom
     }
 
+    /// Returns the number of complex deviations that all covariances together are made of; ∞ of known ones.
+    pub fn total_degrees_of_freedom(&self) -> f64 {
+        self.total_degrees_of_freedom
+    }
+
+    /// Returns some of the rows; the deviations that they are made of are in proportion.
+    pub(crate) fn rows(&self, rows: &[usize]) -> Self {
+        let share = rows.len() as f64 / self.covariance.len().max(1) as f64;
+        Self {
+            covariance: rows.iter().map(|row| self.covariance[*row].clone()).collect(),
+            degrees_of_freedom: self.degrees_of_freedom,
+            total_degrees_of_freedom: self.total_degrees_of_freedom * share,
+        }
+    }
+
     /// Returns these rows followed by those of another record.
     #[must_use]
     pub(crate) fn followed_by(mut self, other: &Self) -> Self {
         self.covariance.extend_from_slice(&other.covariance);
         // The more uncertain of the two decides how far the weights can be trusted.
         self.degrees_of_freedom = self.degrees_of_freedom.min(other.degrees_of_freedom);
+        self.total_degrees_of_freedom += other.total_degrees_of_freedom;
         self
     }
 }

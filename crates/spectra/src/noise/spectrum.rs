@@ -215,6 +215,12 @@ impl NoiseSpectrum {
         self.degrees_of_freedom
     }
 
+    /// Returns the number of independent complex deviations that all covariances together are made of;
+    /// infinite for known noise.
+    pub fn deviations(&self) -> f64 {
+        self.total_degrees_of_freedom
+    }
+
     /// Spectra that were made of samples, one of each experiment; none of known noise.
     pub fn models(&self) -> &[NoiseModel] {
         &self.models
