@@ -1,8 +1,9 @@
 //! The fit of a model to line data by maximum likelihood.
 
+use mechid_signal::correlation::share_above_of;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::covariance::Information;
 use super::limits::{
@@ -38,7 +39,7 @@ pub(super) struct Fit<'a, M> {
     pub(super) degrees_of_freedom: f64,
     /// Sum of squares of the data over its expectation; `None` if the noise comes from the residual.
     pub(super) misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit under a right model with known noise.
+    /// Probability of a larger misfit under a right model.
     pub(super) misfit_p_value: Option<f64>,
     pub(super) is_white: Option<bool>,
 }
@@ -107,34 +108,72 @@ fn with_known_noise<'a, M: ResponseModel>(
     settings: &Settings,
 ) -> Result<Fit<'a, M>, LikelihoodError> {
     let outputs = data.outputs().ncols();
-    let freedom = data.noise().map_or(f64::INFINITY, |noise| noise.degrees_of_freedom());
-    let [inflation, mean_ratio] = sampled_weights(freedom, outputs)?;
+    let known = f64::INFINITY;
+    let [freedom, total] = data.noise().map_or([known, known], |noise| {
+        [noise.degrees_of_freedom(), noise.total_degrees_of_freedom()]
+    });
+    let [inflation, _] = sampled_weights(freedom, outputs)?;
     let residual = Residual { model, data, weights: &weights, priors: &space.priors };
     let spare = (residual.len() + space.priors.len())
         .saturating_sub(space.start.len() + residual.transient_unknowns());
-    let expected = spare as f64 * mean_ratio;
-    let total = freedom * data.len() as f64;
-    let spread = (2.0 / spare.max(1) as f64 + 2.0 / total).sqrt();
-    let plausible = expected * (1.0 + PLAUSIBLE * spread);
+    let expected = Expected::new([freedom, total], outputs, data.len(), spare);
+    let plausible = expected.cost + PLAUSIBLE * expected.deviation();
     let agreeing = |cost: f64| if cost <= plausible { CONFIRMED } else { usize::MAX };
     let minima = searched(&residual, space, settings, agreeing)?;
     let minimum = minima.best().minimum.clone();
     let information = Information::new(&residual, &minimum, inflation)?;
-    let chi_squared = ChiSquared::new(spare.max(1) as f64).ok();
-    let p_value = chi_squared.map(|law| law.sf(minimum.cost / mean_ratio));
     Ok(Fit {
         model,
         data,
         space,
-        misfit_ratio: Some(minimum.cost / expected),
-        misfit_p_value: p_value.filter(|_| freedom.is_infinite()),
+        misfit_ratio: Some(minimum.cost / expected.cost),
+        misfit_p_value: Some(expected.p_value(minimum.cost)),
         weights,
         minimum,
         minima,
         information,
-        degrees_of_freedom: total,
+        degrees_of_freedom: 2.0 * total,
         is_white: None,
     })
+}
+
+/// Sum of squares of a right model in units of the noise, whose covariances may be sampled.
+struct Expected {
+    cost: f64,
+    variance: f64,
+}
+
+impl Expected {
+    /// For covariances of `freedom` deviations each and `total` together, with `spare` real numbers that
+    /// no parameter explains. Rows with a common covariance make one statistic, Hotelling's T².
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapter 9.
+    fn new([freedom, total]: [f64; 2], outputs: usize, lines: usize, spare: usize) -> Self {
+        let (p, lines) = (outputs as f64, lines as f64);
+        let share = spare.max(1) as f64 / (2.0 * p * lines);
+        let (mean, variance) = if freedom.is_infinite() {
+            (p * lines, p * lines)
+        } else {
+            let groups = total / freedom;
+            let size = p * lines / groups;
+            let mean = size * freedom / (freedom - p);
+            let square =
+                size * (size + 1.0) * freedom * freedom / ((freedom - p) * (freedom - p - 1.0));
+            (groups * mean, groups * (square - mean * mean))
+        };
+        // Real and imaginary parts have unit variance each.
+        Self { cost: 2.0 * mean * share, variance: 4.0 * variance * share }
+    }
+
+    fn deviation(&self) -> f64 {
+        self.variance.sqrt()
+    }
+
+    /// Probability of a larger sum of squares.
+    fn p_value(&self, cost: f64) -> f64 {
+        share_above_of(cost, self.cost, 0.5 * self.variance)
+    }
 }
 
 fn with_unknown_noise<'a, M: ResponseModel>(

@@ -63,3 +63,7 @@ pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 /// Level of significance of the misfit of known noise below which standard errors and intervals are those of
 /// the misfit: a right model gets wider intervals than it needs in one of a thousand fits.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
+
+/// Part of a gradient outside the determined combinations above which the quantity is not determined; less is
+/// rounding of the singular vectors.
+pub(super) const UNDETERMINED_PART: f64 = 1e-5;

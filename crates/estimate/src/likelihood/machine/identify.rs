@@ -2,7 +2,7 @@
 
 use mechid_model::elements::{Assembly, Instruments, Machine};
 use mechid_spectra::{LineData, Transient};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{MachineModel, MeasuredPart};
 use crate::likelihood::estimate::LikelihoodEstimate;
@@ -31,6 +31,15 @@ pub struct MachineEstimate {
     pub assembly: Assembly,
     /// Variance of the noise of each output, lines × p.
     pub(super) variance: DMatrix<f64>,
+    /// Difference of measured and modelled outputs, lines × p, in the units of the outputs; the transients
+    /// of open records are subtracted.
+    pub errors: DMatrix<Complex<f64>>,
+    /// Residual in units of the noise, of unit variance: row 2(p·line + output) is a real part, the next
+    /// one the imaginary part.
+    pub residual: DVector<f64>,
+    /// Orthonormal columns of the part of the residual that the parameters explain, rows as of
+    /// [`MachineEstimate::residual`].
+    pub explained: DMatrix<f64>,
     /// Part whose receptance was measured.
     pub(super) part: Option<MeasuredPart>,
 }
@@ -43,7 +52,7 @@ pub struct MachineEstimate {
 /// use mechid_model::ResponseQuantity;
 /// use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
 /// use mechid_spectra::{LineData, Transient};
-/// use nalgebra::{Complex, DMatrix};
+/// use nalgebra::{Complex, DMatrix, DVector};
 ///
 /// // A mass of 2 kg on a spring and a damper, with an exact receptance up to a disturbance.
 /// let omega: Vec<f64> = (1..40).map(|line| 5.0 * line as f64).collect();
@@ -136,7 +145,14 @@ fn identify(
     let variance = DMatrix::from_fn(data.len(), data.outputs().ncols(), |row, output| {
         fit.weights.variance(row, output)
     });
-    Ok(MachineEstimate { likelihood, assembly, variance, part })
+    let parameters = &fit.minimum.parameters;
+    let failed = || LikelihoodError::NoResponse { at: "the estimate" };
+    let linearised = fit.residual().linearise(parameters).ok_or_else(failed)?;
+    let errors = fit.residual().errors(parameters).ok_or_else(failed)?.errors;
+    let rows = 2 * data.outputs().len();
+    let explained = linearised.jacobian.rows(0, rows).into_owned().qr().q();
+    let residual = linearised.residual.rows(0, rows).into_owned();
+    Ok(MachineEstimate { likelihood, assembly, variance, errors, residual, explained, part })
 }
 
 fn parameter_space(assembly: &Assembly) -> ParameterSpace {

@@ -6,6 +6,7 @@ mod identify;
 mod model;
 mod modes;
 mod nominal;
+mod system;
 #[cfg(test)]
 mod tests;
 
@@ -17,6 +18,7 @@ pub use candidates::{Candidate, CandidateGain};
 pub use identify::{MachineEstimate, MeasuredReceptance, identify_joined, identify_machine};
 pub use model::{MachineLine, MachineModel};
 pub use modes::MachineMode;
+pub use system::UncertainEntries;
 
 /// A part of a machine that is known by its measured receptance instead of a model.
 ///

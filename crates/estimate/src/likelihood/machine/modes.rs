@@ -1,10 +1,11 @@
 //! Modes of an identified machine, with the uncertainty of its parameters.
 
-use mechid_model::elements::{Assembly, Power, Speed};
+use mechid_model::elements::{Assembly, Power};
 use mechid_model::{Mode, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::MachineEstimate;
+use super::system::constant_speed;
 use crate::likelihood::LikelihoodError;
 
 /// A mode with standard errors.
@@ -22,19 +23,6 @@ pub struct MachineMode {
 const SHIFT: f64 = 1e-7;
 
 impl MachineEstimate {
-    /// Returns M, C + Ω G and K with the parameters identified, at the constant speed of the instruments.
-    ///
-    /// # Errors
-    /// What [`Assembly::system`] refuses: a degree of freedom without mass.
-    pub fn system(&self) -> Result<SecondOrderSystem, LikelihoodError> {
-        let speed = match self.assembly.speed() {
-            Speed::Constant(speed) => speed,
-            Speed::None | Speed::Synchronous => 0.0,
-        };
-        let system = self.assembly.system(&self.likelihood.values(), speed);
-        system.map_err(|error| LikelihoodError::Machine(error.into()))
-    }
-
     /// Returns the modes of [`MachineEstimate::system`] by rising frequency; structural damping is not in
     /// them.
     ///
@@ -101,10 +89,7 @@ fn slopes(
     let slope = complex(system.mass()) * (lambda * 2.0) + complex(system.damping());
     let denominator = left.dot(&(slope * right));
     let mut slopes = DVector::<Complex<f64>>::zeros(values.len());
-    let speed = match assembly.speed() {
-        Speed::Constant(speed) => speed,
-        _ => 0.0,
-    };
+    let speed = constant_speed(assembly.speed());
     for term in assembly.terms().iter().filter(|term| term.power != Power::Hysteresis) {
         if term.is_known() {
             continue;
