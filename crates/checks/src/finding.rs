@@ -119,6 +119,10 @@ findings! {
     Gain in gain,
     /// Residual power against the power of the noise.
     Misfit in misfit,
+    /// Prior of a parameter against what the data say of it.
+    PriorAgreement in prior,
+    /// Number of searches that ended at the highest likelihood.
+    SearchAgreement in search,
     /// Motion that a fit leaves and takes for the response to forces that were not measured.
     UnmeasuredForce in unmeasured_force,
     /// The response does not follow the force.

@@ -39,7 +39,9 @@ mod instability;
 mod kinematics;
 mod leakage;
 pub mod limits;
+mod line_correlation;
 mod linearity;
+mod machine;
 mod mass;
 mod misfit;
 mod no_logarithm;
@@ -48,10 +50,12 @@ mod period;
 mod period_scatter;
 mod persistent_excitation;
 mod power;
+mod prior;
 mod quantisation;
 mod regressors;
 mod response_residual;
 mod seam;
+mod search;
 mod serialised;
 mod spectral;
 mod spectral_residual;
@@ -92,6 +96,7 @@ pub use leakage::Leakage;
 pub use leakage::leakage;
 pub use linearity::{Linearity, Power};
 pub use linearity::{linearity, linearity_of_open_record};
+pub use machine::{after_machine_fit, whiteness_of_lines};
 pub use mass::NegativeMass;
 pub use mass::negative_mass;
 pub use misfit::{Concentration, Misfit, NoiseSource};
@@ -103,10 +108,12 @@ pub use period_scatter::PeriodScatter;
 pub use persistent_excitation::PersistentExcitation;
 pub use power::PowerFlow;
 pub use power::power;
+pub use prior::PriorAgreement;
 pub use quantisation::{Quantisation, quantised_channels};
 pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
 pub use seam::{Seam, periodicity, periodicity_across};
+pub use search::SearchAgreement;
 pub use spectral::{before_spectral_fit, steady_periods};
 pub use spectral_residual::SpectralResidual;
 pub use spike::{Spike, spiked_channels};
@@ -191,6 +198,10 @@ pub enum Subject {
     Symmetry,
     /// Residual power against the noise.
     Misfit,
+    /// Priors against the data.
+    Prior,
+    /// Searches from several first values.
+    Search,
     /// Residual against powers of the displacement.
     Linearity,
     /// Whiteness of the residual.
@@ -218,6 +229,8 @@ impl fmt::Display for Subject {
             Subject::Mass => "mass",
             Subject::Symmetry => "symmetry",
             Subject::Misfit => "misfit",
+            Subject::Prior => "prior",
+            Subject::Search => "search",
             Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",
             Subject::CrossCorrelation => "cross-correlation",

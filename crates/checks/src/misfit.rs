@@ -42,6 +42,8 @@ pub enum NoiseSource {
     Periods,
     /// Coherence of averaged frequency responses.
     Coherence,
+    /// Standard errors that the data state.
+    Stated,
     /// Noise of the force on the lines on which it decides, stated or read above the band that it drives.
     Force,
 }
@@ -80,6 +82,7 @@ impl Display for NoiseSource {
         f.write_str(match self {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
+            NoiseSource::Stated => "that the standard errors state",
             NoiseSource::Force => "where that of the force decides",
         })
     }

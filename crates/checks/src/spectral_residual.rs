@@ -11,7 +11,8 @@ use super::concentration::Part;
 use super::cross_correlation::CrossCorrelation;
 use super::finding::Finding;
 use super::limits::LAGS;
-use super::limits::{FREE_RESIDUALS, LINES_PER_CORRELATION, MAX_DISTANCES, SPECTRAL_LEAKED};
+use super::limits::{FREE_RESIDUALS, LINES_PER_CORRELATION, SPECTRAL_LEAKED};
+use super::line_correlation::correlation_of_lines;
 use super::misfit::{Concentration, Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
 use super::whiteness::{Residual, Whiteness};
@@ -223,12 +224,8 @@ impl SpectralResidual {
         2 * (self.data.dof() * line + channel)
     }
 
-    /// Correlation of the residual of a channel from line to line: real and imaginary part of
-    /// Σ r̄(l) r(l + d), less their expectation, at the distances d = 1, 2 … in lines of the fit. `None` if
-    /// there are too few lines or the residual is zero.
-    ///
-    /// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
-    /// gives the variances of the products and the covariances of their squares.
+    /// Correlation of the residual of a channel from line to line. `None` if there are too few lines or the
+    /// residual is zero.
     ///
     /// # Panics
     /// If there is no such channel.
@@ -239,50 +236,13 @@ impl SpectralResidual {
     pub fn line_to_line(&self, channel: usize) -> Option<Correlation> {
         let rows: Vec<usize> =
             self.ascending().into_iter().map(|line| self.row(line, channel)).collect();
-        let last = MAX_DISTANCES.min(rows.len() / LINES_PER_CORRELATION);
-        if last == 0 {
-            return None;
-        }
         let complex = |values: &[f64]| -> Vec<Complex<f64>> {
             rows.iter().map(|row| Complex::new(values[*row], values[row + 1])).collect()
-        };
-        let product = |r: &[Complex<f64>], distance: usize| -> Complex<f64> {
-            r.iter().zip(&r[distance..]).map(|(a, b)| a.conj() * b).sum()
         };
         let residual = complex(self.values.as_slice());
         let explained: Vec<Vec<Complex<f64>>> =
             self.explained.column_iter().map(|q| complex(q.as_slice())).collect();
-        let powers: Vec<f64> = residual.iter().map(|r| r.norm_sqr()).collect();
-        let power: f64 = powers.iter().sum();
-        if power == 0.0 {
-            return None;
-        }
-        let explained_power: f64 = explained.iter().flatten().map(|q| q.norm_sqr()).sum();
-        // Variance of a real or imaginary part that the parameters do not reduce.
-        let unit = power / (2.0 * rows.len() as f64 - explained_power);
-        let variance = |distance: usize| -> f64 {
-            powers.iter().zip(&powers[distance..]).map(|(a, b)| a * b).sum()
-        };
-        let (mut coefficients, mut statistic) = (Vec::new(), 0.0);
-        for distance in 1..=last {
-            let expected: Complex<f64> = explained.iter().map(|q| product(q, distance)).sum();
-            let deviation = product(&residual, distance) + expected * unit;
-            coefficients.extend([deviation.re / power, deviation.im / power]);
-            statistic += deviation.norm_sqr() / variance(distance);
-        }
-        let mut square = 0.0;
-        for a in 1..=last {
-            for b in 1..=last {
-                square += covariance_of_squares(&powers, a, b) / (variance(a) * variance(b));
-            }
-        }
-        Some(Correlation {
-            coefficients,
-            bound: 1.96 * (0.5 / rows.len() as f64).sqrt(),
-            statistic,
-            // A square of a complex number is half a sum of two.
-            p_value: share_above_of(statistic, last as f64, 0.5 * square),
-        })
+        correlation_of_lines(&residual, &explained)
     }
 
     /// Correlation of the residual of each channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of
@@ -381,19 +341,6 @@ fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
         deviations[row + 1] = deviations[row];
     }
     deviations
-}
-
-/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the
-/// given squares |r|².
-fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
-    let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
-        .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])
-        .sum();
-    let diagonal = || -> f64 {
-        let pairs = || powers.iter().zip(&powers[a..]).map(|(x, y)| x * y);
-        pairs().sum::<f64>().powi(2) - pairs().map(|pair| pair * pair).sum::<f64>()
-    };
-    2.0 * parallelograms + if a == b { diagonal() } else { 0.0 }
 }
 
 #[cfg(test)]

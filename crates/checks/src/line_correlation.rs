@@ -1,0 +1,73 @@
+//! Correlation of a residual from line to line.
+
+use mechid_signal::correlation::{Correlation, share_above_of};
+use nalgebra::Complex;
+
+use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
+
+/// Correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l + d), less their
+/// expectation, at the distances d = 1, 2 … in lines; `explained` are orthonormal columns of what the
+/// parameters explain. `None` if there are too few lines or the residual is zero.
+///
+/// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
+/// gives the variances of the products and the covariances of their squares.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
+/// validation; White (1980), Econometrica 48, 817–838, for the variance.
+pub(crate) fn correlation_of_lines(
+    residual: &[Complex<f64>],
+    explained: &[Vec<Complex<f64>>],
+) -> Option<Correlation> {
+    let last = MAX_DISTANCES.min(residual.len() / LINES_PER_CORRELATION);
+    if last == 0 {
+        return None;
+    }
+    let product = |r: &[Complex<f64>], distance: usize| -> Complex<f64> {
+        r.iter().zip(&r[distance..]).map(|(a, b)| a.conj() * b).sum()
+    };
+    let powers: Vec<f64> = residual.iter().map(|r| r.norm_sqr()).collect();
+    let power: f64 = powers.iter().sum();
+    if power == 0.0 {
+        return None;
+    }
+    let explained_power: f64 = explained.iter().flatten().map(|q| q.norm_sqr()).sum();
+    // Variance of a real or imaginary part that the parameters do not reduce.
+    let unit = power / (2.0 * residual.len() as f64 - explained_power);
+    let variance = |distance: usize| -> f64 {
+        powers.iter().zip(&powers[distance..]).map(|(a, b)| a * b).sum()
+    };
+    let (mut coefficients, mut statistic) = (Vec::new(), 0.0);
+    for distance in 1..=last {
+        let expected: Complex<f64> = explained.iter().map(|q| product(q, distance)).sum();
+        let deviation = product(residual, distance) + expected * unit;
+        coefficients.extend([deviation.re / power, deviation.im / power]);
+        statistic += deviation.norm_sqr() / variance(distance);
+    }
+    let mut square = 0.0;
+    for a in 1..=last {
+        for b in 1..=last {
+            square += covariance_of_squares(&powers, a, b) / (variance(a) * variance(b));
+        }
+    }
+    Some(Correlation {
+        coefficients,
+        bound: 1.96 * (0.5 / residual.len() as f64).sqrt(),
+        statistic,
+        // A square of a complex number is half a sum of two.
+        p_value: share_above_of(statistic, last as f64, 0.5 * square),
+    })
+}
+
+/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the
+/// given squares |r|².
+fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
+    let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
+        .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])
+        .sum();
+    let diagonal = || -> f64 {
+        let pairs = || powers.iter().zip(&powers[a..]).map(|(x, y)| x * y);
+        pairs().sum::<f64>().powi(2) - pairs().map(|pair| pair * pair).sum::<f64>()
+    };
+    2.0 * parallelograms + if a == b { diagonal() } else { 0.0 }
+}

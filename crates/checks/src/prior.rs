@@ -1,0 +1,61 @@
+//! Priors against the data.
+
+use std::fmt::{self, Formatter};
+
+use super::digits::three_digits;
+use super::finding::{Check, Names};
+use super::p_value::PValue;
+use super::{Subject, Verdict};
+
+/// Prior of a parameter against what the data say of it.
+///
+/// If both are right, estimate − mean has the variance s² − v, with the variance s² of the prior and v of
+/// the estimate.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PriorAgreement {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Mean of the prior, in the unit of the parameter.
+    pub mean: f64,
+    /// Standard deviation of the prior, in the unit of the parameter.
+    pub standard_deviation: f64,
+    /// Estimate, in the unit of the parameter.
+    pub estimate: f64,
+    /// Probability of an estimate as far from the mean.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+}
+
+impl Check for PriorAgreement {
+    fn subject(&self) -> Subject {
+        Subject::Prior
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let away = (self.estimate - self.mean).abs() / self.standard_deviation;
+        write!(
+            f,
+            "{}: the estimate is {} standard deviations of its prior from the mean of it ({}): ",
+            self.parameter,
+            three_digits(away),
+            self.p_value
+        )?;
+        f.write_str(match self.verdict() {
+            Verdict::Good => "prior and data agree",
+            _ => "prior and data contradict each other; one of them, or the model, is wrong",
+        })
+    }
+}

@@ -1,0 +1,45 @@
+//! Searches for the highest likelihood.
+
+use std::fmt::{self, Formatter};
+
+use super::finding::{Check, Names};
+use super::{Subject, Verdict};
+
+/// Number of searches from different first values that ended at the highest likelihood.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct SearchAgreement {
+    /// Searches made.
+    pub searches: usize,
+    /// Searches that ended at the highest likelihood.
+    pub agreeing: usize,
+}
+
+impl Check for SearchAgreement {
+    fn subject(&self) -> Subject {
+        Subject::Search
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.searches > 1 && self.agreeing < 2 { Verdict::Doubtful } else { Verdict::Good }
+    }
+
+    fn value(&self) -> f64 {
+        self.agreeing as f64
+    }
+
+    fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} of {} searches ended at the highest likelihood",
+            self.agreeing, self.searches
+        )?;
+        f.write_str(match self.verdict() {
+            Verdict::Good => "",
+            _ => {
+                ": there may be a higher one; give better first values, bounds, or more \
+                 searches (`starts`)"
+            }
+        })
+    }
+}
