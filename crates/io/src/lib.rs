@@ -30,6 +30,7 @@ mod json;
 mod labels;
 mod limits;
 mod line_spec;
+mod machine;
 mod mat;
 mod matrix_market;
 mod number_text;
@@ -61,6 +62,7 @@ pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
+pub use machine::{parse_machine, read_machine};
 pub use matrix_market::{parse_matrix_market, read_matrix_market};
 pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
