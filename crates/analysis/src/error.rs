@@ -18,6 +18,18 @@ pub enum AnalysisError {
     /// A file cannot be read or understood.
     #[error(transparent)]
     Io(#[from] mechid_io::IoError),
+    /// A machine of named elements cannot be identified.
+    #[error(transparent)]
+    Likelihood(#[from] mechid_estimate::likelihood::LikelihoodError),
+    /// The data determine none of the unknowns, or not what a machine needs.
+    #[error(
+        "{combinations}: add a sensor or a force, or state a coefficient or its prior; \
+         \"candidates\" of the description show what a measurement would add"
+    )]
+    Undetermined {
+        /// Unknowns and the combinations that are determined, a sentence each.
+        combinations: String,
+    },
     /// No modes can be identified from the responses alone.
     #[error(transparent)]
     Ambient(#[from] mechid_modal::ambient::AmbientError),
@@ -522,6 +534,13 @@ impl AnalysisError {
         }
         let [part, name] = [names[names.len() - 2], names[names.len() - 1]];
         format!("{}.{}", kebab(part_of_library(part, name)), kebab(name))
+    }
+}
+
+impl AnalysisError {
+    /// Returns the error of a description that does not make sense.
+    pub(crate) fn machine(error: mechid_model::elements::MachineError) -> Self {
+        Self::Likelihood(error.into())
     }
 }
 

@@ -30,6 +30,7 @@
 //! | What is the response per unit force? | [`frf()`] | [`FrfSettings`] | [`FrfTable`] |
 //! | What machine is this? | [`identify()`] | [`Identify`] | [`Identified`] |
 //! | What machine has these frequency responses? | [`identify_responses()`] | [`IdentifyResponses`] | [`IdentifiedResponses`] |
+//! | What are the unknown parts of this machine? | [`identify_elements()`] | [`IdentifyElements`] | [`IdentifiedElements`] |
 //! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
 //! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
@@ -46,6 +47,7 @@
 pub mod batch;
 pub mod bearing;
 pub mod decay;
+pub mod elements;
 mod error;
 pub mod extremes;
 #[cfg(feature = "parquet")]
@@ -69,6 +71,7 @@ pub mod words;
 pub use batch::{ResultRow, SavedAnalysis};
 pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
 pub use decay::{DecaySettings, DecaySummary, Decayed, decay};
+pub use elements::{ElementData, IdentifiedElements, IdentifyElements, identify_elements};
 pub use error::AnalysisError;
 pub use frf::{FrfSettings, FrfTable, Segmentation, frf, frf_of_records};
 pub use identify::{

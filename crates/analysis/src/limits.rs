@@ -56,3 +56,13 @@ pub(crate) fn memory_bytes(reading: &Reading) -> Option<usize> {
     // A float that no address space has becomes the largest integer, NaN and less than nothing 0.
     reading.memory_gb.map(|gb| (gb * GIGABYTE) as usize)
 }
+
+/// Largest number of degrees of freedom of a machine of elements whose modes are a part of its result; of
+/// more, `modes` finds them.
+pub(crate) const LISTED_MODES_DOF: usize = 30;
+
+/// Share of the information on a parameter from its prior above which the result says so.
+pub(crate) const PRIOR_SHARE: f64 = 0.5;
+
+/// Relative difference up to which two frequencies of tables are one: tables are printed with some digits.
+pub(crate) const SAME_FREQUENCY: f64 = 1e-6;

@@ -158,7 +158,7 @@ fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> 
 }
 
 impl CheckRow {
-    pub(super) fn new(
+    pub(crate) fn new(
         when: When,
         record: Option<String>,
         finding: &Finding,

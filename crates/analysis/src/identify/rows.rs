@@ -14,7 +14,7 @@ use crate::text::{compact, significant, text_table};
 pub const CONFIDENCE: f64 = 0.95;
 
 /// The samples used, counted from 1.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct WindowRow {
     /// First sample, counted from 1.
     pub first_sample: usize,
@@ -297,7 +297,7 @@ pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> Pa
 }
 
 /// Number of parameters up to which a result carries their covariance, whose entries are its square.
-const MOST_WITH_COVARIANCE: usize = 2_000;
+pub(crate) const MOST_WITH_COVARIANCE: usize = 2_000;
 
 /// Returns whether a result carries the covariance of its parameters.
 pub(super) fn carries_covariance(estimate: &Estimate) -> bool {

@@ -17,6 +17,7 @@ use serde::{Serialize, Serializer};
 use self::forced::Test;
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
+pub(crate) use self::sources::driven_band;
 pub use self::summary::{
     DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
 };
@@ -75,7 +76,9 @@ pub fn modes(
         }
     };
     let recorded = Recorded::from_forced(measurements, hits.as_ref(), &settings.places)?;
-    let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());
+    let band_hz = settings.band_hz.unwrap_or_else(|| {
+        driven_band(recorded.parts.iter().filter_map(|part| part.forces.as_ref()))
+    });
     let records = measurements.iter().map(|measurement| {
         let block = measurement.whole_block()?;
         Ok(RecordRow { file: block.file.clone(), window: WindowRow::of(&block) })

@@ -98,32 +98,32 @@ impl Recorded {
         }
         all.ok_or(AnalysisError::NoRecord)
     }
+}
 
-    /// Band, in Hz, that the forces drive: from the first to the last group of lines in which one of
-    /// them has a power worth mentioning.
-    pub fn driven_band(&self) -> [f64; 2] {
-        let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
-        for forces in self.parts.iter().filter_map(|part| part.forces.as_ref()) {
-            let spacing_hz = forces.sampling().line_spacing_hz();
-            let spectrum = Spectrum::of(forces);
-            let lines = forces.len().div_ceil(2).saturating_sub(1);
-            for column in spectrum.lines().column_iter() {
-                let powers: Vec<f64> = column.rows(1, lines).iter().map(|z| z.norm_sqr()).collect();
-                let mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
-                let means: Vec<f64> = powers.chunks(BAND_LINES).map(mean).collect();
-                let largest = means.iter().copied().fold(0.0, f64::max);
-                let is_driven = |power: &f64| largest > 0.0 && *power >= DRIVEN * largest;
-                if let (Some(first), Some(last)) =
-                    (means.iter().position(is_driven), means.iter().rposition(is_driven))
-                {
-                    low = low.min((1 + first * BAND_LINES) as f64 * spacing_hz);
-                    let end = ((last + 1) * BAND_LINES).min(lines);
-                    high = high.max(end as f64 * spacing_hz);
-                }
+/// Returns the band, in Hz, that forces or other inputs drive: from the first to the last group of lines in
+/// which one of them has a power worth mentioning.
+pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [f64; 2] {
+    let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
+    for forces in inputs {
+        let spacing_hz = forces.sampling().line_spacing_hz();
+        let spectrum = Spectrum::of(forces);
+        let lines = forces.len().div_ceil(2).saturating_sub(1);
+        for column in spectrum.lines().column_iter() {
+            let powers: Vec<f64> = column.rows(1, lines).iter().map(|z| z.norm_sqr()).collect();
+            let mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
+            let means: Vec<f64> = powers.chunks(BAND_LINES).map(mean).collect();
+            let largest = means.iter().copied().fold(0.0, f64::max);
+            let is_driven = |power: &f64| largest > 0.0 && *power >= DRIVEN * largest;
+            if let (Some(first), Some(last)) =
+                (means.iter().position(is_driven), means.iter().rposition(is_driven))
+            {
+                low = low.min((1 + first * BAND_LINES) as f64 * spacing_hz);
+                let end = ((last + 1) * BAND_LINES).min(lines);
+                high = high.max(end as f64 * spacing_hz);
             }
         }
-        [low, high]
     }
+    [low, high]
 }
 
 /// Input that each force column of each record belongs to.

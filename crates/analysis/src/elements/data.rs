@@ -1,0 +1,130 @@
+//! The data of a fit of a machine: lines, their noise, and what the result says of them.
+
+use std::f64::consts::TAU;
+
+use mechid_checks::{Finding, NoiseSource};
+use mechid_estimate::likelihood::machine::MeasuredReceptance;
+use mechid_spectra::{LineData, SpectraError};
+use serde::Serialize;
+
+use super::IdentifyElements;
+use crate::AnalysisError;
+use crate::identify::rows::WindowRow;
+use crate::measurement::Channels;
+
+/// Lines of all tests of a machine, and what is known of their noise.
+#[derive(Debug, Clone)]
+pub struct ElementData {
+    /// Lines of all tests, one below the other.
+    pub(super) lines: LineData,
+    /// Tests, one for each record of the lines.
+    pub(super) tests: Vec<TestRow>,
+    /// Source of the noise, if the data state it.
+    pub(super) source: Option<NoiseSource>,
+    /// Noise in words.
+    pub(super) noise: String,
+    /// Findings on the channels, each with the test that it belongs to.
+    pub(super) findings: Vec<(usize, Finding)>,
+    /// Names of the channels, for the findings.
+    pub(super) channels: Channels,
+    /// Remarks on what was read.
+    pub(super) remarks: Vec<String>,
+    /// Part of the machine whose receptance was measured.
+    pub(super) part: Option<MeasuredReceptance>,
+}
+
+/// A test that was fitted.
+#[derive(Debug, Clone, Serialize)]
+pub struct TestRow {
+    /// Name of the file.
+    pub file: String,
+    /// Kind of the lines.
+    pub kind: TestKind,
+    /// Samples used of a record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<WindowRow>,
+}
+
+/// Kind of the lines of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TestKind {
+    /// Mean of whole periods.
+    Periods,
+    /// Open record, with the transient of its ends.
+    Open,
+    /// Frequency responses.
+    Responses,
+    /// Synchronous responses over the speed.
+    Speeds,
+}
+
+impl ElementData {
+    /// Returns the lines of all tests.
+    pub fn lines(&self) -> &LineData {
+        &self.lines
+    }
+
+    /// Returns the tests.
+    pub fn tests(&self) -> &[TestRow] {
+        &self.tests
+    }
+
+    /// Takes the lines of one test.
+    pub(super) fn of_test(lines: LineData, test: TestRow, channels: Channels) -> Self {
+        Self {
+            lines,
+            tests: vec![test],
+            source: None,
+            noise: String::new(),
+            findings: Vec::new(),
+            channels,
+            remarks: Vec::new(),
+            part: None,
+        }
+    }
+
+    /// Returns the tests of both; the noise is known where it is of both.
+    pub(super) fn followed_by(mut self, other: Self) -> Result<Self, SpectraError> {
+        let before = self.tests.len();
+        self.lines = self.lines.followed_by(&other.lines)?;
+        self.tests.extend(other.tests);
+        self.source = self.source.and(other.source);
+        if !self.noise.contains(&other.noise) {
+            self.noise = format!("{}; {}", self.noise, other.noise);
+        }
+        let moved = other.findings.into_iter().map(|(at, finding)| (at + before, finding));
+        self.findings.extend(moved);
+        self.remarks.extend(other.remarks);
+        Ok(self)
+    }
+
+    /// Leaves out what the settings exclude.
+    pub(super) fn kept(
+        lines: LineData,
+        spacing_hz: f64,
+        how: &IdentifyElements,
+    ) -> Result<LineData, AnalysisError> {
+        let excluded =
+            |hz: f64| how.without_hz.iter().any(|disturbance| disturbance.reaches(hz, spacing_hz));
+        lines.retained(|omega| !excluded(omega / TAU)).ok_or_else(|| AnalysisError::Setting {
+            setting: "without_hz",
+            why: format!("no line is left of {}", lines.len()),
+        })
+    }
+}
+
+/// Joins the tests one after the other.
+pub(super) fn joined(
+    tests: impl IntoIterator<Item = Result<ElementData, AnalysisError>>,
+) -> Result<ElementData, AnalysisError> {
+    let mut all: Option<ElementData> = None;
+    for test in tests {
+        let test = test?;
+        all = Some(match all {
+            None => test,
+            Some(before) => before.followed_by(test)?,
+        });
+    }
+    all.ok_or(AnalysisError::NoRecord)
+}

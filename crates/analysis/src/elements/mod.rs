@@ -1,0 +1,166 @@
+//! Identification of a machine of named elements, with sensors anywhere.
+//!
+//! | File | What it does |
+//! |---|---|
+//! | `settings` | settings, as values |
+//! | `data` | the data of a fit: lines, their noise, what the result says of them |
+//! | `records` | lines of records: whole periods with their noise, or open records |
+//! | `responses` | tables of frequency responses, of the machine and of its measured parts |
+//! | `speeds` | tables of synchronous responses over the speed of the rotor |
+//! | `notes` | what to know of the numbers, as values |
+//! | `summary`, `text` | the result: numbers, checks, notes; the same as text |
+//! | `machine` | the identified machine with its covariance, for other questions |
+
+mod data;
+mod machine;
+mod notes;
+mod records;
+mod responses;
+mod settings;
+mod speeds;
+mod summary;
+mod text;
+
+use std::fmt;
+
+use mechid_estimate::likelihood::machine::{MachineEstimate, identify_joined, identify_machine};
+use serde::{Serialize, Serializer};
+
+pub use self::data::{ElementData, TestKind, TestRow};
+pub use self::notes::ElementNote;
+pub use self::settings::IdentifyElements;
+pub use self::summary::{CandidateRow, CombinationRow, ElementRow, ElementSummary, SensorRow};
+use crate::AnalysisError;
+use crate::machine::Machine;
+
+/// Identifies the unknown coefficients of a machine of named elements by maximum likelihood.
+///
+/// # Errors
+/// [`AnalysisError::Likelihood`] if the description does not make sense or no search ends at a minimum,
+/// [`AnalysisError::Undetermined`] if the data determine none of the unknowns.
+///
+/// # Source
+/// That of [`identify_machine`].
+pub fn identify_elements(
+    data: &ElementData,
+    how: &IdentifyElements,
+) -> Result<IdentifiedElements, AnalysisError> {
+    let (machine, settings) = (&how.machine, how.likelihood(data));
+    let (drawn, instruments) = (&machine.machine, &machine.instruments);
+    let estimate = match &data.part {
+        Some(part) => identify_joined(&data.lines, drawn, instruments, part, &settings)?,
+        None => identify_machine(&data.lines, drawn, instruments, &settings)?,
+    };
+    let likelihood = &estimate.likelihood;
+    let is_known = |p: &mechid_estimate::likelihood::ParameterEstimate| {
+        p.at_bound || p.standard_error.is_some()
+    };
+    let determines_none = likelihood.combinations.iter().all(|c| c.determined.is_empty());
+    if determines_none && !likelihood.parameters.iter().any(is_known) {
+        let sentences: Vec<String> =
+            likelihood.combinations.iter().map(ToString::to_string).collect();
+        return Err(AnalysisError::Undetermined { combinations: sentences.join("; ") });
+    }
+    let summary = ElementSummary::new(data, &estimate, how)?;
+    Ok(IdentifiedElements { estimate, summary, spectrum: ElementSpectrum::new(data) })
+}
+
+/// The identified coefficients of a machine, and what they were identified from.
+///
+/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+#[derive(Debug)]
+pub struct IdentifiedElements {
+    estimate: MachineEstimate,
+    summary: ElementSummary,
+    spectrum: ElementSpectrum,
+}
+
+/// Lines of the data, to draw beside the model.
+#[derive(Debug, Clone)]
+struct ElementSpectrum {
+    frequency_hz: Vec<f64>,
+    outputs: nalgebra::DMatrix<nalgebra::Complex<f64>>,
+    rows: std::ops::Range<usize>,
+}
+
+impl ElementSpectrum {
+    fn new(data: &ElementData) -> Self {
+        let hz = |omega: &f64| omega / std::f64::consts::TAU;
+        Self {
+            frequency_hz: data.lines.omega().iter().map(hz).collect(),
+            outputs: data.lines.outputs().clone(),
+            rows: data.lines.records().first().map_or(0..0, |(rows, _)| rows.clone()),
+        }
+    }
+}
+
+/// Amplitude of one sensor over frequency: measured, of the model, and of their difference, in the unit
+/// of the sensor.
+#[derive(Debug, Clone)]
+pub struct SensorSpectrum {
+    /// Name of the sensor.
+    pub name: String,
+    /// Unit of the amplitudes.
+    pub unit: &'static str,
+    /// Frequencies in Hz, rising.
+    pub frequency_hz: Vec<f64>,
+    /// Measured amplitudes, one per frequency, in the unit of the sensor.
+    pub measured: Vec<f64>,
+    /// Amplitudes of the model, one per frequency, in the unit of the sensor.
+    pub modelled: Vec<f64>,
+    /// Amplitudes of the difference, one per frequency, in the unit of the sensor.
+    pub residual: Vec<f64>,
+}
+
+impl IdentifiedElements {
+    /// Returns the numbers, checks and notes.
+    pub fn summary(&self) -> &ElementSummary {
+        &self.summary
+    }
+
+    /// Returns the estimate with everything that likelihood and covariance say.
+    pub fn estimate(&self) -> &MachineEstimate {
+        &self.estimate
+    }
+
+    /// Returns M, C (with Ω G) and K with their covariance, for `force`, `predict` and `modes`.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Likelihood`] if a degree of freedom has no mass, [`AnalysisError::Undetermined`] if
+    /// an entry is not determined, [`AnalysisError::Setting`] if too many entries are uncertain.
+    pub fn machine(&self) -> Result<Machine, AnalysisError> {
+        machine::machine(&self.estimate, self.summary.equations)
+    }
+
+    /// Returns measured and modelled amplitudes of every sensor on the lines of the first record.
+    pub fn spectra(&self) -> Vec<SensorSpectrum> {
+        let ElementSpectrum { frequency_hz, outputs, rows } = &self.spectrum;
+        let mut order: Vec<usize> = rows.clone().collect();
+        order.sort_by(|a, b| frequency_hz[*a].total_cmp(&frequency_hz[*b]));
+        let errors = &self.estimate.errors;
+        let of_sensor = |(at, sensor): (usize, &SensorRow)| SensorSpectrum {
+            name: sensor.name.clone(),
+            unit: sensor.unit,
+            frequency_hz: order.iter().map(|row| frequency_hz[*row]).collect(),
+            measured: order.iter().map(|row| outputs[(*row, at)].norm()).collect(),
+            modelled: order
+                .iter()
+                .map(|row| (outputs[(*row, at)] - errors[(*row, at)]).norm())
+                .collect(),
+            residual: order.iter().map(|row| errors[(*row, at)].norm()).collect(),
+        };
+        self.summary.sensors.iter().enumerate().map(of_sensor).collect()
+    }
+}
+
+impl fmt::Display for IdentifiedElements {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for IdentifiedElements {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}

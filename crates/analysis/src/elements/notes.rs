@@ -1,0 +1,90 @@
+//! What to know of the numbers of an identified machine.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::text::{compact, significant};
+
+/// A note on the result, with its numbers; [`Display`](fmt::Display) gives one sentence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ElementNote {
+    /// A parameter lies at a bound beyond which the data would have it.
+    AtBound {
+        /// Name of the parameter.
+        parameter: String,
+        /// Bound, in the unit of the parameter.
+        bound: f64,
+    },
+    /// Standard errors and intervals are larger than the noise makes them.
+    ScaledErrors {
+        /// Factor.
+        factor: f64,
+    },
+    /// Most of the information on a parameter comes from its prior.
+    FromPrior {
+        /// Name of the parameter.
+        parameter: String,
+        /// Share of the prior, 0 to 1.
+        share: f64,
+    },
+    /// M, C and K do not make a system.
+    NoSystem {
+        /// Reason.
+        reason: String,
+    },
+    /// Structural damping has no place in M, C and K.
+    Hysteresis,
+    /// M, C and K are those of the rotor at rest, for each line had a speed of its own.
+    AtRest,
+    /// Too many entries of M, C and K are uncertain for their covariance.
+    NoCovariance {
+        /// Largest number of entries.
+        most: usize,
+    },
+    /// Standard errors of M, C and K do not know how far a parameter at its bound could be away.
+    BoundInSystem,
+    /// Remark on what was read.
+    Read {
+        /// The remark.
+        text: String,
+    },
+}
+
+impl fmt::Display for ElementNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AtBound { parameter, bound } => write!(
+                f,
+                "{parameter} lies at its bound {}: the data would have it beyond; its interval is one-sided",
+                compact(*bound, 6)
+            ),
+            Self::ScaledErrors { factor } => write!(
+                f,
+                "standard errors and intervals are {} times those of the noise alone, for model and data \
+                 disagree beyond the noise (see misfit); they do not cover a wrong model",
+                significant(*factor, 3)
+            ),
+            Self::FromPrior { parameter, share } => write!(
+                f,
+                "{} % of the information on {parameter} comes from its prior",
+                significant(100.0 * share, 3)
+            ),
+            Self::NoSystem { reason } => write!(f, "the result has no M, C and K: {reason}"),
+            Self::Hysteresis => f.write_str("structural damping is not in M, C and K"),
+            Self::AtRest => f.write_str(
+                "M, C and K are those at rest, without Ω G: each line had a speed of its own",
+            ),
+            Self::NoCovariance { most } => write!(
+                f,
+                "more than {most} entries of M, C and K are uncertain: their covariance is left out"
+            ),
+            Self::BoundInSystem => f.write_str(
+                "the covariance of M, C and K takes parameters at their bounds as known",
+            ),
+            Self::Read { text } => f.write_str(text),
+        }
+    }
+}

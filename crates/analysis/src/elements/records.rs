@@ -1,0 +1,196 @@
+//! Lines of records: whole periods with the noise that they show, or open records.
+
+use mechid_checks::NoiseSource;
+use mechid_model::ResponseQuantity;
+use mechid_model::elements::Input;
+use mechid_signal::Record;
+use mechid_spectra::{
+    FrequencyData, LineData, LineNoise, Lines, Pooling, RepeatedPeriods, Transient,
+};
+use nalgebra::{DMatrix, DVector};
+
+use super::data::{TestKind, TestRow, joined};
+use super::{ElementData, IdentifyElements};
+use crate::AnalysisError;
+use crate::identify::checks;
+use crate::identify::left_out::LineRule;
+use crate::identify::rows::WindowRow;
+use crate::identify::{LeftOut, LineChoice};
+use crate::measurement::{Block, Measurement};
+use crate::modes::driven_band;
+
+/// Inputs and outputs of one record, in the order of the instruments.
+struct Signals {
+    /// Samples × q, in the units of the inputs.
+    inputs: Record,
+    /// Samples × p, in the units of the sensors.
+    outputs: Record,
+}
+
+impl ElementData {
+    /// Takes records with the columns of [`IdentifyElements::channels`]: whole periods where the window has a
+    /// period, otherwise open records.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] for settings that do not belong together or
+    /// leave no line, and if a file cannot be read.
+    pub fn from_records(
+        measurements: &[Measurement],
+        how: &IdentifyElements,
+    ) -> Result<Self, AnalysisError> {
+        joined(measurements.iter().map(|measurement| from_record(measurement, how)))
+    }
+}
+
+fn from_record(
+    measurement: &Measurement,
+    how: &IdentifyElements,
+) -> Result<ElementData, AnalysisError> {
+    let block = measurement.whole_block()?;
+    let signals = Signals::new(&block, how)?;
+    let is_periodic = measurement.window_settings().period.is_some();
+    let mut data =
+        if is_periodic { signals.periods(&block, how)? } else { signals.open(&block, how)? };
+    data.remarks = block.unit_notes();
+    data.findings = checks::of_sensors(&block).into_iter().map(|finding| (0, finding)).collect();
+    Ok(data)
+}
+
+impl Signals {
+    fn new(block: &Block, how: &IdentifyElements) -> Result<Self, AnalysisError> {
+        let instruments = &how.machine.instruments;
+        // Within a group the sensors come first, then the motions of the support.
+        let mut next = [0; 3];
+        let mut response = |quantity: ResponseQuantity| {
+            let of_kind = match quantity {
+                ResponseQuantity::Displacement => &block.displacement,
+                ResponseQuantity::Velocity => &block.velocity,
+                ResponseQuantity::Acceleration => &block.acceleration,
+            };
+            let index = &mut next[quantity as usize];
+            *index += 1;
+            of_kind.as_ref().map(|record| record.channel(*index - 1))
+        };
+        let outputs: Vec<_> =
+            instruments.sensors.iter().map(|sensor| response(sensor.quantity)).collect();
+        let mut forces = 0..block.force.channels();
+        let inputs: Vec<_> = instruments
+            .inputs
+            .iter()
+            .map(|input| match input {
+                Input::Force { .. } => forces.next().map(|at| block.force.channel(at)),
+                Input::Support { quantity, .. } => response(*quantity),
+                Input::Unbalance { .. } => None,
+            })
+            .collect();
+        let record = |columns: Vec<Option<&[f64]>>| -> Result<Record, AnalysisError> {
+            let columns = columns.into_iter().map(|column| column.map(DVector::from_column_slice));
+            let columns: Vec<_> = columns.collect::<Option<_>>().ok_or_else(|| {
+                let why =
+                    "the columns of the record are not those of its sensors and inputs".into();
+                AnalysisError::Setting { setting: "machine", why }
+            })?;
+            Ok(Record::new(block.force.sampling(), DMatrix::from_columns(&columns))?)
+        };
+        if inputs.is_empty() {
+            let why =
+                "a record needs a measured input: a force, or the motion of the support".into();
+            return Err(AnalysisError::Setting { setting: "machine", why });
+        }
+        Ok(Self { inputs: record(inputs)?, outputs: record(outputs)? })
+    }
+
+    fn test(&self, block: &Block, kind: TestKind) -> TestRow {
+        TestRow { file: block.file.clone(), kind, window: Some(WindowRow::of(block)) }
+    }
+
+    /// The mean of the periods with the noise that their scatter shows.
+    fn periods(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
+        let choice = how.band.map_or(LineChoice::Driven, LineChoice::Band);
+        let without = LeftOut { lines: None, frequencies: how.without_hz.clone() };
+        let rule = LineRule { choice: &choice, without: &without };
+        let (period, count) = (block.period, block.periods);
+        let chosen = rule.lines(&self.inputs, period)?;
+        let lines = Lines::new(self.inputs.sampling().with_len(period)?, chosen)?;
+        let (p, q) = (self.outputs.channels(), self.inputs.channels());
+        // Periods of a machine have as many forces as responses; columns of zeros make up for the others.
+        let channels = p.max(q);
+        let padded = |record: &Record| {
+            let data = record.data().rows(0, period * count);
+            let added = channels - record.channels();
+            let data = data.into_owned().insert_columns(record.channels(), added, 0.0);
+            Record::new(record.sampling().with_len(period * count)?, data)
+        };
+        let as_measured = ResponseQuantity::Displacement;
+        let mut periods = RepeatedPeriods::expecting(&lines, channels, as_measured, count);
+        periods.push(&padded(&self.inputs)?, &padded(&self.outputs)?)?;
+        let (mean, noise) = with_noise(&periods, how.noise)?;
+        let inputs = mean.force().columns(0, q).into_owned();
+        let outputs = mean.displacement().columns(0, p).into_owned();
+        let data = LineData::new(lines.omega(), inputs, outputs, Transient::None)?;
+        let of_channels: Vec<usize> = (0..p).chain(channels..channels + q).collect();
+        let (data, source, noise) = match (mean.noise(), noise) {
+            (Some(spectrum), Some(words)) => {
+                let covariance = (0..mean.len()).map(|row| {
+                    let all = spectrum.covariance(row);
+                    all.select_rows(&of_channels).select_columns(&of_channels)
+                });
+                let noise = LineNoise::new(covariance.collect())?
+                    .with_degrees_of_freedom(spectrum.degrees_of_freedom(), spectrum.deviations());
+                (data.with_noise(noise)?, Some(NoiseSource::Periods), words)
+            }
+            _ => (data, None, "taken from the residual".to_owned()),
+        };
+        let test = self.test(block, TestKind::Periods);
+        let of_test = ElementData::of_test(data, test, block.names.as_ref().clone());
+        Ok(ElementData { source, noise, ..of_test })
+    }
+
+    /// All lines of a band, without a window.
+    fn open(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
+        let is_of_periods = matches!(how.noise, Pooling::Neighbours(_) | Pooling::PerLine);
+        if is_of_periods {
+            let why = format!(
+                "{} is for whole periods (`period`): an open record has no scatter at a line",
+                how.noise
+            );
+            return Err(AnalysisError::Setting { setting: "noise", why });
+        }
+        let band_hz = match how.band {
+            Some(band) => [band.low_hz, band.high_hz],
+            None => driven_band([&self.inputs]),
+        };
+        let data = LineData::from_open_record(Some(&self.inputs), &self.outputs, band_hz)?;
+        let spacing_hz = self.inputs.sampling().line_spacing_hz();
+        let data = ElementData::kept(data, spacing_hz, how)?;
+        let test = self.test(block, TestKind::Open);
+        let of_test = ElementData::of_test(data, test, block.names.as_ref().clone());
+        Ok(ElementData { noise: "taken from the residual".to_owned(), ..of_test })
+    }
+}
+
+/// The mean over the periods, with the noise that they show and its model in words; without, if there is one
+/// period or they differ by rounding only.
+fn with_noise(
+    periods: &RepeatedPeriods,
+    noise: Pooling,
+) -> Result<(FrequencyData, Option<String>), AnalysisError> {
+    let count = periods.count();
+    if count < 2 {
+        if noise == Pooling::PerLine {
+            let why = "per-line is the scatter of two periods or more, and there is one".into();
+            return Err(AnalysisError::Setting { setting: "noise", why });
+        }
+        return Ok((periods.mean()?, None));
+    }
+    if periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding().is_none() {
+        return Ok((periods.mean()?, None));
+    }
+    let data = periods.mean_with_noise(noise)?;
+    let models = data.noise().map(|noise| {
+        let mut models: Vec<String> = noise.models().iter().map(ToString::to_string).collect();
+        models.dedup();
+        format!("from {count} periods: {}", models.join("; "))
+    });
+    Ok((data, models))
+}

@@ -1,0 +1,112 @@
+//! Settings of the identification of a machine of named elements.
+
+use mechid_estimate::likelihood::{NoiseSource, Settings};
+use mechid_model::ResponseQuantity;
+use mechid_model::elements::{Input, InstrumentedMachine};
+use mechid_spectra::Pooling;
+use serde::{Deserialize, Serialize};
+
+use super::ElementData;
+use crate::AnalysisError;
+use crate::identify::{Band, Disturbance};
+use crate::measurement::Channels;
+
+/// Settings of the identification of a machine of named elements.
+///
+/// Whether a record is taken as whole periods or as an open one follows from its window: whole periods
+/// where `period` is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IdentifyElements {
+    /// The machine with its sensors and inputs.
+    pub machine: InstrumentedMachine,
+    /// Frequencies to use; without, those that the inputs drive.
+    #[serde(default)]
+    pub band: Option<Band>,
+    /// Frequencies whose lines are left out.
+    #[serde(default)]
+    pub without_hz: Vec<Disturbance>,
+    /// Noise spectrum by which the lines are weighted.
+    #[serde(default)]
+    pub noise: Pooling,
+    /// Maximum number of searches: one from the given values, the others from random ones.
+    #[serde(default = "usual_starts")]
+    pub starts: usize,
+    /// Seed of the random first values.
+    #[serde(default)]
+    pub seed: u64,
+    /// Probability with which the intervals contain the parameters.
+    #[serde(default = "usual_confidence")]
+    pub confidence: f64,
+}
+
+fn usual_starts() -> usize {
+    Settings::default().starts
+}
+
+fn usual_confidence() -> f64 {
+    Settings::default().confidence
+}
+
+impl IdentifyElements {
+    /// Takes a machine with its sensors and inputs, and the usual settings.
+    pub fn new(machine: InstrumentedMachine) -> Self {
+        Self {
+            machine,
+            band: None,
+            without_hz: Vec::new(),
+            noise: Pooling::Automatic,
+            starts: usual_starts(),
+            seed: 0,
+            confidence: usual_confidence(),
+        }
+    }
+
+    /// Returns the columns of a record: the names of the sensors and of the inputs.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Likelihood`] if the description of the machine does not make sense,
+    /// [`AnalysisError::Setting`] if an input is an unbalance, which no record holds.
+    pub fn channels(&self) -> Result<Channels, AnalysisError> {
+        self.machine.assembly().map_err(AnalysisError::machine)?;
+        let mut channels = Channels::default();
+        for sensor in &self.machine.instruments.sensors {
+            group(&mut channels, sensor.quantity).push(sensor.name.clone());
+        }
+        for input in &self.machine.instruments.inputs {
+            match input {
+                Input::Force { name, .. } => channels.force.push(name.clone()),
+                Input::Support { name, quantity } => {
+                    group(&mut channels, *quantity).push(name.clone());
+                }
+                Input::Unbalance { name, .. } => {
+                    let why = format!(
+                        "input {name:?} is an unbalance, which is no column of a record: give a table over \
+                         the speed (`speed_table`)"
+                    );
+                    return Err(AnalysisError::Setting { setting: "machine", why });
+                }
+            }
+        }
+        Ok(channels)
+    }
+
+    /// The settings of the likelihood.
+    pub(super) fn likelihood(&self, data: &ElementData) -> Settings {
+        let noise = match (data.lines.noise(), self.noise) {
+            (None, Pooling::AllLines) => NoiseSource::WhiteResidual,
+            (None, _) => NoiseSource::SmoothResidual,
+            (Some(_), _) => NoiseSource::Automatic,
+        };
+        let (starts, seed, confidence) = (self.starts, self.seed, self.confidence);
+        Settings { noise, starts, seed, confidence, ..Settings::default() }
+    }
+}
+
+fn group(channels: &mut Channels, quantity: ResponseQuantity) -> &mut Vec<String> {
+    match quantity {
+        ResponseQuantity::Displacement => &mut channels.displacement,
+        ResponseQuantity::Velocity => &mut channels.velocity,
+        ResponseQuantity::Acceleration => &mut channels.acceleration,
+    }
+}

@@ -1,0 +1,283 @@
+//! The result of the identification of a machine: numbers, checks, notes.
+
+use std::f64::consts::TAU;
+
+use mechid_checks::{Finding, adjust_p_values, after_machine_fit, whiteness_of_lines};
+use mechid_estimate::likelihood::machine::{Candidate, CandidateGain, MachineEstimate};
+use mechid_estimate::likelihood::{
+    Combination, FoundMinimum, IntervalKind, ParameterEstimate, PriorReport,
+};
+use mechid_io::{ParameterCovariance, SystemMatrices};
+use mechid_model::elements::Candidates;
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::data::TestRow;
+use super::machine::{self, StatedMachine, freedom};
+use super::notes::ElementNote;
+use super::{ElementData, IdentifyElements};
+use crate::AnalysisError;
+use crate::identify::checks::{CheckRow, When};
+use crate::identify::rows::ModeRow;
+use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
+
+/// The identified coefficients of a machine with their uncertainty, and what they were identified from.
+#[derive(Debug, Serialize)]
+pub struct ElementSummary {
+    /// Tests that were fitted together.
+    pub tests: Vec<TestRow>,
+    /// Names of the inputs.
+    pub inputs: Vec<String>,
+    /// Sensors.
+    pub sensors: Vec<SensorRow>,
+    /// Names of the degrees of freedom.
+    pub points: Vec<String>,
+    /// Number of lines of all tests.
+    pub lines: usize,
+    /// Lowest and highest frequency, in Hz.
+    pub band_hz: [f64; 2],
+    /// Number of real numbers that were fitted.
+    pub equations: usize,
+    /// Noise by which the lines were weighted, in words.
+    pub noise: String,
+    /// Level of the intervals, a pure number such as 0.95.
+    pub confidence: f64,
+    /// Unknowns, in the order of the description.
+    pub parameters: Vec<ElementRow>,
+    /// Covariance of the unknowns, in the products of their units.
+    pub parameter_covariance: ParameterCovariance,
+    /// Unknowns of which the data determine combinations only.
+    pub combinations: Vec<CombinationRow>,
+    /// Logarithm of the likelihood.
+    pub log_likelihood: f64,
+    /// Minima found, the lowest first.
+    pub minima: Vec<FoundMinimum>,
+    /// Number of searches.
+    pub searches: usize,
+    /// Power of the residual over its expectation; `None` where the noise comes from the residual.
+    pub misfit_ratio: Option<f64>,
+    /// Probability of a larger misfit if model and noise are right.
+    pub misfit_p_value: Option<f64>,
+    /// Factor by which standard errors and intervals are larger than the noise alone makes them.
+    pub error_scale: f64,
+    /// Ratio of the best to the worst determined direction of the scaled parameters.
+    pub condition_number: f64,
+    /// Measurements that could be added, the best first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<CandidateRow>,
+    /// Modes of small machines, by rising frequency.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modes: Vec<ModeRow>,
+    /// Every check, before the fit and after it.
+    pub checks: Vec<CheckRow>,
+    /// What to know of the numbers.
+    pub notes: Vec<ElementNote>,
+    /// M, C (with Ω G) and K; `None` where they make no system.
+    pub system: Option<SystemMatrices>,
+    /// Covariance of those of their entries that depend on unknowns.
+    pub covariance: Option<ParameterCovariance>,
+    /// The settings, which repeat the analysis.
+    pub analysis: IdentifyElements,
+}
+
+/// One unknown with its uncertainty.
+#[derive(Debug, Clone, Serialize)]
+pub struct ElementRow {
+    /// SI unit at translations.
+    pub unit: &'static str,
+    /// Value, standard error, interval, prior.
+    #[serde(flatten)]
+    pub estimate: ParameterEstimate,
+}
+
+/// A sensor, and what the model leaves of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct SensorRow {
+    /// Name, that of the channel.
+    pub name: String,
+    /// Unit of the quantity.
+    pub unit: &'static str,
+    /// Root mean square of the residual over that of the response.
+    pub relative_residual: f64,
+}
+
+/// Unknowns of which the data determine combinations only.
+#[derive(Debug, Clone, Serialize)]
+pub struct CombinationRow {
+    /// The combinations, in a sentence.
+    pub text: String,
+    /// Their numbers.
+    #[serde(flatten)]
+    pub combination: Combination,
+}
+
+/// A sensor or a force that could be added.
+#[derive(Debug, Clone, Serialize)]
+pub struct CandidateRow {
+    /// Name of the sensor or the force.
+    pub name: String,
+    /// Logarithm of the factor by which the volume of the confidence region shrinks; `None` where a
+    /// combination becomes determined that was not.
+    pub information_gain: Option<f64>,
+    /// Number of parameters or combinations that become determined.
+    pub newly_determined: usize,
+    /// Standard errors with it, one for each parameter; `None` of what stays open.
+    pub standard_errors: Vec<Option<f64>>,
+}
+
+impl From<CandidateGain> for CandidateRow {
+    fn from(gain: CandidateGain) -> Self {
+        Self {
+            name: gain.name,
+            information_gain: Some(gain.information_gain).filter(|gain| gain.is_finite()),
+            newly_determined: gain.newly_determined,
+            standard_errors: gain.standard_errors,
+        }
+    }
+}
+
+impl ElementSummary {
+    pub(super) fn new(
+        data: &ElementData,
+        estimate: &MachineEstimate,
+        how: &IdentifyElements,
+    ) -> Result<Self, AnalysisError> {
+        let (likelihood, lines) = (&estimate.likelihood, &data.lines);
+        let equations = 2 * lines.outputs().len();
+        let StatedMachine { system, covariance, notes } = machine::stated(estimate, equations)?;
+        let instruments = &how.machine.instruments;
+        let sensors = instruments.sensors.iter().zip(&likelihood.relative_residual);
+        let sensors = sensors.map(|(sensor, residual)| SensorRow {
+            name: sensor.name.clone(),
+            unit: sensor.quantity.unit(),
+            relative_residual: *residual,
+        });
+        let described = estimate.assembly.parameters();
+        let rows = likelihood.parameters.iter().zip(described);
+        let rows =
+            rows.map(|(estimate, p)| ElementRow { unit: p.unit, estimate: estimate.clone() });
+        let combinations = likelihood.combinations.iter().map(|combination| CombinationRow {
+            text: combination.to_string(),
+            combination: combination.clone(),
+        });
+        let hz = lines.omega().iter().map(|omega| omega / TAU);
+        let (low, high) =
+            hz.fold((f64::INFINITY, 0.0_f64), |(low, high), hz| (low.min(hz), high.max(hz)));
+        let remarks = data.remarks.iter().map(|text| ElementNote::Read { text: text.clone() });
+        Ok(Self {
+            tests: data.tests.clone(),
+            inputs: instruments.inputs.iter().map(|input| input.name().to_owned()).collect(),
+            sensors: sensors.collect(),
+            points: estimate.assembly.dofs().to_vec(),
+            lines: lines.len(),
+            band_hz: [low, high],
+            equations,
+            noise: data.noise.clone(),
+            confidence: how.confidence,
+            parameters: rows.collect(),
+            parameter_covariance: parameter_covariance(estimate, equations),
+            combinations: combinations.collect(),
+            log_likelihood: likelihood.log_likelihood,
+            minima: likelihood.minima.clone(),
+            searches: likelihood.searches,
+            misfit_ratio: likelihood.misfit_ratio,
+            misfit_p_value: likelihood.misfit_p_value,
+            error_scale: likelihood.error_scale,
+            condition_number: likelihood.condition,
+            candidates: candidates(data, estimate, how)?,
+            modes: modes(estimate, equations)?,
+            checks: checks(data, estimate),
+            notes: notes_of(estimate).chain(notes).chain(remarks).collect(),
+            system: system.as_ref().map(SystemMatrices::from),
+            covariance,
+            analysis: how.clone(),
+        })
+    }
+
+    /// Returns an unknown by its name.
+    pub fn parameter(&self, name: &str) -> Option<&ParameterEstimate> {
+        self.parameters.iter().map(|row| &row.estimate).find(|estimate| estimate.name == name)
+    }
+}
+
+/// Covariance of the unknowns; the variance of those that are not determined is infinite.
+fn parameter_covariance(estimate: &MachineEstimate, equations: usize) -> ParameterCovariance {
+    let parameters = &estimate.likelihood.parameters;
+    let mut covariance: DMatrix<f64> = estimate.likelihood.covariance.clone();
+    for (at, parameter) in parameters.iter().enumerate() {
+        if parameter.standard_error.is_none() && !parameter.at_bound {
+            covariance.row_mut(at).fill(0.0);
+            covariance.column_mut(at).fill(0.0);
+            covariance[(at, at)] = f64::INFINITY;
+        }
+    }
+    let names = parameters.iter().map(|parameter| parameter.name.clone()).collect();
+    ParameterCovariance::new(names, &covariance, freedom(estimate, equations))
+}
+
+fn candidates(
+    data: &ElementData,
+    estimate: &MachineEstimate,
+    how: &IdentifyElements,
+) -> Result<Vec<CandidateRow>, AnalysisError> {
+    let Candidates { sensors, forces } = &how.machine.candidates;
+    let all: Vec<Candidate> = (sensors.iter().cloned().map(Candidate::Sensor))
+        .chain(forces.iter().cloned().map(Candidate::Force))
+        .collect();
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (machine, instruments) = (&how.machine.machine, &how.machine.instruments);
+    let gains = estimate.rank_candidates(&data.lines, machine, instruments, &all)?;
+    Ok(gains.into_iter().map(CandidateRow::from).collect())
+}
+
+/// Modes of a small machine whose entries are all determined.
+fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
+    if estimate.assembly.dof() > LISTED_MODES_DOF {
+        return Ok(Vec::new());
+    }
+    // What keeps the machine from having modes is a note or a combination of its own.
+    let Ok(machine) = machine::machine(estimate, equations) else { return Ok(Vec::new()) };
+    ModeRow::all(&machine.modes()?, machine.is_exact())
+}
+
+fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
+    let before =
+        data.findings.iter().map(|(at, finding)| (When::Before, Some(*at), finding.clone()));
+    let mut all: Vec<(When, Option<usize>, Finding)> = before.collect();
+    let after = after_machine_fit(estimate, data.source);
+    all.extend(after.into_iter().map(|finding| (When::After, None, finding)));
+    for (at, (rows, _)) in data.lines.records().iter().enumerate() {
+        let white = whiteness_of_lines(estimate, &data.lines, rows);
+        all.extend(white.into_iter().map(|finding| (When::After, Some(at), finding)));
+    }
+    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    let several = data.tests.len() > 1;
+    let name = |at: usize| data.tests.get(at).filter(|_| several).map(|test| test.file.clone());
+    let row = |(when, at, finding): &(When, Option<usize>, Finding)| {
+        CheckRow::new(*when, at.and_then(name), finding, &data.channels)
+    };
+    all.iter().map(row).collect()
+}
+
+fn notes_of(estimate: &MachineEstimate) -> impl Iterator<Item = ElementNote> {
+    let likelihood = &estimate.likelihood;
+    let mut notes = Vec::new();
+    if likelihood.error_scale > 1.0 {
+        notes.push(ElementNote::ScaledErrors { factor: likelihood.error_scale });
+    }
+    for parameter in &likelihood.parameters {
+        let name = || parameter.name.clone();
+        if parameter.interval_kind == IntervalKind::OneSided {
+            notes.push(ElementNote::AtBound { parameter: name(), bound: parameter.value });
+        }
+        if let Some(PriorReport { share, .. }) = parameter.prior.filter(|p| p.share > PRIOR_SHARE) {
+            notes.push(ElementNote::FromPrior { parameter: name(), share });
+        }
+    }
+    if likelihood.parameters.iter().any(|parameter| parameter.at_bound) {
+        notes.push(ElementNote::BoundInSystem);
+    }
+    notes.into_iter()
+}
