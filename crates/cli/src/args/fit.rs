@@ -27,10 +27,10 @@ use crate::outcome::Files;
 #[derive(Debug, Args)]
 pub struct FitArgs {
     #[command(flatten)]
-    input: RecordArgs,
+    pub(super) input: RecordArgs,
     /// More records of the same machine, with the same columns and window: all are fitted together
     #[arg(value_name = "RECORD")]
-    more: Vec<PathBuf>,
+    pub(super) more: Vec<PathBuf>,
     /// First samples of more windows of the first record, each as long as that from --start on: all are
     /// fitted together, as realisations of one excitation
     #[arg(long, value_name = "SAMPLE,…", value_parser = at_least_one, value_delimiter = ',',
@@ -42,7 +42,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "DOMAIN", value_parser = word::<Domain>(), default_value = "frequency")]
     domain: Domain,
     #[command(flatten)]
-    lines: LineArgs,
+    pub(super) lines: LineArgs,
     /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise on the
     /// response biases it), instrumental (one half of the periods against the other; not biased), or
     /// maximum-likelihood on the response (not biased, of least scatter) [default: maximum-likelihood
@@ -53,7 +53,7 @@ pub struct FitArgs {
     /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
     /// N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
-    noise: Option<Pooling>,
+    pub(super) noise: Option<Pooling>,
     /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one per
     /// degree of freedom; for open records, which are fitted as such then [default: that above the band
     /// that the force drives, or between hits]
@@ -108,7 +108,7 @@ pub struct FitArgs {
     fitted_lines: bool,
     /// List every check with its verdict, not only the warnings (--json and the report always do)
     #[arg(long, help_heading = "Output", conflicts_with_all = ["json", "quiet"])]
-    verbose: bool,
+    pub(super) verbose: bool,
 }
 
 /// Spectral lines.
@@ -120,14 +120,14 @@ pub struct LineArgs {
     lines: Option<LineSpec>,
     /// Use the lines with force between two frequencies, in Hz
     #[arg(long, value_name = "LOW:HIGH")]
-    band_hz: Option<Band>,
+    pub(super) band_hz: Option<Band>,
     /// Lines to leave out of these, numbers and ranges as for --lines
     #[arg(long, value_name = "LINES")]
     without_lines: Option<LineSpec>,
     /// Frequencies whose lines are left out, in Hz, such as 50 (mains), 50:0.5 (half a hertz to
     /// either side) and 24.5:multiples (rotation)
     #[arg(long, value_name = "HZ,…", value_delimiter = ',')]
-    without_hz: Vec<Disturbance>,
+    pub(super) without_hz: Vec<Disturbance>,
 }
 
 /// Nonlinear springs and dampers.
@@ -194,9 +194,9 @@ pub struct TableArgs {
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["ChannelArgs", "HitArgs", "HitRuleArgs", "NonlinearArgs", "TimeArgs",
           "SegmentArgs", "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz",
-          "from_frf", "noise", "more_starts", "between_samples", "extent", "force_noise", "validate",
+          "from_frf", "more_starts", "between_samples", "extent", "force_noise", "validate",
           "skip_lines", "record_column"])]
-    frf_table: bool,
+    pub(super) frf_table: bool,
     /// Measured quantity of the responses per force, where the table does not state it
     #[arg(long, value_name = "QUANTITY", value_parser = word::<ResponseQuantity>(), requires = "frf_table")]
     quantity: Option<ResponseQuantity>,

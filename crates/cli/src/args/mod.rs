@@ -1,6 +1,7 @@
 //! Arguments that several subcommands share, and what they mean to the analysis.
 
 pub mod channels;
+pub mod elements;
 pub mod fit;
 pub mod hits;
 mod style;

@@ -2,6 +2,7 @@
 
 use clap::Args;
 
+use crate::args::elements::ElementArgs;
 use crate::args::fit::{FitArgs, TableArgs};
 use crate::args::{PlotArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
@@ -18,6 +19,10 @@ use crate::outcome::{Files, Outcome};
 /// measured, --derivatives finds.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
+///
+/// With --machine, of a machine that is described by its elements, the unknown coefficients are found
+/// from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on a shake
+/// table.
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
 /// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
@@ -36,12 +41,16 @@ use crate::outcome::{Files, Outcome};
   mechid identify modal.unv --frf-table --averages 32 --band-hz 20:400
   mechid identify t.csv --force f --displacement x --velocity v --domain time \\
       --between-samples euler --extent period --refine 8:band-limited --plot t.svg
+  mechid identify chain.csv --machine chain.json --period 2048
+  mechid identify runs.csv --machine rotor.json --speed-table --json
   mechid identify t.csv --force f --acceleration a --domain time --derivatives savitzky-golay:11:4")]
 pub struct IdentifyArgs {
     #[command(flatten)]
     fit: FitArgs,
     #[command(flatten)]
     table: TableArgs,
+    #[command(flatten)]
+    elements: ElementArgs,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -53,11 +62,19 @@ pub struct IdentifyArgs {
 impl IdentifyArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        self.fit.files().writes(&self.plot.plot)
+        self.fit.files().reads(self.elements.inputs()).writes(&self.plot.plot)
     }
 
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
+        if let Some(identified) = self.fit.identify_elements(&self.table, &self.elements)? {
+            let text = self.fit.text_of_elements(&identified);
+            return Outcome::new(text, &identified)?.with_result_plot(
+                &self.plot,
+                &identified,
+                self.style.style(),
+            );
+        }
         if let Some(identified) = self.fit.identify_tables(&self.table)? {
             return Outcome::new(identified.to_string(), &identified)?.with_result_plot(
                 &self.plot,

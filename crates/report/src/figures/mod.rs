@@ -2,6 +2,7 @@
 
 mod backbone;
 mod bearing;
+mod elements;
 mod force;
 mod frf;
 pub mod modal;
@@ -21,8 +22,8 @@ use mechid_analysis::bearing::BearingTable;
 #[cfg(feature = "parquet")]
 use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
-    AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
-    Inspected, Machine, Modes, Reconstructed, SweepSummary,
+    AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedElements,
+    IdentifiedResponses, Inspected, Machine, Modes, Reconstructed, SweepSummary,
 };
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
@@ -192,6 +193,13 @@ impl ToFigure for Modes {
     /// Draws the responses of the first record over frequency, measured and explained by the modes.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(modes::figure(self))
+    }
+}
+
+impl ToFigure for IdentifiedElements {
+    /// Draws the responses of the first sensors over frequency, measured and of the identified machine.
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
+        Ok(elements::figure(self))
     }
 }
 
