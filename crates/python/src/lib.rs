@@ -11,6 +11,7 @@
 mod answer;
 mod arrays;
 mod bearing;
+mod elements;
 mod failure;
 mod fleet;
 mod identified;
@@ -31,6 +32,8 @@ mod _mechid {
     use super::answer::Answer;
     #[pymodule_export]
     use super::bearing::{bearing, bearing_of_responses};
+    #[pymodule_export]
+    use super::elements::{IdentifiedElements, described_machine, identify_elements};
     #[pymodule_export]
     use super::fleet::{fleet_begin, fleet_part, fleet_record_column, fleet_rows, fleet_summary};
     #[pymodule_export]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ._doors import decay as decay
     from ._doors import frf as frf
     from ._doors import identify as identify
+    from ._doors import identify_elements as identify_elements
     from ._doors import identify_responses as identify_responses
     from ._doors import inspect as inspect
     from ._doors import integrate as integrate
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from ._results import FrequencyResponses as FrequencyResponses
     from ._results import Identified as Identified
     from ._results import IdentifiedBearing as IdentifiedBearing
+    from ._results import IdentifiedElements as IdentifiedElements
     from ._results import IdentifiedResponses as IdentifiedResponses
     from ._results import Inspected as Inspected
     from ._results import Machine as Machine
@@ -61,6 +63,7 @@ _HOMES = {
     "decay": "_doors",
     "frf": "_doors",
     "identify": "_doors",
+    "identify_elements": "_doors",
     "identify_responses": "_doors",
     "inspect": "_doors",
     "integrate": "_doors",
@@ -80,6 +83,7 @@ _HOMES = {
     "FrequencyResponses": "_results",
     "Identified": "_results",
     "IdentifiedBearing": "_results",
+    "IdentifiedElements": "_results",
     "IdentifiedResponses": "_results",
     "Inspected": "_results",
     "Machine": "_results",
@@ -103,6 +107,7 @@ __all__ = [
     "FrequencyResponses",
     "Identified",
     "IdentifiedBearing",
+    "IdentifiedElements",
     "IdentifiedResponses",
     "Inspected",
     "Machine",
@@ -126,6 +131,7 @@ __all__ = [
     "decay",
     "frf",
     "identify",
+    "identify_elements",
     "identify_responses",
     "inspect",
     "integrate",

@@ -28,6 +28,7 @@ from ._results import (
     FrequencyResponses,
     Identified,
     IdentifiedBearing,
+    IdentifiedElements,
     IdentifiedResponses,
     Inspected,
     Machine,
@@ -233,6 +234,113 @@ def identify(
         [record._inner for record in records], told, predicted, threads
     )
     return Identified(inner)
+
+
+@careful
+def identify_elements(
+    *sources: object,
+    machine: str | os.PathLike[str] | Mapping[str, Any],
+    parts: Sequence[str | os.PathLike[str] | ResponseTable] = (),
+    speed_table: bool = False,
+    band_hz: tuple[float, float] | None = None,
+    without_hz: Sequence[float | Mapping[str, Any]] = (),
+    noise: str = "auto",
+    starts: int | None = None,
+    seed: int = 0,
+    confidence: float = 0.95,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> IdentifiedElements:
+    """Identify the unknown coefficients of a machine of named elements, with sensors anywhere.
+
+    It is ``mechid identify --machine``.
+
+    Parameters
+    ----------
+    *sources
+        Records (files by path, tables, or `Measurement` objects) whose columns have the names of the
+        sensors and inputs; or `ResponseTable` objects whose points have them; or, with `speed_table`,
+        files with a row for each speed of a run.
+    machine : path or mapping
+        The machine: degrees of freedom, elements, sensors and inputs, as the program reads it. The
+        matrices of an element may be NumPy arrays or sparse matrices of SciPy, such as ``rotor.M()``,
+        ``rotor.C(speed)``, ``rotor.G()`` and ``rotor.K(speed)`` of a ROSS rotor without its bearings.
+    parts : sequence
+        Tables of frequency responses of the parts whose receptance stands for a model of them.
+    speed_table : bool
+        Whether the sources are tables of synchronous responses over the speed.
+    band_hz : (float, float), optional
+        Frequencies to use, in Hz; those that the inputs drive, without.
+    without_hz : sequence of float or dict
+        Frequencies whose lines are left out, as in `identify`.
+    noise : str
+        Noise spectrum by which the lines are weighted, as in `identify`.
+    starts : int, optional
+        Number of searches at most; 12, without.
+    seed : int
+        Seed of the random first values.
+    confidence : float
+        Probability with which the intervals contain the unknowns.
+    threads : int, optional
+        Number of threads; as many as there are processors, without.
+    **record
+        What is in the records, as `RecordOptions`, without columns. A record with ``period`` is taken as
+        whole periods, otherwise as an open record.
+
+    Returns
+    -------
+    IdentifiedElements
+
+    Raises
+    ------
+    MechidError
+        If the description does not make sense, a record cannot be read, or nothing is determined.
+
+    Examples
+    --------
+    >>> import mechid
+    >>> foot = {"name": "foot", "at": "displacement", "k": {"start": 1e3, "min": 0}, "c": {"start": 10}}
+    >>> machine = {
+    ...     "dofs": ["displacement"],
+    ...     "elements": [{"name": "m", "at": "displacement", "m": {"start": 20, "min": 0}}, foot],
+    ...     "sensors": [{"at": "displacement", "quantity": "displacement"}],
+    ...     "inputs": [{"kind": "force", "name": "force", "at": "displacement"}],
+    ... }
+    >>> found = mechid.identify_elements("examples/machine.csv", machine=machine, period=256)
+    >>> sorted(found.parameters)
+    ['foot.c', 'foot.k', 'm']
+    """
+    if isinstance(machine, Mapping):
+        name, described, folder = "the machine", json.dumps(machine, default=listed), ""
+    else:
+        name, folder = os.fspath(machine), os.path.dirname(os.fspath(machine))
+        with open(machine, encoding="utf-8-sig") as file:
+            described = file.read()
+    told, columns = (json.loads(text) for text in _mechid.described_machine(name, described, folder))
+    told |= {
+        "band": None if band_hz is None else {"low_hz": float(band_hz[0]), "high_hz": float(band_hz[1])},
+        "without_hz": json.loads(_without(None, without_hz))["frequencies"],
+        "noise": noise,
+        "seed": _index("seed", seed) if seed else 0,
+        "confidence": float(confidence),
+    }
+    if starts is not None:
+        told["starts"] = _index("starts", starts)
+    given = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in parts]
+    of_parts = [one._inner for one in given]
+    settings = json.dumps(told)
+    if speed_table:
+        paths = [os.fspath(source) for source in sources]  # type: ignore[call-overload]
+        inner = _mechid.identify_elements([], [], paths, of_parts, settings, threads)
+    elif sources and all(isinstance(source, ResponseTable) for source in sources):
+        tables = [source._inner for source in sources if isinstance(source, ResponseTable)]
+        inner = _mechid.identify_elements([], tables, [], of_parts, settings, threads)
+    else:
+        if not all(isinstance(source, Measurement) for source in sources):
+            record = {**{kind: names for kind, names in columns.items() if names}, **record}  # type: ignore[assignment, typeddict-item]
+        records = [one._inner for one in measurements(sources, "identify_elements", record)]
+        inner = _mechid.identify_elements(records, [], [], of_parts, settings, threads)
+    return IdentifiedElements(inner)
 
 
 @careful
@@ -622,7 +730,7 @@ def modes(
 
 
 def reconstruct(
-    machine: Machine | Identified | IdentifiedResponses | str | os.PathLike[str],
+    machine: Machine | Identified | IdentifiedResponses | IdentifiedElements | str | os.PathLike[str],
     *sources: object,
     method: ForceMethod = "auto",
     forced: Sequence[int] = (),

@@ -424,18 +424,7 @@ class Estimated(Drawn):
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
         """Every check of the data and of the fit, in the order in which they were made."""
-        return tuple(
-            Finding(
-                when=row["when"],
-                record=row["record"],
-                subject=row["subject"],
-                verdict=row["verdict"],
-                value=row["value"],
-                text=row["text"],
-                numbers=MappingProxyType(row["finding"]),
-            )
-            for row in self._told["checks"]
-        )
+        return tuple(_finding(row) for row in self._told["checks"])
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
@@ -1093,6 +1082,86 @@ class Modes(Drawn):
 
 
 @final
+class IdentifiedElements(Drawn):
+    """Identified coefficients of a machine of named elements."""
+
+    _inner: _mechid.IdentifiedElements
+
+    def __init__(self, inner: _mechid.IdentifiedElements) -> None:
+        self.__dict__["_inner"] = inner
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Uncertain]:
+        """Unknowns by name: value, standard error and interval, in SI units.
+
+        The standard error is None of an unknown at its bound, or that the data do not determine.
+        """
+        return MappingProxyType({row["name"]: _unknown(row) for row in self._told["parameters"]})
+
+    @property
+    def priors(self) -> Mapping[str, Mapping[str, Any]]:
+        """Priors by name: ``mean``, ``standard_deviation``, ``share`` of the information, ``p_value``."""
+        rows = [row for row in self._told["parameters"] if row["prior"] is not None]
+        return MappingProxyType({row["name"]: MappingProxyType(row["prior"]) for row in rows})
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Names of the unknowns that lie at a bound beyond which the data would have them."""
+        return tuple(row["name"] for row in self._told["parameters"] if row["at_bound"])
+
+    @property
+    def combinations(self) -> tuple[str, ...]:
+        """What the data determine only together, a sentence each."""
+        return tuple(row["text"] for row in self._told["combinations"])
+
+    @property
+    def minima(self) -> tuple[Mapping[str, Any], ...]:
+        """Minima that the searches ended at, the lowest first."""
+        return tuple(MappingProxyType(row) for row in self._told["minima"])
+
+    @property
+    def candidates(self) -> tuple[Mapping[str, Any], ...]:
+        """Measurements that could be added, the best first."""
+        return tuple(MappingProxyType(row) for row in self._told.get("candidates", ()))
+
+    @property
+    def covariance(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+        """Names of the unknowns, and their covariance."""
+        names, matrix = self._inner.covariance()
+        matrix.flags.writeable = False
+        return tuple(names), matrix
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """Every check of the data and of the fit."""
+        return tuple(_finding(row) for row in self._told["checks"])
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Findings that are not good."""
+        return tuple(check for check in self.findings if check.verdict != "good")
+
+    @property
+    def notes(self) -> tuple[Mapping[str, Any], ...]:
+        """What to know of the numbers: ``kind`` and the numbers of each note."""
+        return tuple(MappingProxyType(row) for row in self._told["notes"])
+
+    def machine(self) -> Machine:
+        """Return M, C and K with the covariance of their entries.
+
+        Raises
+        ------
+        MechidError
+            If an entry is not determined, or a degree of freedom has no mass.
+        """
+        return Machine._of(self._inner.machine())
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={p.value:.6g}" for name, p in self.parameters.items())
+        return f"<IdentifiedElements: {values}>"
+
+
+@final
 class Sweep(Drawn):
     """Estimates and errors at many sampling steps."""
 
@@ -1336,9 +1405,11 @@ class Multisine:
         return cls(fs, force, tuple(lines), amplitudes, phases, *measures)
 
 
-def machine_of(given: Machine | Estimated | str | os.PathLike[str]) -> Machine:
+def machine_of(
+    given: Machine | Estimated | IdentifiedElements | str | os.PathLike[str],
+) -> Machine:
     """Return the machine that is meant."""
-    if isinstance(given, Estimated):
+    if isinstance(given, (Estimated, IdentifiedElements)):
         return given.machine()
     if isinstance(given, Machine):
         return given
@@ -1396,6 +1467,25 @@ def _mode(row: dict[str, Any]) -> Mode:
         shape=np.array([complex(*entry["value"]) for entry in shape]),
         shape_std_error=None if None in errors else np.array([complex(*e) for e in errors]),
     )
+
+
+def _finding(row: dict[str, Any]) -> Finding:
+    return Finding(
+        when=row["when"],
+        record=row["record"],
+        subject=row["subject"],
+        verdict=row["verdict"],
+        value=row["value"],
+        text=row["text"],
+        numbers=MappingProxyType(row["finding"]),
+    )
+
+
+def _unknown(row: dict[str, Any]) -> Uncertain:
+    low, high = row["interval"]
+    # JSON has no infinity.
+    interval = (float("-inf") if low is None else low, _number(high))
+    return Uncertain(value=_number(row["value"]), std_error=row["standard_error"], interval=interval)
 
 
 def _uncertain(row: dict[str, Any]) -> Uncertain:
