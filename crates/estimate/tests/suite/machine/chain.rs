@@ -74,6 +74,55 @@ pub fn fit(seed: u64, settings: &Settings) -> Option<LikelihoodEstimate> {
     Some(identify_machine(&data, &machine(), &instruments(), settings).ok()?.likelihood)
 }
 
+/// The same with a spring from the last mass to the support, which does not exist: `k >= 0` is active in about
+/// half of the experiments.
+pub fn fit_with_bound(seed: u64) -> Option<LikelihoodEstimate> {
+    let free = FreeCoefficient::from_start(1e3).at_least(0.0);
+    let machine = machine().with("absent", Element::spring(["x5", "support"], free));
+    let data = data(&STIFFNESSES, seed);
+    let settings = Settings::default();
+    Some(identify_machine(&data, &machine, &instruments(), &settings).ok()?.likelihood)
+}
+
+/// Truth of [`fit_with_bound`].
+pub fn truth_with_bound() -> Vec<(String, f64)> {
+    [truth(), vec![("absent".into(), 0.0)]].concat()
+}
+
+/// The same with a prior of 1 % on the first spring, `away` of its standard deviations from the truth.
+pub fn fit_with_prior(seed: u64, away: f64) -> Option<LikelihoodEstimate> {
+    let deviation = 0.01 * STIFFNESSES[0];
+    let mut machine = machine();
+    machine.elements[1].1 = Element::spring_damper(
+        ["support", "x1"],
+        FreeCoefficient::from_start(3e4).with_prior(STIFFNESSES[0] + away * deviation, deviation),
+        FreeCoefficient::from_start(4.0).at_least(0.0),
+    );
+    let data = data(&STIFFNESSES, seed);
+    let settings = Settings::default();
+    Some(identify_machine(&data, &machine, &instruments(), &settings).ok()?.likelihood)
+}
+
+#[test]
+fn a_bound_is_active_in_half_of_the_experiments() {
+    let judged = judge(&truth_with_bound(), 20, fit_with_bound);
+    assert!(judged.failed == 0 && judged.held >= 0.9, "{judged:?}");
+    let is_active = |seed| fit_with_bound(seed).unwrap().parameter("absent").unwrap().at_bound;
+    let active = (0..20).filter(|seed| is_active(*seed)).count();
+    // Of 20 experiments fewer than 4 or more than 16 with a probability of 0.003.
+    assert!((4..=16).contains(&active), "{active}");
+}
+
+#[test]
+fn a_prior_that_is_wrong_by_five_standard_deviations_is_told() {
+    let p_value = |away: f64, seed: u64| {
+        let estimate = fit_with_prior(seed, away).unwrap();
+        estimate.parameter("s1.k").unwrap().prior.unwrap().p_value.unwrap()
+    };
+    assert!((0..4).all(|seed| p_value(5.0, seed) < 1e-4));
+    assert!((0..4).all(|seed| p_value(0.5, seed) > 0.01));
+}
+
 /// Of 200 intervals of 95 % fewer than 90 % hold with a probability of 0.002 if they are independent.
 #[test]
 fn intervals_of_springs_and_dampers_hold() {

@@ -3,7 +3,9 @@
 mod agreement;
 mod chain;
 mod entries;
+mod frame;
 mod generator;
+mod joint;
 mod judge;
 mod open;
 mod rotor;
