@@ -154,6 +154,8 @@ fn assembly(
         name: format!("output {}", at + 1),
         entries: vec![(*dof, 1.0)],
         quantity: *quantity,
+        delay: 0.0,
+        delay_parameter: None,
     });
     let inputs = channels.forces.iter().map(|dof| InputColumn::Force(vec![(*dof, 1.0)]));
     let (sensors, inputs) = (sensors.collect(), inputs.collect());

@@ -1,6 +1,7 @@
 //! Searches from several first values, and all minima that they lead to.
 
 use mechid_signal::{Sampling, noise};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::LikelihoodError;
 use super::limits::{FIRST_STEPS, SAME_MINIMUM, STEPS};
@@ -21,7 +22,8 @@ pub(super) struct Minima {
     pub(super) searches: usize,
 }
 
-/// First values of every search: the given ones, then each times a log-normal factor, within the bounds.
+/// First values of every search: the given ones, then each times a log-normal factor, within the bounds; one
+/// that may have either sign between two bounds is anywhere between them.
 pub(super) fn starts(
     given: &[f64],
     bounds: &Bounds,
@@ -35,7 +37,15 @@ pub(super) fn starts(
     for row in 1..count {
         let Some(drawn) = &drawn else { break };
         let factor = |at: usize| (spread.ln() * drawn.data()[(row, at)]).exp();
-        let value = |at: usize| (given[at] * factor(at)).clamp(bounds.min[at], bounds.max[at]);
+        let value = |at: usize| {
+            let (min, max) = (bounds.min[at], bounds.max[at]);
+            let has_either_sign = min < 0.0 && max > 0.0 && (max - min).is_finite();
+            if has_either_sign {
+                min + (max - min) * Normal::standard().cdf(drawn.data()[(row, at)])
+            } else {
+                (given[at] * factor(at)).clamp(min, max)
+            }
+        };
         starts.push((0..given.len()).map(value).collect());
     }
     starts

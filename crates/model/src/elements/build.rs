@@ -20,10 +20,6 @@ pub(super) fn assembly(
         builder.add(name, element)?;
     }
     builder.check_masses(machine)?;
-    let unused = machine.parameters.iter().find(|(name, _)| !builder.shared.contains_key(name));
-    if let Some((name, _)) = unused {
-        return Err(MachineError::UnusedParameter { name: name.clone() });
-    }
     if instruments.sensors.is_empty() {
         return Err(MachineError::NoInstrument { what: "sensors" });
     }
@@ -32,6 +28,10 @@ pub(super) fn assembly(
     }
     let sensors = instruments.sensors.iter().map(|sensor| builder.sensor(sensor));
     let sensors = sensors.collect::<Result<_, _>>()?;
+    let unused = machine.parameters.iter().find(|(name, _)| !builder.shared.contains_key(name));
+    if let Some((name, _)) = unused {
+        return Err(MachineError::UnusedParameter { name: name.clone() });
+    }
     let inputs = instruments.inputs.iter().map(|input| builder.input(input));
     let inputs = inputs.collect::<Result<_, _>>()?;
     let measured = machine.measured.iter().map(|dof| builder.dof("machine", "measured", dof));

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::build::Builder;
+use super::build::{Builder, Factor};
 use super::{Input, MachineError, Sensor, Speed};
 use crate::ResponseQuantity;
 
@@ -15,6 +15,21 @@ pub struct SensorRow {
     pub entries: Vec<(usize, f64)>,
     /// Quantity measured.
     pub quantity: ResponseQuantity,
+    /// Known delay, in s.
+    pub delay: f64,
+    /// Parameter that is a delay (s), if it is unknown.
+    pub delay_parameter: Option<usize>,
+}
+
+impl SensorRow {
+    /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m, with the
+    /// delay by `parameters` in their units.
+    pub fn factor(&self, parameters: &[f64], omega: f64) -> Complex<f64> {
+        let unknown = self.delay_parameter.map_or(0.0, |at| parameters[at]);
+        let phase = omega * (self.delay + unknown);
+        let factor = self.quantity.per_displacement(omega);
+        if phase == 0.0 { factor } else { factor * Complex::cis(-phase) }
+    }
 }
 
 /// Action of an input.
@@ -53,7 +68,7 @@ pub(super) fn unbalance(
 }
 
 impl Builder<'_> {
-    pub(super) fn sensor(&self, sensor: &Sensor) -> Result<SensorRow, MachineError> {
+    pub(super) fn sensor(&mut self, sensor: &Sensor) -> Result<SensorRow, MachineError> {
         let name = &sensor.name;
         if !sensor.gain.is_finite() {
             return Err(MachineError::NotFinite { name: name.clone(), value: sensor.gain });
@@ -66,7 +81,13 @@ impl Builder<'_> {
             None => vec![(self.dof("sensor", name, &sensor.at)?, 1.0)],
         };
         entries.iter_mut().for_each(|(_, weight)| *weight *= sensor.gain);
-        Ok(SensorRow { name: name.clone(), entries, quantity: sensor.quantity })
+        let (delay, delay_parameter) =
+            match self.factor(&format!("{name}.delay"), "s", &sensor.delay)? {
+                Factor::Known(delay) => (delay, None),
+                Factor::Unknown(parameter) => (0.0, Some(parameter)),
+            };
+        let quantity = sensor.quantity;
+        Ok(SensorRow { name: name.clone(), entries, quantity, delay, delay_parameter })
     }
 
     pub(super) fn input(&self, input: &Input) -> Result<InputColumn, MachineError> {

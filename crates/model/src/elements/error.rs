@@ -63,8 +63,8 @@ pub enum MachineError {
         /// Parameter that it names.
         parameter: String,
     },
-    /// No coefficient uses the parameter.
-    #[error("no element uses the parameter {name:?}")]
+    /// No coefficient and no sensor uses the parameter.
+    #[error("no element or sensor uses the parameter {name:?}")]
     UnusedParameter {
         /// Name of the parameter.
         name: String,

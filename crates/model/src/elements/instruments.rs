@@ -1,6 +1,6 @@
 //! Sensors and inputs of a machine.
 
-use super::SUPPORT;
+use super::{Coefficient, SUPPORT};
 use crate::ResponseQuantity;
 
 /// A sensor at a degree of freedom.
@@ -22,6 +22,9 @@ pub struct Sensor {
     /// Reading per unit of the quantity.
     #[cfg_attr(feature = "serde", serde(default = "one", skip_serializing_if = "is_one"))]
     pub gain: f64,
+    /// Delay behind the inputs, in s: of a logger with a clock of its own, or of a filter.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Coefficient::is_zero"))]
+    pub delay: Coefficient,
 }
 
 /// A measured input.
@@ -99,7 +102,8 @@ impl Sensor {
     /// Takes a sensor of unit gain with the name of its degree of freedom.
     pub fn new(at: &str, quantity: ResponseQuantity) -> Self {
         let name = at.to_owned();
-        Self { at: name.clone(), name, relative_to: None, quantity, gain: 1.0 }
+        let delay = Coefficient::default();
+        Self { at: name.clone(), name, relative_to: None, quantity, gain: 1.0, delay }
     }
 
     /// Returns the same, reading the motion relative to another degree of freedom.

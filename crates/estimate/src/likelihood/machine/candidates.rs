@@ -157,21 +157,35 @@ impl MachineEstimate {
     ) -> Result<DMatrix<f64>, LikelihoodError> {
         let assembly = machine.assembly(instruments)?;
         let model = MachineModel::new(&assembly, data.omega(), self.part.as_ref(), false)?;
-        let (count, outputs) = (values.len(), assembly.sensors().len());
+        // Another set of sensors may have fewer delays among its parameters.
+        let mut places = Vec::new();
+        for parameter in assembly.parameters() {
+            let all = self.assembly.parameters();
+            let place = all.iter().position(|other| other.name == parameter.name);
+            let what = "a candidate without unknowns of its own: unknown parameters";
+            places.push(place.ok_or(LikelihoodError::Size { what, expected: 0, got: 1 })?);
+        }
+        let values: Vec<f64> = places.iter().map(|place| values[*place]).collect();
+        let (count, outputs) = (self.assembly.parameters().len(), assembly.sensors().len());
         let mut gram = DMatrix::zeros(count, count);
-        let mut sensitivity = DMatrix::zeros(outputs, count);
+        let mut sensitivity = DMatrix::zeros(outputs, values.len());
         for row in 0..data.len() {
             let failed = LikelihoodError::NoResponse { at: "the estimate" };
-            let line = model.at(values, row).ok_or(failed)?;
+            let line = model.at(&values, row).ok_or(failed)?;
             let input: DVector<Complex<f64>> = inputs.row(row).transpose();
-            line.sensitivity(values, &input, &DVector::zeros(0), &mut sensitivity);
+            line.sensitivity(&values, &input, &DVector::zeros(0), &mut sensitivity);
             for (output, mut of_output) in sensitivity.row_iter_mut().enumerate() {
                 let weight = (2.0 / variance[(row, output)]).sqrt();
-                for (z, value) in of_output.iter_mut().zip(values) {
+                for (z, value) in of_output.iter_mut().zip(&values) {
                     *z *= weight * scale(*value);
                 }
             }
-            gram += (sensitivity.adjoint() * &sensitivity).map(|z| z.re);
+            let of_line = (sensitivity.adjoint() * &sensitivity).map(|z| z.re);
+            for (i, row) in places.iter().enumerate() {
+                for (j, column) in places.iter().enumerate() {
+                    gram[(*row, *column)] += of_line[(i, j)];
+                }
+            }
         }
         Ok(gram)
     }

@@ -2,7 +2,6 @@
 
 use std::ops::AddAssign;
 
-use mechid_model::ResponseQuantity;
 use mechid_model::elements::{Assembly, Pattern, Power};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -44,8 +43,8 @@ pub struct MachineModel {
     terms: Vec<JointTerm>,
     lines: Vec<NominalLine>,
     line_of: Vec<usize>,
-    /// Sensors: weights of places and of the support, index r, and the quantity measured.
-    sensors: Vec<(Vec<(usize, f64)>, ResponseQuantity)>,
+    /// Sensors: weights of places and of the support, index r.
+    sensors: Vec<Vec<(usize, f64)>>,
     states: usize,
     measured: Option<MeasuredPart>,
 }
@@ -54,6 +53,7 @@ pub struct MachineModel {
 #[derive(Debug, Clone)]
 pub struct MachineLine<'a> {
     model: &'a MachineModel,
+    omega: f64,
     /// G, p × q.
     receptance: DMatrix<Complex<f64>>,
     /// Response of the sensors to each own load, p × loads, and to all of them.
@@ -117,8 +117,7 @@ impl MachineModel {
         let terms = terms.collect();
         let sensors = assembly.sensors().iter().map(|sensor| {
             let place = |dof: usize| places.place(dof).unwrap_or(places.dofs.len());
-            let entries = sensor.entries.iter().map(|(dof, weight)| (place(*dof), *weight));
-            (entries.collect(), sensor.quantity)
+            sensor.entries.iter().map(|(dof, weight)| (place(*dof), *weight)).collect()
         });
         let sensors = sensors.collect();
         Ok(Self {
@@ -174,13 +173,12 @@ impl MachineModel {
     /// Readings of the sensors under motions of the places, r × m, and of the support, in one column each.
     fn read(
         &self,
-        omega: f64,
+        factors: &[Complex<f64>],
         places: &DMatrix<Complex<f64>>,
         support: Option<&[Complex<f64>]>,
     ) -> DMatrix<Complex<f64>> {
         let mut readings = DMatrix::zeros(self.sensors.len(), places.ncols());
-        for (row, (entries, quantity)) in self.sensors.iter().enumerate() {
-            let factor = quantity.per_displacement(omega);
+        for (row, (entries, factor)) in self.sensors.iter().zip(factors).enumerate() {
             for column in 0..places.ncols() {
                 let motion = entries.iter().map(|(place, weight)| match *place < places.nrows() {
                     true => places[(*place, column)] * *weight,
@@ -195,7 +193,7 @@ impl MachineModel {
     /// S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on it per input.
     fn part(
         &self,
-        omega: f64,
+        (omega, readings_of): (f64, &[Complex<f64>]),
         change: &DMatrix<Complex<f64>>,
         from_joints: &DMatrix<Complex<f64>>,
         joints: &DMatrix<Complex<f64>>,
@@ -209,9 +207,9 @@ impl MachineModel {
         let mut forces = DMatrix::zeros(part.dofs.len(), inputs);
         for (at, dof) in part.dofs.iter().enumerate() {
             let place = self.places.place(*dof)?;
-            for (row, (entries, quantity)) in self.sensors.iter().enumerate() {
+            for (row, (entries, factor)) in self.sensors.iter().zip(readings_of).enumerate() {
                 let direct: f64 = entries.iter().filter(|(of, _)| *of == place).map(|e| e.1).sum();
-                readings[(row, at)] = quantity.per_displacement(omega) * direct;
+                readings[(row, at)] = factor * direct;
                 if place < j {
                     readings[(row, at)] -= coupled[(row, place)];
                 }
@@ -264,7 +262,10 @@ impl ResponseModel for MachineModel {
         }
         let mut joints = loads.rows(0, j).into_owned().insert_row(j, Complex::default());
         joints.row_mut(j).iter_mut().zip(&nominal.support).for_each(|(to, from)| *to = *from);
-        let responses = self.read(omega, &loads, Some(&nominal.support));
+        let sensors = self.assembly.sensors().iter();
+        let of_sensors: Vec<Complex<f64>> =
+            sensors.map(|sensor| sensor.factor(parameters, omega)).collect();
+        let responses = self.read(&of_sensors, &loads, Some(&nominal.support));
         let internal = (self.states > 0).then(|| from_joints.rows(0, j).into_owned());
         let own_loads = self.assembly.own_loads(omega);
         let value = |parameter: &Option<usize>| parameter.map_or(1.0, |at| parameters[at]);
@@ -272,12 +273,13 @@ impl ResponseModel for MachineModel {
         let own_response = responses.columns(inputs, all - inputs).into_owned();
         let values = DVector::from_iterator(own_values.len(), own_values.iter().map(|v| v.into()));
         let own = (!own_values.is_empty()).then(|| &own_response * values);
-        let from_joints = self.read(omega, &from_joints, None);
+        let from_joints = self.read(&of_sensors, &from_joints, None);
         let receptance = responses.columns(0, inputs).into_owned();
         receptance.iter().all(|z| z.is_finite()).then_some(())?;
-        let part = self.part(omega, &change, &from_joints, &joints);
+        let part = self.part((omega, &of_sensors), &change, &from_joints, &joints);
         Some(MachineLine {
             model: self,
+            omega,
             receptance,
             own_response,
             own,
@@ -356,6 +358,16 @@ impl LineResponse for MachineLine<'_> {
                     Complex::new(1.0, 0.0),
                 );
             }
+        }
+        // A delay τ turns a reading y by e^{−iωτ}: ∂y/∂τ = −iω y.
+        for (row, sensor) in assembly.sensors().iter().enumerate() {
+            let Some(parameter) = sensor.delay_parameter else { continue };
+            let mut reading = (self.receptance.row(row) * input)[0];
+            reading += self.own.as_ref().map_or(Complex::default(), |own| own[row]);
+            if !states.is_empty() {
+                reading += (self.from_joints.row(row) * states)[0];
+            }
+            to[(row, parameter)] += reading * Complex::new(0.0, -self.omega);
         }
         for (column, (parameter, _)) in assembly.own_loads(1.0).iter().enumerate() {
             if let Some(parameter) = parameter {
