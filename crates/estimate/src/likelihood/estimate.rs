@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::fit::Fit;
-use super::limits::WEAK;
+use super::limits::{COMMON_FACTOR, WEAK};
 use super::profile;
 use super::response_model::ResponseModel;
 
@@ -87,6 +87,12 @@ impl fmt::Display for Combination {
         if self.determined.is_empty() {
             return write!(f, "the data do not determine {all}");
         }
+        if self.has_common_factor() {
+            return write!(
+                f,
+                "the data determine {all} only up to one common factor: state one of them"
+            );
+        }
         let sums = self.determined.iter().map(|coefficients| self.combination(coefficients));
         let sums: Vec<String> = sums.collect();
         write!(f, "the data determine {all} only by {}", sums.join(" and "))
@@ -94,6 +100,16 @@ impl fmt::Display for Combination {
 }
 
 impl Combination {
+    /// Whether nothing but a factor of all values is open: every combination is one of their ratios.
+    fn has_common_factor(&self) -> bool {
+        let is_ratio = |coefficients: &Vec<f64>| {
+            let terms = || coefficients.iter().zip(&self.values).map(|(c, value)| c * value);
+            terms().sum::<f64>().abs() <= COMMON_FACTOR * terms().map(f64::abs).sum::<f64>()
+        };
+        let members = self.parameters.len();
+        members > 2 && self.determined.len() + 1 == members && self.determined.iter().all(is_ratio)
+    }
+
     /// The combination in words where it has a name.
     fn combination(&self, coefficients: &[f64]) -> String {
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * a.abs().max(b.abs());

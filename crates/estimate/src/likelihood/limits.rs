@@ -67,3 +67,7 @@ pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 /// Part of a gradient outside the determined combinations above which the quantity is not determined; less is
 /// rounding of the singular vectors.
 pub(super) const UNDETERMINED_PART: f64 = 1e-5;
+
+/// Part of its terms that a combination of parameters has at most if it depends on their ratios alone; a
+/// combination of another kind has most of them.
+pub(super) const COMMON_FACTOR: f64 = 1e-4;
