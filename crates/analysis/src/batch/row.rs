@@ -7,10 +7,11 @@ use mechid_io::{ParameterCovariance, RecordFile, Table};
 use serde::Serialize;
 
 use super::settings::SavedAnalysis;
+use crate::elements::{ElementRow, ElementSummary};
 use crate::identify::checks::CheckRow;
 use crate::identify::rows::{ModeRow, Uncertain, WindowRow};
 use crate::identify::summary::{FitRow, IdentificationSummary};
-use crate::{AnalysisError, Measurement, identify};
+use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements};
 
 /// Result of one record: a machine with its uncertainty and what speaks against it, or an error.
 ///
@@ -118,7 +119,7 @@ impl SavedAnalysis {
     pub fn row_of_table(&self, record: &str, table: Table) -> ResultRow {
         let open = || {
             let file = RecordFile::of_table(table);
-            Measurement::of_file(file, None, &self.channels, &self.reading)?
+            Measurement::of_file(file, None, &self.record_channels()?, &self.reading)?
                 .window(self.window.clone())
         };
         self.row(record, open)
@@ -152,19 +153,55 @@ impl ResultRow {
             analysis_hash: analysis.hash(),
             version: env!("CARGO_PKG_VERSION").into(),
         };
-        let work = || {
+        let work = || -> Result<Self, AnalysisError> {
             analysis.check()?;
-            identify(&[source()?], &analysis.identify)
+            let records = [source()?];
+            match &analysis.elements {
+                None => Ok(empty.with(identify(&records, &analysis.identify)?.summary())),
+                Some(how) => {
+                    let data = ElementData::from_records(&records, how)?;
+                    Ok(empty.with_elements(identify_elements(&data, how)?.summary()))
+                }
+            }
         };
         let error = match catch_unwind(AssertUnwindSafe(work)) {
-            Ok(Ok(identification)) => return empty.with(identification.summary()),
+            Ok(Ok(row)) => return row,
             Ok(Err(error)) => RowError { code: error.code(), message: error.to_string() },
             Err(panic) => RowError { code: "internal".into(), message: panic_message(&*panic) },
         };
         Self { error: Some(error), ..empty }
     }
 
-    fn with(self, identification: &IdentificationSummary) -> Self {
+    fn with_elements(&self, identified: &ElementSummary) -> Self {
+        let window = identified.tests.first().and_then(|test| test.window.as_ref());
+        let cell = |row: &ElementRow| ParameterCell {
+            name: row.estimate.name.clone(),
+            unit: row.unit.to_owned(),
+            value: row.estimate.value,
+            standard_error: row.estimate.standard_error,
+        };
+        let open = identified.combinations.iter().map(|row| row.text.clone());
+        let conspicuous = identified.checks.iter().filter(|check| check.is_conspicuous());
+        Self {
+            estimator: Some("maximum likelihood, machine of named elements".into()),
+            sample_rate_hz: window.map(|window| window.sample_rate_hz),
+            first_sample: window.map(|window| window.first_sample),
+            last_sample: window.map(|window| window.last_sample),
+            parameters: identified.parameters.iter().map(cell).collect(),
+            // Unknowns without a variance have no covariance in a table.
+            covariance: Some(identified.parameter_covariance.clone())
+                .filter(|_| identified.combinations.is_empty()),
+            modes: identified.modes.iter().map(ModeCell::of).collect(),
+            misfit_ratio: identified.misfit_ratio,
+            condition_number: Some(identified.condition_number),
+            findings: identified.checks.iter().map(FindingRow::of).collect(),
+            warnings: conspicuous.map(CheckRow::sentence).chain(open).collect(),
+            notes: identified.notes.iter().map(ToString::to_string).collect(),
+            ..self.clone()
+        }
+    }
+
+    fn with(&self, identification: &IdentificationSummary) -> Self {
         let WindowRow { first_sample, last_sample, sample_rate_hz, .. } = identification.window;
         let FitRow { nrmse, unexplained_motion, misfit_ratio, condition_number, .. } =
             identification.fit;
@@ -190,7 +227,7 @@ impl ResultRow {
             findings: identification.checks.iter().map(FindingRow::of).collect(),
             warnings: conspicuous.map(CheckRow::sentence).collect(),
             notes: identification.remarks.clone(),
-            ..self
+            ..self.clone()
         }
     }
 }

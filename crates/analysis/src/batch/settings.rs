@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use twox_hash::XxHash3_128;
 
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
-use crate::{AnalysisError, Identify};
+use crate::{AnalysisError, Identify, IdentifyElements};
 
 /// An identification to be repeated on many records that have the same columns.
 ///
@@ -41,6 +41,10 @@ pub struct SavedAnalysis {
     pub window: Window,
     /// Settings of the identification.
     pub identify: Identify,
+    /// Settings of the identification of a machine of named elements, whose sensors and inputs name the
+    /// columns; then `channels` and `identify` are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elements: Option<IdentifyElements>,
 }
 
 impl SavedAnalysis {
@@ -59,9 +63,21 @@ impl SavedAnalysis {
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`],
-    /// and [`AnalysisError::Setting`] for a window that is counted from 0 or has no samples.
+    /// and [`AnalysisError::Setting`] for a window that is counted from 0 or has no samples, and for two
+    /// kinds of identification at once.
     pub fn check(&self) -> Result<(), AnalysisError> {
-        self.channels.check_pairs()?;
+        let channels = self.record_channels()?;
+        match &self.elements {
+            None => channels.check_pairs()?,
+            Some(_)
+                if self.channels == Channels::default() && self.identify == Identify::default() => {
+            }
+            Some(_) => {
+                let why = "a machine of named elements has columns and settings of its own: leave `channels` \
+                           and `identify` out";
+                return Err(AnalysisError::Setting { setting: "elements", why: why.into() });
+            }
+        }
         let Window { start, period, periods } = self.window;
         for (setting, count) in [("start", Some(start)), ("period", period), ("periods", periods)] {
             if count == Some(0) {
@@ -72,6 +88,17 @@ impl SavedAnalysis {
         Ok(())
     }
 
+    /// Returns the columns of a record.
+    ///
+    /// # Errors
+    /// Those of [`IdentifyElements::channels`].
+    pub(crate) fn record_channels(&self) -> Result<Channels, AnalysisError> {
+        match &self.elements {
+            Some(elements) => elements.channels(),
+            None => Ok(self.channels.clone()),
+        }
+    }
+
     /// Opens a record as the analysis reads it.
     ///
     /// # Errors
@@ -79,7 +106,7 @@ impl SavedAnalysis {
     pub fn open(&self, path: impl AsRef<Path>) -> Result<Measurement, AnalysisError> {
         let plan = RecordPlan {
             path: path.as_ref().to_owned(),
-            channels: self.channels.clone(),
+            channels: self.record_channels()?,
             reading: self.reading.clone(),
             window: self.window.clone(),
         };

@@ -53,8 +53,9 @@ fn open(
     records: &[RecordRows],
     analysis: &SavedAnalysis,
 ) -> Vec<Result<Measurement, AnalysisError>> {
-    let SavedAnalysis { channels, reading, window, .. } = analysis;
-    let opened = open_all(path, channels, reading, records);
+    let SavedAnalysis { reading, window, .. } = analysis;
+    let channels = analysis.record_channels();
+    let opened = channels.and_then(|channels| open_all(path, &channels, reading, records));
     let opened = match (opened, records) {
         (Ok(opened), _) => opened,
         (Err(error), [_]) => vec![Err(error)],
