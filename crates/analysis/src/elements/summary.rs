@@ -8,7 +8,7 @@ use mechid_estimate::likelihood::{
     Combination, FoundMinimum, IntervalKind, ParameterEstimate, PriorReport,
 };
 use mechid_io::{ParameterCovariance, SystemMatrices};
-use mechid_model::elements::Candidates;
+use mechid_model::elements::{Candidates, Instruments, Sensor, Speed};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -145,38 +145,20 @@ impl ElementSummary {
         let (likelihood, lines) = (&estimate.likelihood, &data.lines);
         let equations = 2 * lines.outputs().len();
         let StatedMachine { system, covariance, notes } = machine::stated(estimate, equations)?;
-        let instruments = &how.machine.instruments;
-        let sensors = instruments.sensors.iter().zip(&likelihood.relative_residual);
-        let sensors = sensors.map(|(sensor, residual)| SensorRow {
-            name: sensor.name.clone(),
-            unit: sensor.quantity.unit(),
-            relative_residual: *residual,
-        });
-        let described = estimate.assembly.parameters();
-        let rows = likelihood.parameters.iter().zip(described);
-        let rows =
-            rows.map(|(estimate, p)| ElementRow { unit: p.unit, estimate: estimate.clone() });
-        let combinations = likelihood.combinations.iter().map(|combination| CombinationRow {
-            text: combination.to_string(),
-            combination: combination.clone(),
-        });
-        let hz = lines.omega().iter().map(|omega| omega / TAU);
-        let (low, high) =
-            hz.fold((f64::INFINITY, 0.0_f64), |(low, high), hz| (low.min(hz), high.max(hz)));
         let remarks = data.remarks.iter().map(|text| ElementNote::Read { text: text.clone() });
         Ok(Self {
             tests: data.tests.clone(),
-            inputs: instruments.inputs.iter().map(|input| input.name().to_owned()).collect(),
-            sensors: sensors.collect(),
+            inputs: instruments(how).inputs.iter().map(|input| input.name().to_owned()).collect(),
+            sensors: sensors(estimate, how),
             points: estimate.assembly.dofs().to_vec(),
             lines: lines.len(),
-            band_hz: [low, high],
+            band_hz: band_hz(lines.omega()),
             equations,
             noise: data.noise.clone(),
             confidence: how.confidence,
-            parameters: rows.collect(),
+            parameters: parameters(estimate),
             parameter_covariance: parameter_covariance(estimate, equations),
-            combinations: combinations.collect(),
+            combinations: likelihood.combinations.iter().map(CombinationRow::from).collect(),
             log_likelihood: likelihood.log_likelihood,
             minima: likelihood.minima.clone(),
             searches: likelihood.searches,
@@ -198,6 +180,39 @@ impl ElementSummary {
     pub fn parameter(&self, name: &str) -> Option<&ParameterEstimate> {
         self.parameters.iter().map(|row| &row.estimate).find(|estimate| estimate.name == name)
     }
+}
+
+impl From<&Combination> for CombinationRow {
+    fn from(combination: &Combination) -> Self {
+        Self { text: combination.to_string(), combination: combination.clone() }
+    }
+}
+
+fn instruments(how: &IdentifyElements) -> &Instruments {
+    &how.machine.instruments
+}
+
+fn sensors(estimate: &MachineEstimate, how: &IdentifyElements) -> Vec<SensorRow> {
+    let residuals = &estimate.likelihood.relative_residual;
+    let rows = instruments(how).sensors.iter().zip(residuals);
+    let row = |(sensor, residual): (&Sensor, &f64)| SensorRow {
+        name: sensor.name.clone(),
+        unit: sensor.quantity.unit(),
+        relative_residual: *residual,
+    };
+    rows.map(row).collect()
+}
+
+fn parameters(estimate: &MachineEstimate) -> Vec<ElementRow> {
+    let rows = estimate.likelihood.parameters.iter().zip(estimate.assembly.parameters());
+    rows.map(|(estimate, p)| ElementRow { unit: p.unit, estimate: estimate.clone() }).collect()
+}
+
+/// Lowest and highest frequency, in Hz.
+fn band_hz(omega: &[f64]) -> [f64; 2] {
+    let low = omega.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = omega.iter().copied().fold(0.0, f64::max);
+    [low / TAU, high / TAU]
 }
 
 /// Covariance of the unknowns; the variance of those that are not determined is infinite.
@@ -234,7 +249,9 @@ fn candidates(
 
 /// Modes of a small machine whose entries are all determined.
 fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
-    if estimate.assembly.dof() > LISTED_MODES_DOF {
+    let is_small = estimate.assembly.dof() <= LISTED_MODES_DOF;
+    // At a speed of its own on each line a rotor has other modes on each.
+    if !is_small || estimate.assembly.speed() == Speed::Synchronous {
         return Ok(Vec::new());
     }
     // What keeps the machine from having modes is a note or a combination of its own.

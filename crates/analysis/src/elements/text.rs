@@ -19,9 +19,7 @@ impl fmt::Display for ElementSummary {
         write!(f, "{}\n{}", self.heading(), self.parameter_table())?;
         f.write_str(&paragraph(self.combinations.iter().map(|row| row.text.clone())))?;
         write!(f, "\n{}", self.sensor_table())?;
-        if !self.modes.is_empty() {
-            write!(f, "\n{}", self.mode_table())?;
-        }
+        f.write_str(&self.mode_table())?;
         if !self.candidates.is_empty() {
             write!(f, "\n{}", self.candidate_table())?;
         }
@@ -75,14 +73,17 @@ impl ElementSummary {
         text_table(&rows)
     }
 
+    /// Modes up to the highest frequency of the data, with an empty line above; nothing without any.
     fn mode_table(&self) -> String {
         let header = ["mode", "value", "±"].map(String::from).to_vec();
         let mut rows = vec![header];
-        for (name, value, unit) in ModeRow::quantities(&self.modes, false) {
+        let in_band = |mode: &&ModeRow| mode.natural_frequency_hz.value <= self.band_hz[1];
+        let modes: Vec<ModeRow> = self.modes.iter().take_while(in_band).cloned().collect();
+        for (name, value, unit) in ModeRow::quantities(&modes, false) {
             let [value, error, _] = value.cells();
             rows.push(vec![format!("{name} ({unit})"), value, error]);
         }
-        text_table(&rows)
+        if rows.len() == 1 { String::new() } else { format!("\n{}", text_table(&rows)) }
     }
 
     fn candidate_table(&self) -> String {
