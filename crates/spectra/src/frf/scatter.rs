@@ -128,6 +128,36 @@ fn independent(lines: usize, correlation: &[f64]) -> f64 {
     all / (1.0 + 2.0 * common)
 }
 
+/// Returns what a smoothing of these weights, over fractions of a line, adds to a `response` at ω
+/// (rad/s) on lines `spacing` (rad/s) apart; `None` on a line without a finite response.
+pub(super) fn smoothing_bias(
+    smoothing: &[f64],
+    lines: &[usize],
+    spacing: f64,
+    response: &dyn Fn(f64) -> Option<ComplexMatrix>,
+) -> Vec<Option<ComplexMatrix>> {
+    let step = spacing / SMOOTHING_STEPS as f64;
+    let finite = |place: i64| {
+        response(place as f64 * step).filter(|h| h.iter().all(|z: &Complex<f64>| z.is_finite()))
+    };
+    // Neighbouring lines share most of the frequencies at which the system is asked.
+    let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
+    let mut bias_at = |line: &usize| {
+        let place = (line * SMOOTHING_STEPS) as i64;
+        let exact = known.entry(place).or_insert_with(|| finite(place)).clone()?;
+        let mut smooth = &exact * Complex::from(smoothing[0]);
+        for (apart, weight) in smoothing.iter().enumerate().skip(1) {
+            for side in [place - apart as i64, place + apart as i64] {
+                // A free machine has no response at rest.
+                let there = known.entry(side).or_insert_with(|| finite(side));
+                smooth += there.as_ref().unwrap_or(&exact) * Complex::from(*weight);
+            }
+        }
+        Some(smooth - exact)
+    };
+    lines.iter().map(|line| bias_at(line)).collect()
+}
+
 impl Frf {
     /// Returns whether the window of the segments smooths the responses.
     pub fn is_smoothed(&self) -> bool {
@@ -141,30 +171,16 @@ impl Frf {
         let Some(scatter) = self.scatter.as_ref().filter(|_| self.is_smoothed()) else {
             return self.clone();
         };
-        let mut sharp = self.clone();
-        let step = self.line_spacing() / SMOOTHING_STEPS as f64;
-        let response = |place: i64| -> Option<ComplexMatrix> {
-            let omega = place as f64 * step;
+        let response = |omega: f64| {
             let receptance = system.receptance(omega).ok()?;
-            let h = receptance.select_columns(force_dof) * self.measured.per_displacement(omega);
-            h.iter().all(|z| z.is_finite()).then_some(h)
+            Some(receptance.select_columns(force_dof) * self.measured.per_displacement(omega))
         };
-        // Neighbouring lines share most of the frequencies at which the system is asked.
-        let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
-        for (at, line) in self.lines.iter().enumerate() {
-            let place = (line * SMOOTHING_STEPS) as i64;
-            let Some(exact) = known.entry(place).or_insert_with(|| response(place)).clone() else {
-                continue;
-            };
-            let mut smooth = &exact * Complex::from(scatter.smoothing[0]);
-            for (apart, weight) in scatter.smoothing.iter().enumerate().skip(1) {
-                for side in [place - apart as i64, place + apart as i64] {
-                    // A free machine has no response at rest.
-                    let there = known.entry(side).or_insert_with(|| response(side));
-                    smooth += there.as_ref().unwrap_or(&exact) * Complex::from(*weight);
-                }
+        let bias = smoothing_bias(&scatter.smoothing, &self.lines, self.line_spacing(), &response);
+        let mut sharp = self.clone();
+        for (response, bias) in sharp.response.iter_mut().zip(bias) {
+            if let Some(bias) = bias {
+                *response -= bias;
             }
-            sharp.response[at] -= smooth - exact;
         }
         sharp
     }

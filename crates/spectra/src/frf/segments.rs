@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use mechid_signal::Window;
 use nalgebra::{Complex, DVectorView};
 
+use super::ComplexMatrix;
+use super::scatter::smoothing_bias;
 use crate::SpectraError;
 use crate::limits::{FARTHEST_LINES, SEGMENT_INDEPENDENT, SMOOTHED_LINES, SMOOTHING_STEPS};
 
@@ -63,7 +65,7 @@ impl Segments {
     /// Noise and force leak by the window alike from a line to its neighbours, and so do pieces that
     /// overlap: Σ_j |ρ_j(d)|² over pieces j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop)
     /// exp(−2πi d k/len), over the same at d = 0.
-    pub(super) fn line_correlation(self, pieces: usize) -> Vec<f64> {
+    pub fn line_correlation(self, pieces: usize) -> Vec<f64> {
         let Segments::Windowed { len, hop, window } = self else { return vec![1.0] };
         let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
         let common = |apart: usize, lines: usize| {
@@ -93,7 +95,7 @@ impl Segments {
     /// response is that to what a window leaves of the past: h(τ) times the autocorrelation of the window.
     pub(super) fn smoothing(self) -> Vec<f64> {
         let Segments::Windowed { len, window, .. } = self else { return Vec::new() };
-        if window == Window::Rectangular {
+        if !self.smooths() {
             return Vec::new();
         }
         let power = |step: usize| {
@@ -104,6 +106,31 @@ impl Segments {
         let half: Vec<f64> = (0..=SMOOTHED_LINES * SMOOTHING_STEPS).map(power).collect();
         let total = half[0] + 2.0 * half[1..].iter().sum::<f64>();
         half.into_iter().map(|weight| weight / total).collect()
+    }
+
+    /// Returns whether averages over the segments smooth a frequency response: not those of periods, nor
+    /// of pieces that begin and end at rest, for which the rectangular window is.
+    pub fn smooths(self) -> bool {
+        matches!(self, Segments::Windowed { window, .. } if window != Window::Rectangular)
+    }
+
+    /// Returns what averages over the segments add to a frequency response, given as a function of ω
+    /// (rad/s), on some of their lines, which are `spacing` (rad/s) apart: they smooth it, and blunt a
+    /// resonance. `None` on a line without a finite response; empty where nothing is smoothed.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates).
+    pub fn smoothing_bias(
+        self,
+        lines: &[usize],
+        spacing: f64,
+        response: &dyn Fn(f64) -> Option<ComplexMatrix>,
+    ) -> Vec<Option<ComplexMatrix>> {
+        let smoothing = self.smoothing();
+        if smoothing.is_empty() {
+            return Vec::new();
+        }
+        smoothing_bias(&smoothing, lines, spacing, response)
     }
 
     /// Samples from the start of one piece to that of the next.
