@@ -14,7 +14,8 @@ use std::f64::consts::TAU;
 
 use faer::prelude::{Solve, SolveLstsq};
 use faer::{Mat, Side};
-use nalgebra::Complex;
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DVector};
 use rayon::prelude::*;
 
 use crate::ModalError;
@@ -23,6 +24,7 @@ use crate::limits::{
     MIN_ORDER_SHARE, SUBSPACE_SHIFTS,
 };
 use crate::lines::Lines;
+use crate::stabilisation::{Pole, Stabilisation};
 
 type C = Complex<f64>;
 
@@ -56,6 +58,22 @@ impl Root {
 pub(crate) fn initial_poles(lines: &Lines) -> Result<Vec<C>, ModalError> {
     let (roots, orders) = subspace_roots(lines)?;
     Ok(clusters(roots, orders))
+}
+
+/// Returns the poles of the subspace models of rising order, from which the identification starts; the
+/// vectors, which say nothing here, have one entry of 1.
+///
+/// # Errors
+/// As [`identify_modes`](crate::identify_modes).
+pub fn stabilisation_of(data: &LineData) -> Result<Stabilisation, ModalError> {
+    let lines = Lines::new(data);
+    lines.check()?;
+    let (roots, _) = subspace_roots(&lines)?;
+    let vector = DVector::from_element(1, C::from(1.0));
+    let pole = |root: &Root| Pole { pole: root.pole, vector: vector.clone() };
+    let models = roots.chunk_by(|a, b| a.order == b.order);
+    let models = models.map(|model| (model[0].order, model.iter().map(pole).collect()));
+    Ok(Stabilisation::new(models.collect()))
 }
 
 /// Returns the roots in the band of a range of orders, and the number of orders.
