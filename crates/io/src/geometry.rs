@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use nalgebra::Complex;
+
 use crate::contents::Place;
 use crate::{IoError, standard, uff};
 
@@ -43,6 +45,56 @@ pub struct PointShape {
     pub damping_ratio: f64,
     /// Real and imaginary part of the displacement along x, y, z, for each point, a pure number.
     pub displacement: Vec<[[f64; 2]; 3]>,
+}
+
+/// Modes at nodes, as a finite-element program or another modal analysis writes them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalModes {
+    /// Name of the file for messages.
+    pub file: String,
+    /// Points and directions of the entries of each shape, such as `12+Z`; a node alone of values
+    /// without directions.
+    pub points: Vec<String>,
+    /// The modes, in the order of the file.
+    pub modes: Vec<NodalMode>,
+}
+
+/// A mode at nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalMode {
+    /// Natural frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Damping ratio, a pure number; 0 if the file states none.
+    pub damping_ratio: f64,
+    /// Shape, a pure number for each point and direction.
+    pub shape: Vec<Complex<f64>>,
+}
+
+impl NodalModes {
+    /// Reads the modes of a universal file: datasets 55 of normal modes (analysis type 2) and complex
+    /// ones (3 and 7). Directions in which no node moves in any mode are left out.
+    ///
+    /// # Errors
+    /// [`IoError::Read`], [`IoError::Malformed`] with the line that is wrong, [`IoError::Empty`] without
+    /// a mode.
+    ///
+    /// # Source
+    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, dataset 55.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let file = standard::input_name(path.as_ref());
+        match standard::read_text(path.as_ref()) {
+            Ok(text) => Self::parse(&file, &text),
+            Err(source) => Err(IoError::Read { file, source }),
+        }
+    }
+
+    /// Reads the text of such a file; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// As [`NodalModes::read`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, IoError> {
+        uff::read_modes(file, text.as_bytes())
+    }
 }
 
 impl<'a> Direction<'a> {

@@ -58,7 +58,7 @@ pub use experiment::{
     StudyField, StudyRuns, SubStepLoad,
 };
 pub use folder::{FileStamp, create_folder, files_of, special_kind};
-pub use geometry::{Direction, Geometry, GeometryPoint, PointShape};
+pub use geometry::{Direction, Geometry, GeometryPoint, NodalMode, NodalModes, PointShape};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;

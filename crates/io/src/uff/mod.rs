@@ -8,6 +8,7 @@ mod function;
 mod geometry;
 mod header;
 mod lines;
+mod modes;
 mod responses;
 mod shapes;
 mod values;
@@ -22,6 +23,7 @@ use crate::units::ResponseUnit;
 use crate::{IoError, Quantity, Unit};
 
 pub(crate) use self::geometry::read_geometry;
+pub(crate) use self::modes::read_modes;
 pub(crate) use self::responses::read as read_responses;
 pub(crate) use self::shapes::write_shapes;
 pub(crate) use self::write::write_responses;

@@ -1,0 +1,167 @@
+//! Modes at nodes (dataset 55).
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use nalgebra::Complex;
+
+use super::lines::{Line, Lines, is_mark, number};
+use super::{dataset_number, skip_to_end};
+use crate::IoError;
+use crate::contents::{Fault, Place};
+use crate::geometry::{NodalMode, NodalModes};
+
+/// Names of the values at a node, in the order of the dataset.
+const DIRECTIONS: [&str; 6] = ["+X", "+Y", "+Z", "+RX", "+RY", "+RZ"];
+
+/// Largest number of values at a node: translations and rotations.
+const MOST_VALUES: usize = DIRECTIONS.len();
+
+/// A mode with the values at each node.
+struct Nodal {
+    frequency_hz: f64,
+    damping_ratio: f64,
+    values: BTreeMap<u32, Vec<Complex<f64>>>,
+}
+
+/// Reads the modes of a file; directions in which no node moves in any mode are left out.
+pub(crate) fn read_modes(file: &str, bytes: &[u8]) -> Result<NodalModes, IoError> {
+    let mut lines = Lines::new(bytes);
+    let modes = modes(&mut lines).map_err(|fault| {
+        let at = Place::Line(lines.number_at(fault.at));
+        fault.error(file, at)
+    })?;
+    let Some(first) = modes.first() else {
+        return Err(IoError::Empty {
+            file: file.into(),
+            found: "it has no dataset 55 with modes at nodes",
+        });
+    };
+    let zero = vec![Complex::default(); MOST_VALUES];
+    let width = |node: &u32| first.values.get(node).map_or(0, Vec::len);
+    let mut points = Vec::new();
+    for node in first.values.keys() {
+        for at in 0..width(node) {
+            let value = |mode: &Nodal| mode.values.get(node).unwrap_or(&zero).get(at).copied();
+            if modes.iter().any(|mode| value(mode).is_some_and(|z| z != Complex::default())) {
+                points.push((*node, at, width(node)));
+            }
+        }
+    }
+    let name = |(node, at, width): &(u32, usize, usize)| match width {
+        1 => node.to_string(),
+        _ => format!("{node}{}", DIRECTIONS[*at]),
+    };
+    let of = |mode: &Nodal| NodalMode {
+        frequency_hz: mode.frequency_hz,
+        damping_ratio: mode.damping_ratio,
+        shape: points
+            .iter()
+            .map(|(node, at, _)| {
+                mode.values.get(node).and_then(|v| v.get(*at)).copied().unwrap_or_default()
+            })
+            .collect(),
+    };
+    Ok(NodalModes {
+        file: file.into(),
+        points: points.iter().map(name).collect(),
+        modes: modes.iter().map(of).collect(),
+    })
+}
+
+fn modes(lines: &mut Lines<'_>) -> Result<Vec<Nodal>, Fault> {
+    let mut modes = Vec::new();
+    while let Some(mark) = lines.next() {
+        if mark.text.trim_ascii().is_empty() {
+            continue;
+        }
+        if !is_mark(mark.text) {
+            return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
+        }
+        let id = lines.required("a dataset begins here and has no number")?;
+        if dataset_number(&id)? == 55 {
+            modes.extend(mode(lines)?);
+        } else {
+            skip_to_end(lines)?;
+        }
+    }
+    Ok(modes)
+}
+
+/// Reads a dataset 55; `None` if its data are not those of a mode.
+fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
+    const SHORT: &str = "dataset 55 is cut short";
+    for _ in 0..5 {
+        lines.required(SHORT)?;
+    }
+    let kind = lines.required(SHORT)?;
+    let integer = |line: &Line<'_>, at: usize| -> Result<usize, Fault> {
+        number(columns(line, 10 * at, 10))
+            .ok_or_else(|| line.fault(format!("no whole number in field {}", at + 1)))
+    };
+    let (analysis, data, width) = (integer(&kind, 1)?, integer(&kind, 4)?, integer(&kind, 5)?);
+    // Normal modes, and complex eigenvalues of first and second order.
+    if ![2, 3, 7].contains(&analysis) {
+        skip_to_end(lines)?;
+        return Ok(None);
+    }
+    if !(1..=MOST_VALUES).contains(&width) || ![2, 5].contains(&data) {
+        return Err(kind.fault(format!("{width} values of type {data} at a node")));
+    }
+    let about = lines.required(SHORT)?;
+    let (integers, reals) = (integer(&about, 0)?, integer(&about, 1)?);
+    if integers > MOST_REALS || reals > MOST_REALS {
+        return Err(about.fault(format!("{integers} whole numbers and {reals} numbers of a mode")));
+    }
+    for _ in 1..(2 + integers).div_ceil(8) {
+        lines.required(SHORT)?;
+    }
+    let values = numbers(lines, reals)?;
+    let value = |at: usize| values.get(at).copied().unwrap_or(0.0);
+    let (frequency_hz, damping_ratio) = if analysis == 2 {
+        (value(0), value(2))
+    } else {
+        let size = value(0).hypot(value(1));
+        (size / TAU, if size > 0.0 { -value(0) / size } else { 0.0 })
+    };
+    let mut nodes = BTreeMap::new();
+    loop {
+        let line = lines.required("dataset has no end: the file is cut short")?;
+        if is_mark(line.text) {
+            break;
+        }
+        let node: u32 = number(columns(&line, 0, 10))
+            .ok_or_else(|| line.fault("the number of the node is missing in columns 1 to 10"))?;
+        let each = if data == 5 { 2 } else { 1 };
+        let numbers = numbers(lines, each * width)?;
+        let complex = |part: &[f64]| Complex::new(part[0], part.get(1).copied().unwrap_or(0.0));
+        if nodes.insert(node, numbers.chunks(each).map(complex).collect()).is_some() {
+            return Err(line.fault(format!("node {node} is there twice")));
+        }
+    }
+    Ok(Some(Nodal { frequency_hz, damping_ratio, values: nodes }))
+}
+
+/// Largest number of type-specific numbers that a dataset is believed to state.
+const MOST_REALS: usize = 64;
+
+/// Reads numbers in fields of 13 columns, six a line.
+fn numbers(lines: &mut Lines<'_>, count: usize) -> Result<Vec<f64>, Fault> {
+    let mut values = Vec::with_capacity(count);
+    while values.len() < count {
+        let line = lines.required("numbers of dataset 55 are missing")?;
+        for field in 0..(count - values.len()).min(6) {
+            let value = number::<f64>(columns(&line, 13 * field, 13)).filter(|v| v.is_finite());
+            let from = 13 * field + 1;
+            values.push(value.ok_or_else(|| {
+                line.fault(format!("no number in columns {from} to {}", from + 12))
+            })?);
+        }
+    }
+    Ok(values)
+}
+
+fn columns<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
+    let rest = line.text.get(from..).unwrap_or_default();
+    rest.get(..width).unwrap_or(rest)
+}
