@@ -76,6 +76,17 @@ pub fn stabilisation_of(data: &LineData) -> Result<Stabilisation, ModalError> {
     Ok(Stabilisation::new(models.collect()))
 }
 
+/// Returns the number of modes with which the identification starts, before any is tested: the poles that
+/// most orders of the subspace method agree on.
+///
+/// # Errors
+/// As [`identify_modes`](crate::identify_modes).
+pub fn initial_mode_count(data: &LineData) -> Result<usize, ModalError> {
+    let lines = Lines::new(data);
+    lines.check()?;
+    Ok(initial_poles(&lines)?.len())
+}
+
 /// Returns the roots in the band of a range of orders, and the number of orders.
 pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalError> {
     let channels = leading_components(lines)?;

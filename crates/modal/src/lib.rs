@@ -56,6 +56,6 @@ pub use constraint::{ConstraintTest, DrivingPoint, ModalConstraint};
 pub use error::ModalError;
 pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
-pub use initial_poles::stabilisation_of;
+pub use initial_poles::{initial_mode_count, stabilisation_of};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};
 pub use model::ResidualPowers;

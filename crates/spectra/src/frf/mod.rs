@@ -15,6 +15,7 @@ pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
 pub use self::interleaved::{Crosstalk, OwnLines};
 use self::scatter::Scatter;
+pub use self::scatter::smoothing_bias;
 pub use self::segments::Segments;
 use crate::SpectraError;
 use crate::frequency_data::FrequencyData;

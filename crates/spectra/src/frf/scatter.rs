@@ -128,9 +128,13 @@ fn independent(lines: usize, correlation: &[f64]) -> f64 {
     all / (1.0 + 2.0 * common)
 }
 
-/// Returns what a smoothing of these weights, over fractions of a line, adds to a `response` at ω
-/// (rad/s) on lines `spacing` (rad/s) apart; `None` on a line without a finite response.
-pub(super) fn smoothing_bias(
+/// Returns what averages over segments with these weights ([`Segments::smoothing`]) add to a frequency
+/// response, given as a function of ω (rad/s), on some of their lines, which are `spacing` (rad/s) apart:
+/// they smooth it, and blunt a resonance. `None` on a line without a finite response.
+///
+/// # Source
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates).
+pub fn smoothing_bias(
     smoothing: &[f64],
     lines: &[usize],
     spacing: f64,

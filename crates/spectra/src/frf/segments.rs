@@ -5,8 +5,6 @@ use std::f64::consts::TAU;
 use mechid_signal::Window;
 use nalgebra::{Complex, DVectorView};
 
-use super::ComplexMatrix;
-use super::scatter::smoothing_bias;
 use crate::SpectraError;
 use crate::limits::{FARTHEST_LINES, SEGMENT_INDEPENDENT, SMOOTHED_LINES, SMOOTHING_STEPS};
 
@@ -93,9 +91,9 @@ impl Segments {
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates); the
     /// response is that to what a window leaves of the past: h(τ) times the autocorrelation of the window.
-    pub(super) fn smoothing(self) -> Vec<f64> {
+    pub fn smoothing(self) -> Vec<f64> {
         let Segments::Windowed { len, window, .. } = self else { return Vec::new() };
-        if !self.smooths() {
+        if window == Window::Rectangular {
             return Vec::new();
         }
         let power = |step: usize| {
@@ -106,31 +104,6 @@ impl Segments {
         let half: Vec<f64> = (0..=SMOOTHED_LINES * SMOOTHING_STEPS).map(power).collect();
         let total = half[0] + 2.0 * half[1..].iter().sum::<f64>();
         half.into_iter().map(|weight| weight / total).collect()
-    }
-
-    /// Returns whether averages over the segments smooth a frequency response: not those of periods, nor
-    /// of pieces that begin and end at rest, for which the rectangular window is.
-    pub fn smooths(self) -> bool {
-        matches!(self, Segments::Windowed { window, .. } if window != Window::Rectangular)
-    }
-
-    /// Returns what averages over the segments add to a frequency response, given as a function of ω
-    /// (rad/s), on some of their lines, which are `spacing` (rad/s) apart: they smooth it, and blunt a
-    /// resonance. `None` on a line without a finite response; empty where nothing is smoothed.
-    ///
-    /// # Source
-    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates).
-    pub fn smoothing_bias(
-        self,
-        lines: &[usize],
-        spacing: f64,
-        response: &dyn Fn(f64) -> Option<ComplexMatrix>,
-    ) -> Vec<Option<ComplexMatrix>> {
-        let smoothing = self.smoothing();
-        if smoothing.is_empty() {
-            return Vec::new();
-        }
-        smoothing_bias(&smoothing, lines, spacing, response)
     }
 
     /// Samples from the start of one piece to that of the next.
