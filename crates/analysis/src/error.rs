@@ -114,6 +114,96 @@ pub enum AnalysisError {
         /// Point of the force.
         force: String,
     },
+    /// A file is neither a record with named columns nor a table of frequency responses.
+    #[error(
+        "{file}: name the columns of the response with `displacement`, `velocity` or `acceleration`; without \
+         any, the file is taken for a table of frequency responses, and it has none such as h_1_1_real; its \
+         columns are {available}"
+    )]
+    NeitherRecordNorTable {
+        /// The file.
+        file: String,
+        /// Numbers and names of its columns.
+        available: String,
+    },
+    /// A table does not have the responses of all points to a force.
+    #[error(
+        "{file} has no response at {response} to the force at {force}, which other forces have: a shape \
+         needs the responses of all points to every force"
+    )]
+    MissingResponse {
+        /// The table.
+        file: String,
+        /// Point of the response.
+        response: String,
+        /// Point of the force.
+        force: String,
+    },
+    /// Responses without power in the band.
+    #[error(
+        "{columns}: constant or zero in the band, a sensor that is dead or not connected: leave it out"
+    )]
+    DeadResponses {
+        /// Names of the responses.
+        columns: String,
+    },
+    /// Forces without power in the band.
+    #[error(
+        "force {columns}: constant or zero in the band, a shaker that is off or not connected: leave it \
+         out of `force`"
+    )]
+    DeadForces {
+        /// Names of the forces.
+        columns: String,
+    },
+    /// A force is a combination of the others on every line.
+    #[error(
+        "force {force} is a multiple of {others} in the band (independent part {own_share:.1e}): their \
+         responses cannot be separated; record a test in which it differs, or leave it out of `force`"
+    )]
+    DependentForces {
+        /// The force.
+        force: String,
+        /// The forces before it.
+        others: String,
+        /// RMS of its independent part over its RMS.
+        own_share: f64,
+    },
+    /// A file has no modes that can be compared.
+    #[error("{file} has no mode with a frequency and a shape of one length: nothing to compare")]
+    NothingToCompare {
+        /// The file.
+        file: String,
+    },
+    /// The modes in a JSON file are not those of a result.
+    #[error("{file}: its `modes` are not those of a result: {why}")]
+    SavedModes {
+        /// The file.
+        file: String,
+        /// The reason.
+        why: String,
+    },
+    /// Two sets of modes have no point in common.
+    #[error(
+        "{first} has shapes at {points}, {second} at {other_points}: no point in common; name the places \
+         of the responses (`response_at`) as the other set does, such as 3 or 12+Z"
+    )]
+    NoCommonPoint {
+        /// The first set.
+        first: String,
+        /// Its points.
+        points: String,
+        /// The second set.
+        second: String,
+        /// Its points.
+        other_points: String,
+    },
+    /// An indicator of modes cannot be computed.
+    #[error("{error}")]
+    Indicator {
+        /// The failure.
+        error: mechid_modal::indicators::IndicatorError,
+    },
     /// No force column is named.
     #[error("the force is missing: name its columns with `force`")]
     NoForce,
@@ -504,6 +594,12 @@ pub enum AnalysisError {
     /// A model cannot be used.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),
+}
+
+impl From<mechid_modal::indicators::IndicatorError> for AnalysisError {
+    fn from(error: mechid_modal::indicators::IndicatorError) -> Self {
+        Self::Indicator { error }
+    }
 }
 
 impl AnalysisError {

@@ -35,6 +35,8 @@
 //! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
 //! | What are the modes of this structure? | [`modes()`] | [`ModesSettings`] | [`Modes`] |
+//! | What are the modes of these frequency responses? | [`modes_of_responses()`] | [`ModesSettings`] | [`Modes`] |
+//! | Have the modes changed, or are they those of a model? | [`compare_modes()`] | – | [`ModeComparison`] |
 //! | How does the structure vibrate when left alone? | [`decay()`] | [`DecaySettings`] | [`Decayed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
@@ -83,7 +85,9 @@ pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Windo
 pub use mechid_model::ResponseQuantity;
 pub use mechid_signal::HitRule;
 pub use modal::ModalSummary;
-pub use modes::{Modes, ModesSettings, modes, modes_of_responses};
+pub use modes::{
+    ModeComparison, ModeSet, Modes, ModesSettings, compare_modes, modes, modes_of_responses,
+};
 pub use predict::{Predict, Predicted, predict};
 pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};
 pub use sweep::{SweepSettings, SweepSummary, sweep_experiment, sweep_record};

@@ -1,4 +1,5 @@
-//! Limits on the memory that work on a record takes.
+//! Limits on the memory that work on a record takes, and numbers that decide about the modes of a
+//! test.
 //!
 //! The work is refused before its memory is taken: where the numbers that it holds, times the bytes
 //! that it takes for each, exceed the memory allowed for a file of this size
@@ -32,6 +33,45 @@ pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
 /// Relative error of the standard errors from which a fit says so: that of 12 equations to spare.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
+/// Least share of the variance of a response that the modes of a test must explain. Below it, most
+/// of the response is something else, and the entries of the shapes there mean little.
+pub const LEAST_EXPLAINED: f64 = 0.5;
+
+/// Power of a force over its largest, in the mean of [`DRIVEN_LINES`] lines, below which these lines
+/// are not part of the default band. At −40 dB the response to the force drowns in the noise of
+/// usual sensors (60 to 80 dB below their range); a lower value would take in lines of noise alone.
+pub const DRIVEN_POWER: f64 = 1e-4;
+
+/// Number of lines whose mean power decides whether a force drives them. The power of a random force
+/// on one line scatters by its own size, on 16 by a quarter; many more would blur the band's edges.
+pub const DRIVEN_LINES: usize = 16;
+
+/// Largest share of a record that may be kept out of the fit for its validation. Beyond it, the fit
+/// is to so little that it says nothing of the fit to all.
+pub const MOST_VALIDATED: f64 = 0.8;
+
+/// Share of the motion of a mode that unmeasured forces drive, above which a note says so. Below
+/// it, the share is in the table alone.
+pub const NOTED_UNMEASURED: f64 = 0.01;
+
+/// Largest correlation of the errors of two lines of averaged responses that may both be used:
+/// neighbours under a Hann window have 0.44, second neighbours 0.03. A smaller one would give away
+/// lines; with a larger one, smooth noise passes for modes.
+pub const LINE_CORRELATION: f64 = 0.1;
+
+/// Largest number of samples of a segment times the number of segments that overlap it, of a table that
+/// states segments. Beyond it, the weights of its window take minutes, and the statement is not used.
+pub const MOST_SEGMENT_WORK: usize = 1 << 22;
+
+/// Largest number of rounds in which modes are fitted to averaged responses less what their window
+/// blunts of these modes. Where resonances are wide enough for it, two or three are enough.
+pub const SHARPENING_ROUNDS: usize = 6;
+
+/// Change of a frequency or damping ratio in a round, in standard errors, below which the rounds end.
+pub const SHARPENING_SETTLED: f64 = 0.1;
+
+/// Probability below which a check of the modes by a test fails, after adjustment for all of them.
+pub const MODAL_SIGNIFICANCE: f64 = 0.01;
 
 /// Number of bytes in the unit of the setting `memory_gb`.
 const GIGABYTE: f64 = 1e9;

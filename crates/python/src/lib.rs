@@ -47,7 +47,7 @@ mod _mechid {
     #[pymodule_export]
     use super::program::program;
     #[pymodule_export]
-    use super::questions::{decay, frf, inspect, modes, sweep};
+    use super::questions::{compare_modes, decay, frf, inspect, modes, sweep};
     #[pymodule_export]
     use super::reconstructed::{Reconstructed, reconstruct};
     #[pymodule_export]

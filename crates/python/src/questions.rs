@@ -6,12 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mechid::analysis::sweep::{SweepSettings, sweep_record};
 use mechid::analysis::{InspectSettings, RecordPlan};
-use mechid::{DecaySettings, FrfSettings, ModesSettings};
+use mechid::io::FrequencyResponses;
+use mechid::{DecaySettings, FrfSettings, ModeSet, ModesSettings};
 use pyo3::prelude::*;
 
 use crate::answer::Answer;
 use crate::machine::Machine;
 use crate::measurement::Measurement;
+use crate::responses::ResponseTable;
 use crate::simulated::described;
 use crate::{failure, work};
 
@@ -44,19 +46,56 @@ pub fn decay(
     work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::of)
 }
 
-/// Finds the modes of a test with forces, or of an ambient record; settings are JSON.
+/// Finds the modes of a test with forces, of an ambient record, or of tables of frequency responses;
+/// settings are JSON, and diagrams are added on demand.
 #[pyfunction]
-#[pyo3(signature = (records, settings, threads))]
+#[pyo3(signature = (records, tables, settings, diagrams, threads))]
 pub fn modes(
     py: Python<'_>,
     records: Vec<PyRef<'_, Measurement>>,
+    tables: Vec<PyRef<'_, ResponseTable>>,
     settings: &str,
+    diagrams: bool,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: ModesSettings = failure::settings(py, settings)?;
     let records: Vec<mechid::Measurement> = records.iter().map(|record| record.0.clone()).collect();
-    let find = move || mechid::modes(&records, &how);
+    let tables: Vec<FrequencyResponses> = tables.iter().map(|table| table.0.clone()).collect();
+    let find = move || {
+        let mut modes = if tables.is_empty() {
+            mechid::modes(&records, &how)?
+        } else {
+            mechid::modes_of_responses(&tables, &how)?
+        };
+        if diagrams {
+            modes.add_diagrams()?;
+        }
+        Ok::<_, mechid::analysis::AnalysisError>(modes)
+    };
     work::watched(py, threads, || Ok(()), find).map(Answer::of)
+}
+
+/// Compares two sets of modes, each a file, or a name and the JSON of a result: JSON and text.
+#[pyfunction]
+pub fn compare_modes(
+    py: Python<'_>,
+    first: (PathBuf, Option<String>),
+    second: (PathBuf, Option<String>),
+) -> PyResult<(String, String)> {
+    let [first, second] = [first, second].map(|(path, json)| mode_set(py, path, json));
+    let (first, second) = (first?, second?);
+    let comparison = work::brief(py, || mechid::compare_modes(&first, &second))?;
+    Ok((failure::json(py, &comparison)?, comparison.to_string()))
+}
+
+fn mode_set(py: Python<'_>, path: PathBuf, json: Option<String>) -> PyResult<ModeSet> {
+    match json {
+        None => work::watched(py, None, || Ok(()), move || ModeSet::read(path)),
+        Some(json) => {
+            let json: serde_json::Value = failure::settings(py, &json)?;
+            work::brief(py, || ModeSet::from_json(&path.to_string_lossy(), json))
+        }
+    }
 }
 
 /// Inspects the file of a saved plan; plan and settings are JSON.

@@ -5,10 +5,11 @@ use std::f64::consts::TAU;
 use std::fs;
 use std::path::PathBuf;
 
+use mechid_analysis::modes::StabilisationRows;
 use mechid_io::{Geometry, PointShape};
 use mechid_plot::charts::{FrequencyResponse, bode};
 use mechid_plot::{Axis, Curve, Figure, Panel};
-use mechid_report::{ModeShapes, StabilisationPole, figure_page, stabilisation};
+use mechid_report::{ModeShapes, figure_page, stabilisation};
 use nalgebra::Complex;
 
 const LINES: usize = 4096;
@@ -115,20 +116,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let sum: Vec<f64> =
         hz.iter().map(|f| resonance(*f, 12.4, 0.011) + 0.3 * resonance(*f, 38.0, 0.008)).collect();
-    let pole = |order: usize, frequency_hz: f64, is_stable: bool| StabilisationPole {
-        order,
-        frequency_hz,
-        damping_ratio: 0.01,
-        is_stable,
-    };
-    let poles: Vec<StabilisationPole> = (2..=20)
-        .step_by(2)
-        .flat_map(|order| {
-            let wander = 50.0 * (TAU * order as f64 / 7.3).sin().abs() + 5.0;
-            [pole(order, 12.4, order > 2), pole(order, 38.0, order > 6), pole(order, wander, false)]
-        })
-        .collect();
-    let diagram = ("Stabilisation".to_owned(), stabilisation("", &poles, (&hz, &sum)));
+    let mut poles = StabilisationRows::default();
+    for order in (2..=20).step_by(2) {
+        let wander = 50.0 * (TAU * order as f64 / 7.3).sin().abs() + 5.0;
+        for (hz, is_stable) in [(12.4, order > 2), (38.0, order > 6), (wander, false)] {
+            poles.order.push(order);
+            poles.frequency_hz.push(hz);
+            poles.damping_ratio.push(0.01);
+            poles.is_stable.push(is_stable);
+        }
+    }
+    let panel = stabilisation(&poles, (&hz, &sum)).ok_or("there are poles")?;
+    let diagram = ("Stabilisation".to_owned(), Figure::new("").panel(panel));
     fs::write(folder.join("shapes.html"), figure_page("Frame", vec![diagram], Some(&frame()?))?)?;
     let expected = [known(1599), known(127)];
     fs::write(folder.join("expected.json"), serde_json::to_string(&expected)?)?;

@@ -20,7 +20,8 @@ pub mod page;
 mod spectrum_csv;
 
 pub use error::ReportError;
-pub use figures::shapes::{ModeShapes, StabilisationPole, stabilisation};
+pub use figures::modes::stabilisation;
+pub use figures::shapes::ModeShapes;
 pub use figures::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle, ToFigure};
 #[cfg(feature = "parquet")]
 pub use page::trends_page;

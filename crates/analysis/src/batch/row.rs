@@ -11,6 +11,7 @@ use crate::elements::{ElementRow, ElementSummary};
 use crate::identify::checks::CheckRow;
 use crate::identify::rows::{ModeRow, Uncertain, WindowRow};
 use crate::identify::summary::{FitRow, IdentificationSummary};
+use crate::modes::{ModalCheck, ModesSummary, modes};
 use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements};
 
 /// Result of one record: a machine with its uncertainty and what speaks against it, or an error.
@@ -156,13 +157,14 @@ impl ResultRow {
         let work = || -> Result<Self, AnalysisError> {
             analysis.check()?;
             let records = [source()?];
-            match &analysis.elements {
-                None => Ok(empty.with(identify(&records, &analysis.identify)?.summary())),
-                Some(how) => {
-                    let data = ElementData::from_records(&records, how)?;
-                    Ok(empty.with_elements(identify_elements(&data, how)?.summary()))
-                }
+            if let Some(how) = &analysis.elements {
+                let data = ElementData::from_records(&records, how)?;
+                return Ok(empty.with_elements(identify_elements(&data, how)?.summary()));
             }
+            Ok(match &analysis.modes {
+                None => empty.with(identify(&records, &analysis.identify)?.summary()),
+                Some(settings) => empty.with_modes(modes(&records, settings)?.summary()),
+            })
         };
         let error = match catch_unwind(AssertUnwindSafe(work)) {
             Ok(Ok(row)) => return row,
@@ -228,6 +230,32 @@ impl ResultRow {
             warnings: conspicuous.map(CheckRow::sentence).collect(),
             notes: identification.remarks.clone(),
             ..self.clone()
+        }
+    }
+}
+
+impl ResultRow {
+    fn with_modes(self, summary: &ModesSummary) -> Self {
+        let window = summary.records.first().and_then(|record| record.window.as_ref());
+        let finding = |check: &ModalCheck| FindingRow {
+            code: check.code.into(),
+            verdict: if check.passed { Verdict::Good } else { Verdict::Doubtful },
+            value: Some(check.value).filter(|value| value.is_finite()),
+        };
+        let failed = summary.checks.iter().filter(|check| !check.passed);
+        let unexplained = summary.variance_explained.map(|share| (1.0 - share).max(0.0).sqrt());
+        Self {
+            estimator: Some("modes by maximum likelihood".into()),
+            sample_rate_hz: window.map(|window| window.sample_rate_hz),
+            first_sample: window.map(|window| window.first_sample),
+            last_sample: window.map(|window| window.last_sample),
+            modes: summary.modes.iter().map(|mode| ModeCell::of(&mode.mode.row)).collect(),
+            nrmse: unexplained,
+            unexplained_motion: unexplained,
+            findings: summary.checks.iter().map(finding).collect(),
+            warnings: failed.map(|check| check.text.clone()).collect(),
+            notes: summary.notes.clone(),
+            ..self
         }
     }
 }

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use twox_hash::XxHash3_128;
 
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
-use crate::{AnalysisError, Identify, IdentifyElements};
+use crate::{AnalysisError, Identify, IdentifyElements, ModesSettings};
 
-/// An identification to be repeated on many records that have the same columns.
+/// An identification, or a modal test, to be repeated on many records that have the same columns.
 ///
 /// Everything but the record is in it, so that a record and this value make a result.
 ///
@@ -45,6 +45,9 @@ pub struct SavedAnalysis {
     /// columns; then `channels` and `identify` are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elements: Option<IdentifyElements>,
+    /// Settings of a modal test, which takes the place of the identification; `None`: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modes: Option<ModesSettings>,
 }
 
 impl SavedAnalysis {
@@ -67,14 +70,15 @@ impl SavedAnalysis {
     /// kinds of identification at once.
     pub fn check(&self) -> Result<(), AnalysisError> {
         let channels = self.record_channels()?;
-        match &self.elements {
-            None => channels.check_pairs()?,
-            Some(_)
+        match (&self.elements, &self.modes) {
+            (None, None) => channels.check_pairs()?,
+            (None, Some(settings)) => settings.check_channels(&channels)?,
+            (Some(_), None)
                 if self.channels == Channels::default() && self.identify == Identify::default() => {
             }
-            Some(_) => {
-                let why = "a machine of named elements has columns and settings of its own: leave `channels` \
-                           and `identify` out";
+            (Some(_), _) => {
+                let why = "a machine of named elements has columns and settings of its own: leave `channels`, \
+                           `identify` and `modes` out";
                 return Err(AnalysisError::Setting { setting: "elements", why: why.into() });
             }
         }

@@ -13,7 +13,7 @@ use crate::AnalysisError;
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] if they differ.
-pub(super) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
+pub(crate) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
     let Some(first) = tables.first() else { return Ok(None) };
     match tables.iter().find(|table| table.added_decay != first.added_decay) {
         None => Ok(first.added_decay),
@@ -29,7 +29,7 @@ pub(super) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, An
 
 /// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as the estimators take
 /// them: under the window they are iω + σ and (iω + σ)² times it.
-pub(super) fn as_derivatives(
+pub(crate) fn as_derivatives(
     table: &FrequencyResponses,
     quantity: ResponseQuantity,
     rate: f64,

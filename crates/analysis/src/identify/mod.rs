@@ -22,7 +22,7 @@
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
-mod added_decay;
+pub(crate) mod added_decay;
 pub mod checks;
 mod coherence;
 mod counts;
@@ -89,6 +89,7 @@ use crate::AnalysisError;
 use crate::hits::{self, HitNoise};
 use crate::machine::Machine;
 use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
+use crate::modes::resonances;
 
 /// Unexplained part of the response above which the result says so.
 pub const CONSPICUOUS: f64 = 0.05;
@@ -129,10 +130,17 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         true => Unscaled::or_fitted(&unknowns, &driven, fit),
         false => fit(&unknowns).map(|fitted| (fitted, None)),
     };
-    let (fitted, unscaled) = fitted.map_err(|error| explained(error, &records))?;
+    let is_linear = !matches!(how.source, Source::Terms(_));
+    let (fitted, unscaled) = fitted.map_err(|error| {
+        let surplus = if is_linear { resonances::surplus(measurements) } else { None };
+        with_surplus(explained(error, &records), surplus)
+    })?;
     let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
-    if !period_given && !matches!(how.source, Source::Hits(_) | Source::Terms(_)) {
+    if is_linear && summary.fit.unexplained_motion > Some(CONSPICUOUS) {
+        summary.remarks.extend(resonances::surplus(measurements));
+    }
+    if !period_given && is_linear && !matches!(how.source, Source::Hits(_)) {
         summary.remarks.extend(hits::uncut(&records));
         if !matches!(how.source, Source::Segments(_) | Source::Samples(_)) {
             summary.remarks.extend(records.iter().find_map(spectra::unsaid_period));
@@ -145,6 +153,17 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         fitted,
         summary,
     })
+}
+
+/// Returns the failure of a fit with the surplus of resonances as a reason.
+fn with_surplus(failure: AnalysisError, surplus: Option<String>) -> AnalysisError {
+    match (failure, surplus) {
+        (AnalysisError::Unfit { error, reasons }, Some(surplus)) => {
+            AnalysisError::Unfit { error, reasons: format!("{reasons}; {surplus}") }
+        }
+        (AnalysisError::Estimate(error), Some(reasons)) => AnalysisError::Unfit { error, reasons },
+        (failure, _) => failure,
+    }
 }
 
 /// An identified machine, and what it was identified from.

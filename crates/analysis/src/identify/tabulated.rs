@@ -202,7 +202,7 @@ impl Tabulated {
 
 /// Returns the responses with points in positive directions: a force or a response in −Z is one in +Z of the other sign.
 /// Points that are asked for in negative directions stay as they are.
-fn with_positive_directions<'a>(
+pub(crate) fn with_positive_directions<'a>(
     table: &'a FrequencyResponses,
     points: &[String],
 ) -> Cow<'a, FrequencyResponses> {

@@ -10,6 +10,7 @@ use mechid_modal::indicators;
 use mechid_spectra::LineData;
 
 use super::checks;
+use super::diagrams::Source;
 use super::settings::ModesSettings;
 use super::sources::{outputs_of, responses_of};
 use super::summary::{
@@ -17,7 +18,7 @@ use super::summary::{
 };
 use super::{Modes, ModesSpectrum};
 use crate::AnalysisError;
-use crate::identify::rows::{Uncertain, WindowRow};
+use crate::identify::rows::Uncertain;
 use crate::measurement::Measurement;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::significant;
@@ -65,7 +66,7 @@ pub(super) fn modes(
         p_value: h.p_value,
     };
     let summary = ModesSummary {
-        records: vec![RecordRow { file: block.file.clone(), window: WindowRow::of(&block) }],
+        records: vec![RecordRow::of_block(&block)],
         hits: Vec::new(),
         inputs: Vec::new(),
         outputs: outputs.into_iter().map(output).collect(),
@@ -80,10 +81,12 @@ pub(super) fn modes(
         variance_predicted: None,
         checks: checks::of_channels(measurements)?,
         notes: notes(&estimate),
+        diagrams: None,
         analysis: settings.clone(),
     };
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
-    Ok(Modes { summary, spectrum: spectrum(&data) })
+    let source = Source::Ambient(estimate.stabilisation);
+    Ok(Modes { summary, spectrum: spectrum(&data), source })
 }
 
 fn row(mode: &AmbientMode) -> ModalModeRow {

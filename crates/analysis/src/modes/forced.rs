@@ -2,27 +2,24 @@
 
 use std::f64::consts::TAU;
 
-use mechid_io::derivative;
-use mechid_modal::{
-    DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, ModalSettings, identify_modes,
-    indicators,
-};
+use mechid_modal::{IdentifiedMode, ModalError, ModalEstimate, ModalSettings, identify_modes};
+use mechid_signal::message;
 use mechid_spectra::LineData;
-use nalgebra::{Complex, DMatrix, DVector, DVectorView};
+use nalgebra::{Complex, DMatrix};
 
+use super::averaged::{Sharpened, corrected};
 use super::checks;
+use super::diagrams::Source;
+use super::rows::{dropped, mac, notes, row};
 use super::settings::ModesSettings;
 use super::sources::{Output, Part, Recorded};
-use super::summary::{
-    DroppedRow, LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
-};
+use super::summary::{LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
 use super::tables::Tables;
+use super::validation::explained;
 use super::{Modes, ModesSpectrum};
 use crate::AnalysisError;
 use crate::hits::HitRow;
-use crate::identify::rows::Uncertain;
-use crate::modal::{ShapeEntry, ShapedMode};
-use crate::text::{compact, significant};
+use crate::text::significant;
 
 /// Records of a test, and the band that is fitted.
 pub(super) struct Test {
@@ -31,7 +28,7 @@ pub(super) struct Test {
 }
 
 /// What the result says beside the fit.
-struct Told {
+struct Context {
     records: Vec<RecordRow>,
     hits: Vec<HitRow>,
     inputs: Vec<String>,
@@ -39,7 +36,19 @@ struct Told {
     driving_points: Vec<(usize, usize)>,
     band_hz: [f64; 2],
     checks: Vec<ModalCheck>,
+    notes: Vec<String>,
     predicted: Option<Vec<f64>>,
+    /// `true` if the data are tables of frequency responses.
+    is_table: bool,
+    /// Decay rate, in 1/s, that an exponential window adds to that of every mode.
+    added_decay: Option<f64>,
+}
+
+/// Modes as they were fitted and as they are reported: without the decay of an exponential window.
+struct Fit {
+    data: LineData,
+    estimate: ModalEstimate,
+    modes: Vec<IdentifiedMode>,
 }
 
 impl Test {
@@ -51,38 +60,99 @@ impl Test {
         settings: &ModesSettings,
     ) -> Result<Modes, AnalysisError> {
         let Self { recorded, band_hz } = self;
+        let named = |error| named(error, &recorded.inputs, &recorded.outputs);
         let data = recorded.lines(band_hz)?;
-        let estimate = identify_modes(&data, &engine_settings(settings))?;
+        let estimate = identify_modes(&data, &engine_settings(settings)).map_err(named)?;
         let predicted = match settings.validate {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, settings)?),
         };
         let Recorded { inputs, outputs, driving_points, hits, .. } = recorded;
-        let told =
-            Told { records, hits, inputs, outputs, driving_points, band_hz, checks, predicted };
-        told.with(&data, &estimate, settings)
+        let context = Context {
+            records,
+            hits,
+            inputs,
+            outputs,
+            driving_points,
+            band_hz,
+            checks,
+            notes: Vec::new(),
+            predicted,
+            is_table: false,
+            added_decay: None,
+        };
+        let modes = estimate.modes().to_vec();
+        context.with(Fit { data, estimate, modes }, settings)
     }
 }
 
 /// Fits the modes of tables of frequency responses.
 pub(super) fn of_tables(
-    tables: &Tables<'_>,
+    tables: &Tables,
     band_hz: [f64; 2],
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
-    let data = tables.lines(band_hz)?;
-    let estimate = identify_modes(&data, &engine_settings(settings))?;
-    let told = Told {
-        records: Vec::new(),
+    let outputs = tables.outputs();
+    let fit =
+        Sharpened::new(tables, band_hz, &engine_settings(settings)).map_err(
+            |error| match error {
+                AnalysisError::Modal(error) => named(error, &tables.forces, &outputs),
+                other => other,
+            },
+        )?;
+    let Sharpened { data, estimate, settled } = fit;
+    let (decay, inflation) = (tables.added_decay.unwrap_or(0.0), tables.error_inflation());
+    let correct = |mode| corrected(mode, decay, inflation);
+    let modes: Vec<IdentifiedMode> = estimate.modes().iter().map(correct).collect();
+    let mut notes = Vec::new();
+    if tables.added_decay.is_some() {
+        notes.push(format!(
+            "an exponential window adds {} 1/s to the decay of every mode of the tables: it was \
+             subtracted",
+            significant(decay, 4)
+        ));
+    }
+    let remarks = tables.with_segments().flat_map(|(table, _)| table.remarks.iter().cloned());
+    notes.extend(remarks);
+    let context = Context {
+        records: tables.with_segments().map(|(table, _)| RecordRow::of_table(table)).collect(),
         hits: Vec::new(),
         inputs: tables.forces.clone(),
-        outputs: tables.outputs(),
         driving_points: tables.driving_points(),
+        outputs,
         band_hz,
-        checks: Vec::new(),
+        checks: checks::of_tables(tables, band_hz, &modes, settled),
+        notes,
         predicted: None,
+        is_table: true,
+        added_decay: tables.added_decay,
     };
-    told.with(&data, &estimate, settings)
+    context.with(Fit { data, estimate, modes }, settings)
+}
+
+/// Number of channels that a message lists by their names.
+const LISTED: usize = 8;
+
+/// Returns a failure with the names of the channels that it counts.
+fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisError {
+    let list = |numbers: &[usize], name: &dyn Fn(usize) -> String| {
+        message::list(numbers.iter().map(|at| name(*at)), ", ", LISTED)
+    };
+    match error {
+        ModalError::DeadOutputs { outputs: dead } => {
+            let columns = list(&dead, &|at| outputs[at].name.clone());
+            AnalysisError::DeadResponses { columns }
+        }
+        ModalError::DeadInputs { inputs: dead } => {
+            let columns = list(&dead, &|at| inputs[at].clone());
+            AnalysisError::DeadForces { columns }
+        }
+        ModalError::DependentInputs { input, own_share } => {
+            let others = list(&(0..input).collect::<Vec<_>>(), &|at| inputs[at].clone());
+            AnalysisError::DependentForces { force: inputs[input].clone(), others, own_share }
+        }
+        other => other.into(),
+    }
 }
 
 fn engine_settings(settings: &ModesSettings) -> ModalSettings {
@@ -124,28 +194,20 @@ fn predicted(
         identify_modes(&part(0.0, 1.0 - share)?.lines(band_hz)?, &engine_settings(settings))?;
     let rest = part(1.0 - share, 1.0)?.lines(band_hz)?;
     let model = fitted.synthesis(&rest)?;
-    let share =
-        |(measured, model): (DVectorView<'_, Complex<f64>>, DVectorView<'_, Complex<f64>>)| {
-            1.0 - (measured - model).norm_squared() / measured.norm_squared()
-        };
-    Ok(rest.outputs().column_iter().zip(model.column_iter()).map(share).collect())
+    Ok(explained(rest.outputs(), &model))
 }
 
-impl Told {
-    fn with(
-        self,
-        data: &LineData,
-        estimate: &ModalEstimate,
-        settings: &ModesSettings,
-    ) -> Result<Modes, AnalysisError> {
+impl Context {
+    fn with(self, fit: Fit, settings: &ModesSettings) -> Result<Modes, AnalysisError> {
+        let Fit { data, estimate, modes: reported } = fit;
         let names: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let explained = estimate.variance_explained();
         let mut rows = self.checks;
         rows.extend(checks::of_outputs(&explained, &names));
-        let modes: Vec<ModalModeRow> = estimate
-            .modes()
-            .iter()
-            .map(|mode| row(mode, &self.outputs, &self.driving_points))
+        rows.extend(checks::of_modes(&reported, &self.inputs, &self.outputs, &self.driving_points));
+        let fitted = reported.iter().zip(estimate.modes());
+        let modes: Vec<ModalModeRow> = fitted
+            .map(|(mode, fitted)| row(mode, fitted, &self.outputs, &self.driving_points))
             .collect();
         let mean = |shares: &[f64]| shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         let outputs = self.outputs.iter().enumerate().map(|(at, output)| OutputRow {
@@ -153,7 +215,7 @@ impl Told {
             unit: output.quantity.map(|quantity| quantity.unit()),
             variance_explained: Some(explained[at]),
             variance_predicted: self.predicted.as_ref().map(|shares| shares[at]),
-            noise_share: Some(estimate.noise_levels()[at] / rms(data, at)),
+            noise_share: Some(estimate.noise_levels()[at] / rms(&data, at)),
         });
         let summary = ModesSummary {
             records: self.records,
@@ -163,140 +225,23 @@ impl Told {
             band_hz: self.band_hz,
             lines: data.len(),
             confidence: LEVEL,
-            mac: mac(estimate.modes()),
+            mac: mac(&reported),
             modes,
             dropped: estimate.dropped().iter().map(dropped).collect(),
             harmonics: Vec::new(),
             variance_explained: Some(mean(&explained)),
             variance_predicted: self.predicted.as_deref().map(mean),
             checks: rows,
-            notes: notes(estimate),
+            notes: notes(&estimate).into_iter().chain(self.notes).collect(),
+            diagrams: None,
             analysis: settings.clone(),
         };
-        Ok(Modes { summary, spectrum: spectrum(data, estimate)? })
+        let spectrum = spectrum(&data, &estimate)?;
+        let quantities = self.outputs.iter().map(|output| output.quantity).collect();
+        let (is_table, added_decay) = (self.is_table, self.added_decay);
+        let source = Source::Forced { data, estimate, is_table, quantities, added_decay };
+        Ok(Modes { summary, spectrum, source })
     }
-}
-
-fn row(mode: &IdentifiedMode, outputs: &[Output], points: &[(usize, usize)]) -> ModalModeRow {
-    let entries = |values: &[Complex<f64>], errors: &[Complex<f64>], scale: Complex<f64>| {
-        let of = |(value, error): (&Complex<f64>, &Complex<f64>)| {
-            let value = value / scale;
-            let size = scale.norm();
-            let standard_error = Some([error.re / size, error.im / size]);
-            ShapeEntry { value: [value.re, value.im], standard_error }
-        };
-        values.iter().zip(errors).map(of).collect::<Vec<_>>()
-    };
-    let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
-    let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
-    let modal_mass = points.iter().filter_map(|&(input, output)| {
-        let power = derivative(outputs[output].quantity?) as i32;
-        Some((mode.residue(output, input).norm(), mode.modal_mass(output, input, power).re))
-    });
-    // The driving point that moves most in this mode determines the mass best.
-    let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
-    let values = [
-        uncertain(&mode.natural_frequency_hz),
-        damped_frequency(mode),
-        uncertain(&mode.damping_ratio),
-    ];
-    let shape = entries(&mode.shape, &mode.shape_standard_error, Complex::from(1.0));
-    ModalModeRow {
-        mode: ShapedMode::from_pole([mode.pole.re, mode.pole.im], values, shape),
-        participation: entries(&mode.participation, &mode.participation_standard_error, scale),
-        phase_collinearity: indicators::mpc(&vector(&mode.shape)),
-        driven_share: mode.driven_share,
-        modal_mass,
-        decay_times: None,
-    }
-}
-
-/// f√(1 − ζ²), with its standard error to first order.
-fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
-    let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
-    let root = (1.0 - zeta.value * zeta.value).sqrt();
-    let slope = -f.value * zeta.value / root;
-    let variance = (root * f.standard_error).powi(2)
-        + (slope * zeta.standard_error).powi(2)
-        + 2.0 * root * slope * mode.frequency_damping_covariance;
-    normal(root * f.value, variance.max(0.0).sqrt())
-}
-
-/// Value with a normal interval: the noise is averaged over many lines.
-fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
-    normal(value.value, value.standard_error)
-}
-
-fn normal(value: f64, standard_error: f64) -> Uncertain {
-    let half = NORMAL_95 * standard_error;
-    Uncertain::new(value, standard_error, [value - half, value + half])
-}
-
-/// Half width of the 95 % interval of a normal distribution, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
-
-fn mac(modes: &[IdentifiedMode]) -> Vec<Vec<f64>> {
-    let shapes: Vec<_> = modes.iter().map(|mode| vector(&mode.shape)).collect();
-    let row = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
-    shapes.iter().map(row).collect()
-}
-
-fn vector(shape: &[Complex<f64>]) -> DVector<Complex<f64>> {
-    DVector::from_column_slice(shape)
-}
-
-fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
-    let reason = match candidate.reason {
-        DropReason::Insignificant { gain, required } => format!(
-            "it improves the fit by {} (−2 log L) where {} is needed",
-            significant(gain, 3),
-            significant(required, 3)
-        ),
-        DropReason::UndeterminedDamping { standard_error } => format!(
-            "its damping ratio is not above zero: ± {} %",
-            significant(100.0 * standard_error, 2)
-        ),
-        DropReason::TooDamped => {
-            "it is too damped for a mode: the response of modes outside of the band".into()
-        }
-        DropReason::OutsideBand => "it left the band".into(),
-        DropReason::Twin { other_hz } => format!(
-            "its shape is that of the mode at {} Hz, within whose width it lies",
-            significant(other_hz, 5)
-        ),
-        DropReason::Undriven { ratio } => format!(
-            "forces that were not measured drive it: {} times the measured ones",
-            significant(ratio, 2)
-        ),
-        DropReason::BeyondNumber { .. } => "`modes` asks for fewer, and others explain more".into(),
-        _ => "it is no mode of the record".into(),
-    };
-    let DroppedCandidate { frequency_hz, damping_ratio, .. } = *candidate;
-    DroppedRow { frequency_hz, damping_ratio, reason }
-}
-
-/// Share of unmeasured forces from which a mode is told to be driven by them.
-const NOTED_UNMEASURED: f64 = 0.01;
-
-fn notes(estimate: &ModalEstimate) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (number, mode) in (1..).zip(estimate.modes()) {
-        let hz = significant(mode.natural_frequency_hz.value, 4);
-        if mode.near_edge {
-            notes.push(format!(
-                "mode {number} ({hz} Hz) is at an edge of the band: choose a wider one (`band_hz`) if the \
-                 forces reach further"
-            ));
-        }
-        if let Some(share) = mode.driven_share.filter(|share| 1.0 - share > NOTED_UNMEASURED) {
-            notes.push(format!(
-                "{} % of the motion of mode {number} ({hz} Hz) answers forces that were not measured; its \
-                 intervals allow for that",
-                compact(100.0 * (1.0 - share), 2)
-            ));
-        }
-    }
-    notes
 }
 
 /// RMS of an output over the lines, which is not zero.

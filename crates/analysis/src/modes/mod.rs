@@ -2,28 +2,40 @@
 //! from ambient records.
 
 mod ambient;
+mod averaged;
 mod checks;
+mod comparison;
+mod diagrams;
 mod forced;
+mod mode_set;
+pub(crate) mod resonances;
+mod rows;
 mod settings;
 mod sources;
 mod summary;
+mod synthesis;
 mod tables;
+mod validation;
 
 use std::fmt;
 
 use mechid_io::FrequencyResponses;
 use serde::{Serialize, Serializer};
 
+pub use self::comparison::{DifferenceRow, LoneRow, ModeComparison, PairRow, compare_modes};
+use self::diagrams::Source;
+pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
+pub use self::mode_set::ModeSet;
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
 pub(crate) use self::sources::driven_band;
 pub use self::summary::{
     DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+    SegmentsRow, TableRow,
 };
 use self::tables::Tables;
 use crate::AnalysisError;
-use crate::identify::rows::WindowRow;
 use crate::measurement::Measurement;
 
 /// Modes of a structure with their uncertainty, and how well they explain the records.
@@ -31,6 +43,7 @@ use crate::measurement::Measurement;
 pub struct Modes {
     summary: ModesSummary,
     spectrum: ModesSpectrum,
+    source: Source,
 }
 
 /// Responses over frequency, measured and explained: root of the sum over all responses, each over its
@@ -81,7 +94,7 @@ pub fn modes(
     });
     let records = measurements.iter().map(|measurement| {
         let block = measurement.whole_block()?;
-        Ok(RecordRow { file: block.file.clone(), window: WindowRow::of(&block) })
+        Ok(RecordRow::of_block(&block))
     });
     let records = records.collect::<Result<Vec<_>, AnalysisError>>()?;
     let checks = checks::of_channels(measurements)?;
@@ -91,8 +104,12 @@ pub fn modes(
 /// Finds the modes of a structure from tables of its frequency responses, which are fitted together;
 /// any number of points and references is possible.
 ///
+/// Of averages over segments that a table states, lines whose errors are tied by the window are left
+/// out, and what the window blunts is subtracted by the modes themselves, round by round; the decay of an
+/// exponential window is subtracted, too.
+///
 /// # Errors
-/// As [`modes`], and [`AnalysisError::NoResponse`] if a response is missing.
+/// As [`modes`], and [`AnalysisError::MissingResponse`] if a response is missing.
 ///
 /// # Source
 /// That of [`modes`].
@@ -101,7 +118,7 @@ pub fn modes_of_responses(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     settings.check()?;
-    let tables = Tables::new(tables)?;
+    let tables = Tables::new(tables, settings.quantity)?;
     let band_hz = settings.band_hz.unwrap_or_else(|| tables.range_hz());
     forced::of_tables(&tables, band_hz, settings)
 }
@@ -110,6 +127,24 @@ impl Modes {
     /// Returns the numbers, checks and notes.
     pub fn summary(&self) -> &ModesSummary {
         &self.summary
+    }
+
+    /// Returns the stabilisation diagram and the mode indicator, which take a part of the time of the
+    /// identification.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Modal`] and [`AnalysisError::Indicator`] if a decomposition fails.
+    pub fn diagrams(&self) -> Result<Diagrams, AnalysisError> {
+        self.source.diagrams()
+    }
+
+    /// Adds the diagrams to the summary.
+    ///
+    /// # Errors
+    /// As [`Modes::diagrams`].
+    pub fn add_diagrams(&mut self) -> Result<(), AnalysisError> {
+        self.summary.diagrams = Some(self.diagrams()?);
+        Ok(())
     }
 
     /// Returns the responses over frequency, measured and explained.

@@ -1,12 +1,12 @@
 //! Settings of a modal test.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::HitRule;
 use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
-
-/// Share of a record that may be kept out of a fit for its validation; beyond, the fit is another one.
-const MOST_VALIDATED: f64 = 0.8;
+use crate::limits::MOST_VALIDATED;
+use crate::measurement::Channels;
 
 /// Settings of [`modes`](super::modes()).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,9 @@ pub struct ModesSettings {
     /// Frequencies, in Hz, near which a mode is looked for whatever the start shows; a list of any
     /// length.
     pub near_hz: Vec<f64>,
+    /// Quantity of the responses of tables that do not state it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantity: Option<ResponseQuantity>,
     /// Places of the forces, one each (of a roving hammer one per record), and of the responses, by
     /// which a driving point is known; empty: not stated.
     pub places: Places,
@@ -69,6 +72,20 @@ impl Default for ModalTest {
 }
 
 impl ModesSettings {
+    /// Checks that there are the columns that the kind of test needs.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`].
+    pub(crate) fn check_channels(&self, channels: &Channels) -> Result<(), AnalysisError> {
+        if channels.first_response().is_none() {
+            return Err(AnalysisError::NoMotion);
+        }
+        match self.test {
+            ModalTest::Forced { .. } if channels.force.is_empty() => Err(AnalysisError::NoForce),
+            _ => Ok(()),
+        }
+    }
+
     /// # Errors
     /// [`AnalysisError::Setting`] for a band or a share that is none.
     pub(super) fn check(&self) -> Result<(), AnalysisError> {

@@ -8,14 +8,8 @@ use nalgebra::DMatrix;
 use super::settings::Places;
 use crate::AnalysisError;
 use crate::hits::{self, HitRow};
+use crate::limits::{DRIVEN_LINES, DRIVEN_POWER};
 use crate::measurement::{Block, Channels, Measurement};
-
-/// Number of lines whose mean power decides whether a force drives them.
-const BAND_LINES: usize = 16;
-
-/// Power of a force over its largest, in the mean of some lines, below which these are not driven: at
-/// −40 dB the response to the force drowns in the noise of usual sensors.
-const DRIVEN: f64 = 1e-4;
 
 /// Records of one test: the inputs and outputs of each, and what they are called.
 #[derive(Debug)]
@@ -111,14 +105,14 @@ pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [
         for column in spectrum.lines().column_iter() {
             let powers: Vec<f64> = column.rows(1, lines).iter().map(|z| z.norm_sqr()).collect();
             let mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
-            let means: Vec<f64> = powers.chunks(BAND_LINES).map(mean).collect();
+            let means: Vec<f64> = powers.chunks(DRIVEN_LINES).map(mean).collect();
             let largest = means.iter().copied().fold(0.0, f64::max);
-            let is_driven = |power: &f64| largest > 0.0 && *power >= DRIVEN * largest;
+            let is_driven = |power: &f64| largest > 0.0 && *power >= DRIVEN_POWER * largest;
             if let (Some(first), Some(last)) =
                 (means.iter().position(is_driven), means.iter().rposition(is_driven))
             {
-                low = low.min((1 + first * BAND_LINES) as f64 * spacing_hz);
-                let end = ((last + 1) * BAND_LINES).min(lines);
+                low = low.min((1 + first * DRIVEN_LINES) as f64 * spacing_hz);
+                let end = ((last + 1) * DRIVEN_LINES).min(lines);
                 high = high.max(end as f64 * spacing_hz);
             }
         }

@@ -2,14 +2,20 @@
 
 use std::fmt;
 
-use mechid_signal::message;
+use mechid_io::FrequencyResponses;
+use mechid_signal::{Window, message};
 use serde::Serialize;
 
+use super::diagrams::Diagrams;
 use super::settings::ModesSettings;
 use crate::hits::{self, HitRow};
 use crate::identify::rows::{CONFIDENCE, Uncertain, WindowRow};
+use crate::measurement::Block;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, paged_table, significant, text_table};
+
+/// Damping ratio above which a candidate stands for what lies outside of the band, in the text.
+const LIGHT: f64 = 0.3;
 
 /// Decimal places of a phase, in degrees.
 const PHASE_DECIMALS: usize = 0;
@@ -45,25 +51,95 @@ pub struct ModesSummary {
     /// forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_explained: Option<f64>,
-    /// Share that a fit to the first part of the records explains of the rest, where it was tried.
+    /// Share that a fit to the first part of the records explains of the rest, or the modes of another
+    /// record, where that was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
     /// Checks of the data and of the fit.
     pub checks: Vec<ModalCheck>,
+    /// Stabilisation diagram and mode indicator, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diagrams: Option<Diagrams>,
     /// Notes to read before using the numbers.
     pub notes: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: ModesSettings,
 }
 
-/// A record of a modal test.
+/// A record of a modal test, or a table of frequency responses.
 #[derive(Debug, Serialize)]
 pub struct RecordRow {
-    /// Name of the record.
+    /// Name of the file.
     pub file: String,
-    /// Samples used.
+    /// Samples used; `None` of a table.
     #[serde(flatten)]
-    pub window: WindowRow,
+    pub window: Option<WindowRow>,
+    /// What a table states of its frequencies; `None` of a record.
+    #[serde(flatten)]
+    pub table: Option<TableRow>,
+}
+
+/// What a table of frequency responses states.
+#[derive(Debug, Serialize)]
+pub struct TableRow {
+    /// Number of frequencies.
+    pub frequencies: usize,
+    /// Segments that the responses are averages over; `None` if the table does not state them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segments: Option<SegmentsRow>,
+    /// Rate, in 1/s, that an exponential window adds to the decay of every mode, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub added_decay: Option<f64>,
+}
+
+/// Segments of averaged responses.
+#[derive(Debug, Serialize)]
+pub struct SegmentsRow {
+    /// Number of segments.
+    pub count: usize,
+    /// Number of samples of a segment.
+    pub samples: usize,
+    /// Window that weights the samples; `None` for whole periods.
+    pub window: Option<Window>,
+}
+
+impl RecordRow {
+    /// Returns the row of a record.
+    pub(super) fn of_block(block: &Block) -> Self {
+        Self { file: block.file.clone(), window: Some(WindowRow::of(block)), table: None }
+    }
+
+    /// Returns the row of a table.
+    pub(super) fn of_table(table: &FrequencyResponses) -> Self {
+        let segments = table.segments.map(|stated| SegmentsRow {
+            count: stated.count,
+            samples: stated.samples,
+            window: stated.window,
+        });
+        let frequencies = table.frequency_hz.len();
+        let row = TableRow { frequencies, segments, added_decay: table.added_decay };
+        Self { file: table.file.clone(), window: None, table: Some(row) }
+    }
+
+    fn text(&self) -> String {
+        let file = &self.file;
+        match (&self.window, &self.table) {
+            (Some(WindowRow { first_sample, last_sample, sample_rate_hz, .. }), _) => {
+                let rate = compact(*sample_rate_hz, 6);
+                format!("{file}: samples {first_sample} to {last_sample}, {rate} Hz\n")
+            }
+            (None, Some(TableRow { frequencies, segments: Some(segments), .. })) => {
+                let SegmentsRow { count, samples, .. } = segments;
+                let frequencies = message::count(*frequencies, "frequency");
+                let segments = message::count(*count, "segment");
+                format!("{file}: {frequencies}, averages of {segments} of {samples} samples\n")
+            }
+            (None, Some(TableRow { frequencies, .. })) => {
+                format!("{file}: {}\n", message::count(*frequencies, "frequency"))
+            }
+            (None, None) => format!("{file}\n"),
+        }
+    }
 }
 
 /// One response.
@@ -156,17 +232,12 @@ impl ModesSummary {
     }
 
     fn heading(&self) -> String {
-        let rate = self.records.first().map_or(0.0, |record| record.window.sample_rate_hz);
-        let rate = compact(rate, 6);
-        let mut text = String::new();
-        if self.hits.is_empty() {
-            for RecordRow { file, window } in &self.records {
-                let (first, last) = (window.first_sample, window.last_sample);
-                text += &format!("{file}: samples {first} to {last}, {rate} Hz\n");
-            }
+        let text = if self.hits.is_empty() {
+            self.records.iter().map(RecordRow::text).collect()
         } else {
-            text += &hits::heading(&self.hits, &rate);
-        }
+            let window = self.records.first().and_then(|record| record.window.as_ref());
+            hits::heading(&self.hits, &compact(window.map_or(0.0, |w| w.sample_rate_hz), 6))
+        };
         let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
         let forces = match self.inputs.len() {
             0 => "forces not measured".into(),
@@ -235,6 +306,27 @@ impl ModesSummary {
         text_table(&rows)
     }
 
+    /// A line for each candidate in the band, and one for all others, which no one would take for modes.
+    fn dropped_lines(&self) -> String {
+        let [low, high] = self.band_hz;
+        let (inside, outside): (Vec<_>, Vec<_>) = self.dropped.iter().partition(|row| {
+            (low..=high).contains(&row.frequency_hz) && row.damping_ratio <= LIGHT
+        });
+        let mut text = String::new();
+        for DroppedRow { frequency_hz, damping_ratio, reason } in inside {
+            let (hz, ratio) =
+                (significant(*frequency_hz, 5), significant(100.0 * damping_ratio, 3));
+            text += &format!("left out: {hz} Hz, {ratio} %: {reason}\n");
+        }
+        if !outside.is_empty() {
+            text += &format!(
+                "left out: {} outside of the band or too damped for a mode\n",
+                message::count(outside.len(), "candidate")
+            );
+        }
+        text
+    }
+
     fn check_lines(&self) -> String {
         let passed = self.checks.iter().filter(|check| check.passed).count();
         let mut text =
@@ -262,11 +354,7 @@ impl fmt::Display for ModesSummary {
             write!(f, "\n{}", self.output_table())?;
         }
         write!(f, "\n{}", self.check_lines())?;
-        for row in &self.dropped {
-            let (hz, ratio) =
-                (significant(row.frequency_hz, 5), significant(100.0 * row.damping_ratio, 3));
-            writeln!(f, "left out: {hz} Hz, {ratio} %: {}", row.reason)?;
-        }
+        f.write_str(&self.dropped_lines())?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
 }

@@ -3,29 +3,48 @@
 use std::f64::consts::TAU;
 
 use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_modal::ModalEstimate;
+use mechid_model::ResponseQuantity;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix};
 
+use super::averaged::Averaged;
 use super::sources::Output;
 use crate::AnalysisError;
+use crate::identify::added_decay;
+use crate::identify::tabulated::with_positive_directions;
 
 /// Tables of frequency responses of one structure, and the points that they name.
 #[derive(Debug)]
-pub(super) struct Tables<'a> {
-    tables: &'a [FrequencyResponses],
+pub(super) struct Tables {
+    /// Tables with points in positive directions.
+    tables: Vec<FrequencyResponses>,
+    /// What is known of the segments behind each table.
+    averaged: Vec<Option<Averaged>>,
     /// Points of the forces, in the order of the tables.
     pub forces: Vec<String>,
     /// Points of the responses, in the order of the tables.
     pub responses: Vec<String>,
+    /// Rate, in 1/s, that an exponential window adds to the decay of every mode.
+    pub added_decay: Option<f64>,
 }
 
-impl<'a> Tables<'a> {
+impl Tables {
+    /// Takes tables, and the quantity of their responses where they do not state it.
+    ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`] without a table.
-    pub fn new(tables: &'a [FrequencyResponses]) -> Result<Self, AnalysisError> {
+    /// [`AnalysisError::NoRecord`] without a table, [`AnalysisError::Setting`] if a table states
+    /// another quantity, or tables have different exponential windows.
+    pub fn new(
+        tables: &[FrequencyResponses],
+        quantity: Option<ResponseQuantity>,
+    ) -> Result<Self, AnalysisError> {
         if tables.is_empty() {
             return Err(AnalysisError::NoRecord);
         }
+        let added_decay = added_decay::of_tables(tables)?;
+        let prepared = |table: &FrequencyResponses| prepare(table, quantity, added_decay);
+        let tables = tables.iter().map(prepared).collect::<Result<Vec<_>, AnalysisError>>()?;
         let points = |point: fn(&ResponseFunction) -> &String| {
             let mut points: Vec<String> = Vec::new();
             for function in tables.iter().flat_map(|table| &table.functions) {
@@ -36,7 +55,15 @@ impl<'a> Tables<'a> {
             points
         };
         let (forces, responses) = (points(|f| &f.reference), points(|f| &f.response));
-        Ok(Self { tables, forces, responses })
+        let averaged = tables.iter().map(Averaged::new).collect();
+        Ok(Self { averaged, forces, responses, added_decay, tables })
+    }
+
+    /// Returns the tables, and the segments behind each.
+    pub fn with_segments(
+        &self,
+    ) -> impl Iterator<Item = (&FrequencyResponses, Option<&Averaged>)> + '_ {
+        self.tables.iter().zip(self.averaged.iter().map(Option::as_ref))
     }
 
     /// Lowest and highest frequency above zero, in Hz.
@@ -64,21 +91,50 @@ impl<'a> Tables<'a> {
         inputs.filter_map(|(input, point)| Some((input, output(point)?))).collect()
     }
 
-    /// Lines in a band (Hz): each force in turn is a record with a unit input there.
+    /// Returns whether a window smooths the responses of a table.
+    pub fn is_smoothed(&self) -> bool {
+        self.averaged.iter().flatten().any(Averaged::is_smoothed)
+    }
+
+    /// Returns the largest ratio of a standard error to that of independent lines.
+    pub fn error_inflation(&self) -> f64 {
+        self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
+    }
+
+    /// Returns the lines in a band (Hz): each force in turn is a record with a unit input there. With
+    /// a `model` the responses are less what the windows of their segments make of those of the model.
     ///
     /// # Errors
-    /// [`AnalysisError::NoResponse`] if a table has the response of one point to a force, and not that
-    /// of another, [`AnalysisError::EmptyBand`]-like errors of [`LineData`] if the band has no line.
-    pub fn lines(&self, band_hz: [f64; 2]) -> Result<LineData, AnalysisError> {
+    /// [`AnalysisError::MissingResponse`] if a table has the response of one point to a force, and not
+    /// that of another; those of [`LineData`] if the band has no line.
+    pub fn lines(
+        &self,
+        band_hz: [f64; 2],
+        model: Option<&ModalEstimate>,
+    ) -> Result<LineData, AnalysisError> {
         let mut all: Option<LineData> = None;
-        for table in self.tables {
+        for (table, averaged) in self.with_segments() {
+            let rows = rows(table, averaged, band_hz);
+            let bias = match (averaged, model) {
+                (Some(averaged), Some(model)) => averaged.bias(&rows, model),
+                _ => Vec::new(),
+            };
             for (input, force) in self.forces.iter().enumerate() {
                 let of_force: Vec<&ResponseFunction> =
                     table.functions.iter().filter(|f| f.reference == *force).collect();
                 if of_force.is_empty() {
                     continue;
                 }
-                let one = self.lines_of(table, &of_force, input, band_hz)?;
+                let functions = self.complete(table, &of_force, force)?;
+                let omega = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
+                let mut inputs = DMatrix::zeros(rows.len(), self.forces.len());
+                inputs.column_mut(input).fill(Complex::from(1.0));
+                let outputs = DMatrix::from_fn(rows.len(), functions.len(), |at, output| {
+                    let bias = bias.get(at).and_then(Option::as_ref);
+                    let bias = bias.map_or(Complex::default(), |bias| bias[(output, input)]);
+                    functions[output].values[rows[at]] - bias
+                });
+                let one = LineData::new(omega, inputs, outputs, Transient::None)?;
                 all = Some(match all {
                     None => one,
                     Some(before) => before.followed_by(&one)?,
@@ -88,34 +144,60 @@ impl<'a> Tables<'a> {
         all.ok_or(AnalysisError::NoRecord)
     }
 
-    fn lines_of(
+    /// Returns the responses of all points to a force.
+    fn complete<'a>(
         &self,
         table: &FrequencyResponses,
-        of_force: &[&ResponseFunction],
-        input: usize,
-        [low, high]: [f64; 2],
-    ) -> Result<LineData, AnalysisError> {
-        let functions: Vec<&ResponseFunction> = self
-            .responses
-            .iter()
-            .map(|point| {
-                let function = of_force.iter().find(|function| function.response == *point);
-                function.copied().ok_or_else(|| AnalysisError::NoResponse {
-                    file: table.file.clone(),
-                    response: point.clone(),
-                    force: self.forces[input].clone(),
-                })
+        of_force: &[&'a ResponseFunction],
+        force: &str,
+    ) -> Result<Vec<&'a ResponseFunction>, AnalysisError> {
+        let function = |point: &String| {
+            let function = of_force.iter().find(|function| function.response == *point);
+            function.copied().ok_or_else(|| AnalysisError::MissingResponse {
+                file: table.file.clone(),
+                response: point.clone(),
+                force: force.to_owned(),
             })
-            .collect::<Result<_, _>>()?;
-        let inside = |hz: f64| hz > 0.0 && (low..=high).contains(&hz);
-        let rows: Vec<usize> =
-            (0..table.frequency_hz.len()).filter(|row| inside(table.frequency_hz[*row])).collect();
-        let omega = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
-        let mut inputs = DMatrix::zeros(rows.len(), self.forces.len());
-        inputs.column_mut(input).fill(Complex::from(1.0));
-        let outputs = DMatrix::from_fn(rows.len(), functions.len(), |row, at| {
-            functions[at].values[rows[row]]
-        });
-        Ok(LineData::new(omega, inputs, outputs, Transient::None)?)
+        };
+        self.responses.iter().map(function).collect()
     }
+}
+
+/// Returns the rows of a table in a band (Hz), without 0 Hz, whose errors are independent.
+pub(super) fn rows(
+    table: &FrequencyResponses,
+    averaged: Option<&Averaged>,
+    [low, high]: [f64; 2],
+) -> Vec<usize> {
+    let inside = |hz: f64| hz > 0.0 && (low..=high).contains(&hz);
+    let hz = &table.frequency_hz;
+    let rows = (0..hz.len()).filter(|row| inside(hz[*row]));
+    match averaged {
+        Some(averaged) => averaged.independent(rows),
+        None => rows.collect(),
+    }
+}
+
+/// Returns a table with points in positive directions, the stated quantity, and velocities and
+/// accelerations as derivatives also under an exponential window.
+fn prepare(
+    table: &FrequencyResponses,
+    quantity: Option<ResponseQuantity>,
+    added_decay: Option<f64>,
+) -> Result<FrequencyResponses, AnalysisError> {
+    let mut table = with_positive_directions(table, &[]).into_owned();
+    for function in &mut table.functions {
+        match (function.quantity, quantity) {
+            (Some(of_file), Some(given)) if of_file != given => {
+                let why = format!("{} states {of_file}, not {given}", table.file);
+                return Err(AnalysisError::Setting { setting: "quantity", why });
+            }
+            (of_file, given) => function.quantity = of_file.or(given),
+        }
+    }
+    let first = table.functions.first().and_then(|function| function.quantity);
+    Ok(match (added_decay, first) {
+        (Some(rate), Some(quantity)) => added_decay::as_derivatives(&table, quantity, rate),
+        _ => table,
+    })
 }

@@ -13,6 +13,7 @@ mod fleet;
 mod hammer;
 mod headlines;
 mod modal;
+mod modes;
 mod nonlinear;
 mod random;
 mod reading;

@@ -9,11 +9,12 @@ use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary};
 use mechid::integrate::ModeSearch;
-use mechid::io::{input_name, read_sparse_system};
+use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
 use mechid::report::{FigureStyle, ModeShapes, ToFigure, figure_page};
 use mechid::selected_modes::SelectedModes;
-use mechid::{DecaySettings, Measurement};
+use mechid::{DecaySettings, ModeSet, Modes};
 
+use crate::args::choices::QuantityChoice;
 use crate::args::hits::HitRuleArgs;
 use crate::args::{
     ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one, positive,
@@ -21,14 +22,21 @@ use crate::args::{
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
-/// Find the modes: of a test with forces, of a free decay, of an ambient record, of a machine
+/// Find the modes: of a test with forces, of a table of frequency responses, of a free decay, of an
+/// ambient record, of a machine
 ///
 /// With --force, any number of forces and of responses: shakers, a hammer (--hits leaves bad hits
 /// out), a hammer that roves from point to point (a record for each, --force-at). Frequencies,
 /// damping ratios and shapes are those of maximum likelihood on the spectral lines of the whole
 /// records, without windows; the number of modes is found, too. Without --force the record is taken
-/// for a free decay, or with --ambient for the response to forces that nobody measured. Without any
-/// response the file is the description of a machine, or what `mechid identify --json` printed.
+/// for a free decay, or with --ambient for the response to forces that nobody measured.
+///
+/// Without any column the file is a table of frequency responses: a universal file (datasets 58), or
+/// a table with the columns that `mechid frf --output` writes. A file in JSON is the description of a
+/// machine, or what `mechid identify --json` printed.
+///
+/// --compare sets the modes beside those of another result, or of a finite-element model (datasets 55
+/// of a universal file): pairs by frequency and shape, with differences over their standard errors.
 ///
 /// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes
 /// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency.
@@ -39,6 +47,9 @@ use crate::outcome::{Files, Outcome};
   mechid modes p1.csv p2.csv p3.csv --force f --force-at 1,2,3 --acceleration a --response-at 3 --hits
   mechid modes examples/decay.csv --acceleration a1,a2,a3
   mechid modes bridge.csv --acceleration a1,a2,a3 --ambient --band-hz 0.5:20
+  mechid modes table.unv --plot modes.html
+  mechid modes before.json --compare after.json
+  mechid modes frame.csv --force f1,f2 --acceleration a1,a2 --response-at 1+Z,2+Z --compare model.unv
   mechid modes examples/machine.json --plot modes.svg
   mechid modes found.json --geometry frame.csv --plot modes.html --shapes modes.unv
   mechid modes casing.json --modes 4 --near-hz 50")]
@@ -74,10 +85,26 @@ pub struct ModesArgs {
     /// Keep this part of each record, at its end, out of a second fit, and predict it
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
+    /// Predict this record, with the same columns, from its forces
+    #[arg(long, value_name = "RECORD", conflicts_with = "validate_percent")]
+    validate: Option<PathBuf>,
+    /// Measured quantity of the responses of a table, if the table does not state it
+    #[arg(long, value_name = "QUANTITY", value_enum)]
+    quantity: Option<QuantityChoice>,
     #[command(flatten)]
     hits: HitRuleArgs,
     #[command(flatten)]
     unmeasured: UnmeasuredArgs,
+    /// Compare with these modes: a result of `mechid modes --json`, a machine, or a universal file with
+    /// datasets 55
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["plot", "shapes", "geometry", "synthesis"])]
+    compare: Option<PathBuf>,
+    /// Add the stabilisation diagram and the mode indicator to the JSON
+    #[arg(long, help_heading = "Output")]
+    diagrams: bool,
+    /// Write the frequency responses of the modes into this universal file (datasets 58; SI units)
+    #[arg(long, value_name = "FILE.unv", help_heading = "Output")]
+    synthesis: Option<PathBuf>,
     #[command(flatten)]
     shapes: ShapeArgs,
     #[command(flatten)]
@@ -137,27 +164,38 @@ impl ModesArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         let files = Files::default().reads([&self.input.record]).reads(&self.more);
+        let files = files.reads(&self.compare).reads(&self.validate).writes(&self.synthesis);
         self.shapes.add_files(files.writes(&self.plot.plot))
     }
 
     /// Reads what there is, finds the modes, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let channels = self.channels.channels();
+        let path = &self.input.record;
         if channels.first_response().is_none() {
-            let path = &self.input.record;
-            let is_json =
-                path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-            if !channels.force.is_empty() || !(is_json || path == Path::new("-")) {
+            if !channels.force.is_empty() {
                 return Err(AnalysisError::NoMotion.into());
             }
-            return self.of_machine(path);
+            let is_json =
+                path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+            if is_json || path == Path::new("-") {
+                return match &self.compare {
+                    Some(_) => self.compared(&ModeSet::read(path)?),
+                    None => self.of_machine(path),
+                };
+            }
+            return self.of_tables();
         }
+        self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         if channels.force.is_empty() && !self.unmeasured.ambient {
             self.refuse("a free decay", &self.of_forces())?;
             let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
             let summary = decayed.summary();
             let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
             let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
+            if self.compare.is_some() {
+                return self.compared(&ModeSet::from_shaped(&summary.file, names, &modes)?);
+            }
             let outcome = Outcome::new(decayed.to_string(), &decayed)?;
             return self.drawn(outcome, &decayed, &modes, &names);
         }
@@ -165,13 +203,61 @@ impl ModesArgs {
         for record in &self.more {
             records.push(self.input.open_other(record, &channels, self.input.window())?);
         }
-        self.of_records(&records)
+        let mut modes = mechid::modes(&records, &self.settings())?;
+        if let Some(other) = &self.validate {
+            modes.add_validation(&[self.input.open_other(
+                other,
+                &channels,
+                self.input.window(),
+            )?])?;
+        }
+        self.of_test(modes)
     }
 
-    fn of_records(&self, records: &[Measurement]) -> Result<Outcome, CliError> {
-        let modes = mechid::modes(records, &self.settings())?;
+    fn of_tables(&self) -> Result<Outcome, CliError> {
+        self.refuse("a table of frequency responses", &self.of_records())?;
+        let files = std::iter::once(&self.input.record).chain(&self.more);
+        let read = |file: &PathBuf| {
+            FrequencyResponses::read(file).map_err(|error| match error {
+                IoError::Responses { file, available } => {
+                    AnalysisError::NeitherRecordNorTable { file, available }
+                }
+                other => other.into(),
+            })
+        };
+        let tables = files.map(read).collect::<Result<Vec<_>, _>>()?;
+        self.of_test(mechid::modes_of_responses(&tables, &self.settings())?)
+    }
+
+    /// Reports the modes of a test, or compares them.
+    fn of_test(&self, mut modes: Modes) -> Result<Outcome, CliError> {
+        if self.compare.is_some() {
+            return self.compared(&ModeSet::from_summary(modes.summary())?);
+        }
+        if self.diagrams {
+            modes.add_diagrams()?;
+        }
         let (shaped, names) = modes.summary().shapes();
-        self.drawn(Outcome::new(modes.to_string(), &modes)?, &modes, &shaped, &names)
+        let outcome = Outcome::new(modes.to_string(), &modes)?;
+        let outcome = match (&self.synthesis, modes.synthesis()) {
+            (Some(path), Some(responses)) => {
+                outcome.with_file(path, responses.to_universal_file()?)
+            }
+            (Some(_), None) => {
+                let why = "without measured forces there are no frequency responses".into();
+                return Err(AnalysisError::Setting { setting: "synthesis", why }.into());
+            }
+            (None, _) => outcome,
+        };
+        self.drawn(outcome, &modes, &shaped, &names)
+    }
+
+    /// Compares modes with those of `--compare`.
+    fn compared(&self, first: &ModeSet) -> Result<Outcome, CliError> {
+        let second = self.compare.as_ref().map(ModeSet::read).transpose()?;
+        let second = second.as_ref().unwrap_or(first);
+        let comparison = mechid::compare_modes(first, second)?;
+        Outcome::new(comparison.to_string(), &comparison)
     }
 
     /// Adds the pictures and the files of shapes that are asked for.
@@ -194,21 +280,35 @@ impl ModesArgs {
         Err(AnalysisError::Setting { setting, why }.into())
     }
 
-    /// Options of tests with forces, and whether they were given.
-    fn of_forces(&self) -> [(&'static str, bool); 6] {
-        [
+    /// Options of records with forces, and whether they were given.
+    fn of_records(&self) -> Vec<(&'static str, bool)> {
+        vec![
             ("force_at", !self.force_at.is_empty()),
             ("response_at", !self.response_at.is_empty()),
-            ("band_hz", self.band_hz.is_some()),
-            ("near_hz", !self.near_hz.is_empty()),
             ("validate_percent", self.validate_percent.is_some()),
+            ("validate", self.validate.is_some()),
             ("hits", self.hits.rule().is_some()),
+            ("ambient", self.unmeasured.ambient),
         ]
     }
 
+    /// Options of tests with forces, and whether they were given.
+    fn of_forces(&self) -> Vec<(&'static str, bool)> {
+        let mut options = self.of_records();
+        options.extend([
+            ("band_hz", self.band_hz.is_some()),
+            ("near_hz", !self.near_hz.is_empty()),
+            ("quantity", self.quantity.is_some()),
+            ("diagrams", self.diagrams),
+            ("synthesis", self.synthesis.is_some()),
+        ]);
+        options
+    }
+
     fn of_machine(&self, path: &Path) -> Result<Outcome, CliError> {
-        let of_forces = self.of_forces().into_iter().filter(|(name, _)| *name != "near_hz");
-        self.refuse("a machine", &of_forces.collect::<Vec<_>>())?;
+        let mut of_forces = self.of_forces();
+        of_forces.retain(|(name, _)| *name != "near_hz");
+        self.refuse("a machine", &of_forces)?;
         if self.modes.is_none() && !self.near_hz.is_empty() {
             let why = "of a machine it needs `modes`, the number to find".into();
             return Err(AnalysisError::Setting { setting: "near_hz", why }.into());
@@ -246,6 +346,7 @@ impl ModesArgs {
             modes: self.modes,
             max_modes: self.max_modes,
             near_hz: self.near_hz.clone(),
+            quantity: self.quantity.map(Into::into),
             places: Places { forces: self.force_at.clone(), responses: self.response_at.clone() },
             validate: self.validate_percent.unwrap_or(0.0) / 100.0,
         }

@@ -1,7 +1,9 @@
 //! `mechid modes` on records with forces: more modes than sensors, more points than sensors.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
+use nalgebra::Complex;
 use serde_json::Value;
 
 use super::{mechid, refused};
@@ -88,4 +90,114 @@ fn what_means_nothing_is_refused() {
         let message = refused(folder.path(), &format!("modes {arguments}"));
         assert!(message.contains(told), "{arguments}: {message}");
     }
+}
+
+/// Writes 4 s at 256 Hz of a machine of 20 Hz and 2 % under two random forces, the second with a gain, by
+/// an exact recursion, with what a fault makes of each channel.
+fn two_shakers(folder: &Path, name: &str, gain: f64, fault: impl Fn([f64; 4]) -> [f64; 4]) {
+    let (omega, zeta, dt) = (TAU * 20.0, 0.02, 1.0 / 256.0);
+    let pole = Complex::new(-zeta * omega, omega * (1.0f64 - zeta * zeta).sqrt());
+    let step = (pole * dt).exp();
+    let mut seed = 12_345_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let (mut state, mut text) = (Complex::new(0.0, 0.0), String::from("f1,f2,a1,a2\n"));
+    for _ in 0..1024 {
+        let forces = [random(), random()];
+        state = state * step + (step - 1.0) / pole * (forces[0] + gain * forces[1]);
+        let noise = [1e-6 * random(), 1e-6 * random()];
+        let row = fault([forces[0], forces[1], state.im + noise[0], 0.5 * state.im + noise[1]]);
+        text += &row.map(|value| format!("{value:e}")).join(",");
+        text.push('\n');
+    }
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+const SHAKERS: &str = "--force f1,f2 --displacement a1,a2 --sample-rate 256 --band-hz 5:60";
+
+#[test]
+fn faults_of_a_test_are_told_in_a_line_each() {
+    let folder = examples();
+    let path = folder.path();
+    two_shakers(path, "dead.csv", 0.6, |[f1, f2, a1, _]| [f1, f2, a1, 0.25]);
+    two_shakers(path, "off.csv", 0.6, |[f1, _, a1, a2]| [f1, 0.0, a1, a2]);
+    two_shakers(path, "one.csv", 0.6, |[f1, _, a1, a2]| [f1, 2.0 * f1, a1, a2]);
+    for (file, told) in [
+        ("dead.csv", "a2: constant or zero in the band, a sensor that is dead"),
+        ("off.csv", "force f2: constant or zero in the band, a shaker that is off"),
+        ("one.csv", "force f2 is a multiple of f1 in the band"),
+    ] {
+        let message = refused(path, &format!("modes {file} {SHAKERS}"));
+        assert!(message.contains(told) && message.trim_end().lines().count() == 1, "{message}");
+    }
+    // A shaker that is off, but whose channel has noise.
+    two_shakers(path, "noise.csv", 0.0, |[f1, f2, a1, a2]| [f1, 1e-3 * f2, a1, a2]);
+    let text = mechid(path, &format!("modes noise.csv {SHAKERS}"));
+    let warnings = text.lines().filter(|line| line.contains("f2 drives no mode")).count();
+    assert_eq!(warnings, 1, "{text}");
+    let silence = refused(
+        path,
+        "modes dead.csv --force f1,f2 --displacement a1 --sample-rate 256 --band-hz 90:120",
+    );
+    assert!(silence.contains("no mode in") && silence.trim_end().lines().count() == 1, "{silence}");
+}
+
+/// Judge: the machine behind the examples; the responses are averages of hits under an exponential window.
+#[test]
+fn a_table_gives_the_modes_of_the_record() {
+    let folder = examples();
+    let path = folder.path();
+    for table in ["table.csv", "table.unv"] {
+        mechid(
+            path,
+            &format!(
+                "frf hammer-1.csv --force force,0 --acceleration a1,a2 --hits --band-hz 2:100 \
+                 --exponential-percent 5 --output {table} --quiet"
+            ),
+        );
+        let report = modes(path, table);
+        let found = report["modes"].as_array().unwrap();
+        assert_eq!(found.len(), 2, "{report}");
+        for (mode, [hz, ratio]) in found.iter().zip([[12.0, 0.01], [31.0, 0.015]]) {
+            for (quantity, truth) in [("natural_frequency_hz", hz), ("damping_ratio", ratio)] {
+                let value = mode[quantity]["value"].as_f64().unwrap();
+                assert!((value / truth - 1.0).abs() < 0.02, "{quantity}: {value}, {truth}");
+            }
+        }
+        assert!(report["records"][0]["frequencies"].as_u64().unwrap() > 10, "{report}");
+    }
+    let message = refused(path, "modes hammer-1.csv");
+    assert!(message.trim_end().lines().count() == 1, "{message}");
+    assert!(refused(path, "modes table.csv --hits").contains("means nothing to a table"));
+}
+
+/// Judge: the same machine in two records, and the same machine as its description.
+#[test]
+fn two_results_are_compared() {
+    let folder = examples();
+    let path = folder.path();
+    let columns = "--force force --acceleration a1,a2 --response-at 1,2 --hits --band-hz 2:100";
+    let saved = mechid(path, &format!("modes hammer-1.csv {columns} --json"));
+    std::fs::write(path.join("first.json"), saved).unwrap();
+    let comparison = modes(path, &format!("hammer-2.csv {columns} --compare first.json"));
+    let pairs = comparison["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 2, "{comparison}");
+    for pair in pairs {
+        assert!(pair["mac"].as_f64().unwrap() > 0.9999, "{pair}");
+        let p = pair["natural_frequency_hz"]["p_value"].as_f64().unwrap();
+        assert!(p > 1e-3, "{pair}");
+    }
+    mechid(path, "modes first.json --compare first.json");
+    mechid(
+        path,
+        &format!(
+            "modes hammer-1.csv {columns} --shapes shapes.unv --synthesis frf.unv --diagrams --quiet"
+        ),
+    );
+    let with_model = modes(path, "first.json --compare shapes.unv");
+    assert_eq!(with_model["pairs"].as_array().unwrap().len(), 2, "{with_model}");
+    let again = modes(path, "frf.unv");
+    assert_eq!(again["modes"].as_array().unwrap().len(), 2, "{again}");
 }

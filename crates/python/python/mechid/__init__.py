@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._doors import bearing as bearing
+    from ._doors import compare_modes as compare_modes
     from ._doors import decay as decay
     from ._doors import frf as frf
     from ._doors import identify as identify
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from ._results import Inspected as Inspected
     from ._results import Machine as Machine
     from ._results import Mode as Mode
+    from ._results import ModeComparison as ModeComparison
     from ._results import Modes as Modes
     from ._results import Multisine as Multisine
     from ._results import Parameter as Parameter
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
 # Where each name is: imported when it is used, so that the program starts without NumPy.
 _HOMES = {
     "bearing": "_doors",
+    "compare_modes": "_doors",
     "decay": "_doors",
     "frf": "_doors",
     "identify": "_doors",
@@ -88,6 +91,7 @@ _HOMES = {
     "Inspected": "_results",
     "Machine": "_results",
     "Mode": "_results",
+    "ModeComparison": "_results",
     "Modes": "_results",
     "Multisine": "_results",
     "Parameter": "_results",
@@ -114,6 +118,7 @@ __all__ = [
     "Measurement",
     "MechidError",
     "Mode",
+    "ModeComparison",
     "Modes",
     "Multisine",
     "Parameter",
@@ -128,6 +133,7 @@ __all__ = [
     "Validation",
     "__version__",
     "bearing",
+    "compare_modes",
     "decay",
     "frf",
     "identify",

@@ -32,6 +32,7 @@ from ._results import (
     IdentifiedResponses,
     Inspected,
     Machine,
+    ModeComparison,
     Modes,
     Multisine,
     Reconstructed,
@@ -661,17 +662,20 @@ def modes(
     without_hz: Sequence[float] = (),
     without_harmonics: bool = False,
     validate: float = 0.0,
+    quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
+    diagrams: bool = False,
     settings: dict[str, Any] | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Modes:
-    """Find the modes of a test with forces, with any number of forces and responses, or of an ambient record.
+    """Find the modes of a test with forces, of tables of frequency responses, or of an ambient record.
 
     Parameters
     ----------
     *sources, **record
         One or several records, fitted together, as in `identify`; forces and responses need not belong
-        to the same degrees of freedom.
+        to the same degrees of freedom. Files without any option of a record, and `ResponseTable`, are
+        tables of frequency responses.
     band_hz : (float, float), optional
         Frequencies to use, in Hz; those that the forces drive, without.
     modes, max_modes : int, optional
@@ -691,6 +695,10 @@ def modes(
         Whether the harmonics that an ambient record shows are left out, too.
     validate : float
         Share of each record, at its end, that a second fit leaves out and predicts; none, without.
+    quantity : {"displacement", "velocity", "acceleration"}, optional
+        Measured quantity of the responses of tables that do not state it.
+    diagrams : bool
+        Whether the result has the stabilisation diagram and the mode indicator, as ``diagrams``.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
@@ -705,7 +713,11 @@ def modes(
     MechidError
         If the record cannot be read, or shows no mode in the band.
     """
-    records = [measured._inner for measured in measurements(sources, "modes", record)]
+    tables: list[ResponseTable] = []
+    is_path = [isinstance(source, str | os.PathLike) for source in sources]
+    if sources and not record and all(isinstance(s, ResponseTable) or p for s, p in zip(sources, is_path)):
+        tables = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in sources]  # type: ignore[arg-type]
+    records = [] if tables else [one._inner for one in measurements(sources, "modes", record)]
     if settings is None:
         if ambient:
             excluded = [float(hz) for hz in without_hz]
@@ -720,13 +732,77 @@ def modes(
             "modes": None if modes is None else _index("modes", modes),
             "max_modes": None if max_modes is None else _index("max_modes", max_modes),
             "near_hz": [float(hz) for hz in near_hz],
+            "quantity": quantity,
             "places": {
                 "forces": [str(place) for place in force_at],
                 "responses": [str(place) for place in response_at],
             },
             "validate": float(validate),
         }
-    return Modes(_mechid.modes(records, json.dumps(settings, default=_plain), threads))
+    given = [table._inner for table in tables]
+    return Modes(_mechid.modes(records, given, json.dumps(settings, default=_plain), bool(diagrams), threads))
+
+
+@careful
+def compare_modes(first: object, second: object) -> ModeComparison:
+    """Compare two sets of modes: a structure before and after a change, or a test and a model.
+
+    Modes are paired by frequency and shape, at the points that both sets have; differences stand beside
+    their standard errors and the probability of such a difference without a change.
+
+    Parameters
+    ----------
+    first, second : Modes, Decayed, Identified, Machine, path or mapping
+        A result with modes, a file (its JSON, the description of a machine, or a universal file with
+        datasets 55), or a mapping of arrays: ``natural_frequency_hz`` (modes,), ``shape`` (points, modes)
+        and, if they are known, ``damping_ratio`` (modes,) and ``points``, names such as ``"12+Z"``.
+
+    Returns
+    -------
+    ModeComparison
+
+    Raises
+    ------
+    MechidError
+        If a set has no mode with a shape, or the two have no point in common.
+
+    Examples
+    --------
+    >>> import mechid
+    >>> test = {"natural_frequency_hz": [10.0, 20.0], "shape": [[1.0, 1.0], [0.9, -1.0]]}
+    >>> model = {"natural_frequency_hz": [10.5, 20.0], "shape": [[1.0, 1.0], [1.0, -1.0]]}
+    >>> pair = mechid.compare_modes(test, model).pairs[0]
+    >>> round(pair["natural_frequency_hz"]["difference"], 6), pair["mac"] > 0.99
+    (0.5, True)
+    """
+    return ModeComparison(_mechid.compare_modes(_mode_set(first), _mode_set(second)))
+
+
+def _mode_set(source: object) -> tuple[str | os.PathLike[str], str | None]:
+    """Return a file, or a name and the JSON of modes."""
+    if isinstance(source, str | os.PathLike):
+        return source, None
+    if isinstance(source, Mapping):
+        frequencies = np.atleast_1d(np.asarray(source["natural_frequency_hz"], dtype=np.float64))
+        shapes = np.asarray(source["shape"], dtype=np.complex128)
+        if frequencies.ndim != 1 or shapes.ndim != 2 or shapes.shape[1] != len(frequencies):
+            raise ValueError(
+                f"`shape` has the shape {shapes.shape}, expected (points, {len(frequencies)}): a column a mode"
+            )
+        dampings = source.get("damping_ratio")
+        modes: list[dict[str, Any]] = []
+        for at, hz in enumerate(frequencies):
+            shape = [{"value": [value.real, value.imag]} for value in shapes[:, at].tolist()]
+            mode: dict[str, Any] = {"natural_frequency_hz": {"value": float(hz)}, "shape": shape}
+            if dampings is not None:
+                mode["damping_ratio"] = {"value": float(np.asarray(dampings)[at])}
+            modes.append(mode)
+        points = [str(point) for point in source.get("points", ())]
+        return "modes", json.dumps({"modes": modes, "response_names": points})
+    told = getattr(source, "to_json", None)
+    if told is None:
+        raise TypeError(f"modes are a result, a path or a mapping of arrays, not {type(source).__name__}")
+    return type(source).__name__, told()
 
 
 def reconstruct(

@@ -1076,6 +1076,17 @@ class Modes(Drawn):
         """What to know of the numbers."""
         return tuple(self._told["notes"])
 
+    @property
+    def checks(self) -> tuple[Mapping[str, Any], ...]:
+        """Checks of data and modes: ``code``, ``passed``, ``value`` and ``text`` of each."""
+        return tuple(MappingProxyType(row) for row in self._told["checks"])
+
+    @property
+    def diagrams(self) -> Mapping[str, Any] | None:
+        """Stabilisation diagram and mode indicator, if they were asked for."""
+        told = self._told.get("diagrams")
+        return None if told is None else MappingProxyType(told)
+
     def __repr__(self) -> str:
         frequencies = ", ".join(f"{mode.natural_frequency_hz.value:.5g} Hz" for mode in self.modes)
         return f"<Modes: {frequencies}>"
@@ -1159,6 +1170,48 @@ class IdentifiedElements(Drawn):
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={p.value:.6g}" for name, p in self.parameters.items())
         return f"<IdentifiedElements: {values}>"
+class ModeComparison(Bare):
+    """Two sets of modes side by side."""
+
+    _found: tuple[str, str]
+
+    def __init__(self, found: tuple[str, str]) -> None:
+        self.__dict__["_found"] = found
+
+    @property
+    def pairs(self) -> tuple[Mapping[str, Any], ...]:
+        """Modes that are one: their numbers, frequencies, damping ratios, MAC and probabilities."""
+        return tuple(MappingProxyType(row) for row in self._told["pairs"])
+
+    @property
+    def only_first(self) -> tuple[int, ...]:
+        """Numbers, from 1, of the modes of the first set without a partner."""
+        return tuple(row["mode"] for row in self._told["only_first"])
+
+    @property
+    def only_second(self) -> tuple[int, ...]:
+        """Numbers, from 1, of the modes of the second set without a partner."""
+        return tuple(row["mode"] for row in self._told["only_second"])
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Points that both sets have."""
+        return tuple(self._told["points"])
+
+    @property
+    def mac(self) -> NDArray[np.float64]:
+        """Modal assurance criterion of the modes of the first set (rows) with those of the second."""
+        return np.array(self._told["mac"], dtype=np.float64)
+
+    def to_json(self) -> str:
+        """Return the comparison as ``mechid modes --compare FILE --json`` prints it."""
+        return self._found[0]
+
+    def __str__(self) -> str:
+        return self._found[1]
+
+    def __repr__(self) -> str:
+        return f"<ModeComparison: {len(self.pairs)} pairs>"
 
 
 @final

@@ -6,7 +6,7 @@ mod elements;
 mod force;
 mod frf;
 pub mod modal;
-mod modes;
+pub mod modes;
 mod motion;
 pub mod receptance;
 mod record;
@@ -190,9 +190,10 @@ impl ToFigure for Decayed {
 }
 
 impl ToFigure for Modes {
-    /// Draws the responses of the first record over frequency, measured and explained by the modes.
+    /// Draws the responses of the first record over frequency, measured and explained by the modes, the
+    /// stabilisation diagram and the mode indicator.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
-        Ok(modes::figure(self))
+        modes::figure(self)
     }
 }
 

@@ -1,30 +1,132 @@
-//! Responses over frequency, measured and explained by modes.
+//! Responses over frequency, measured and explained by modes, stabilisation and mode indicator.
 
 use mechid_analysis::Modes;
+use mechid_analysis::modes::{ModeIndicator, StabilisationRows};
+use mechid_analysis::text::{compact, significant};
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
+
+use crate::ReportError;
 
 /// Points that a curve shows at most: more than it has dots.
 const SHOWN: usize = 4000;
 
-/// Root of the sum over all responses, each over its RMS in the band: measured, explained, and the
-/// difference, with the natural frequencies.
-pub fn figure(modes: &Modes) -> Figure {
-    let spectrum = modes.spectrum();
-    let step = spectrum.frequency_hz.len().div_ceil(SHOWN).max(1);
-    let every = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(step).collect() };
-    let frequency = every(&spectrum.frequency_hz);
+/// Draws the root of the sum over all responses, each over its RMS in the band: measured, explained,
+/// and the difference; below it the stabilisation diagram and the mode indicator.
+pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
     let summary = modes.summary();
     let natural: Vec<f64> =
         summary.modes.iter().map(|m| m.mode.row.natural_frequency_hz.value).collect();
-    let curve = |name: &str, values: &[f64]| Curve::line(name, &frequency, &every(values));
-    let mut panel =
-        Panel::new(Axis::linear("Frequency", "Hz"), Axis::log10("Responses over their RMS", ""))
-            .curve(curve("measured", &spectrum.measured).color(Color::GREY).width(2.4));
-    if !spectrum.modelled.is_empty() {
-        panel = panel
-            .curve(curve("modes", &spectrum.modelled).color(Color::VERMILION))
-            .curve(curve("difference", &spectrum.residual));
-    }
     let files: Vec<&str> = summary.records.iter().map(|record| record.file.as_str()).collect();
-    Figure::new(files.join(", ")).panel(panel).mark_x("natural frequencies", &natural)
+    let spectrum = modes.spectrum();
+    let diagrams = modes.diagrams()?;
+    let sum = (spectrum.frequency_hz.as_slice(), spectrum.measured.as_slice());
+    let below = [
+        stabilisation(&diagrams.stabilisation, sum),
+        diagrams.mode_indicator.as_ref().map(indicator),
+    ];
+    let figure = Figure::new(files.join(", ")).panel(responses(modes));
+    let figure = below.into_iter().flatten().fold(figure, Figure::panel);
+    Ok(figure.share_x().mark_x("natural frequencies", &natural))
+}
+
+/// Returns every value that is shown of many.
+fn thinned(values: &[f64]) -> Vec<f64> {
+    values.iter().copied().step_by(values.len().div_ceil(SHOWN).max(1)).collect()
+}
+
+fn responses(modes: &Modes) -> Panel {
+    let spectrum = modes.spectrum();
+    let frequency = thinned(&spectrum.frequency_hz);
+    let curve = |name: &str, values: &[f64]| Curve::line(name, &frequency, &thinned(values));
+    let axis = Axis::log10("Responses over their RMS", "");
+    let panel = Panel::new(Axis::linear("Frequency", "Hz"), axis)
+        .curve(curve("measured", &spectrum.measured).color(Color::GREY).width(2.4));
+    if spectrum.modelled.is_empty() {
+        return panel;
+    }
+    panel
+        .curve(curve("modes", &spectrum.modelled).color(Color::VERMILION))
+        .curve(curve("difference", &spectrum.residual))
+}
+
+/// Draws the poles of models of rising order over the sum of the responses (frequencies, in Hz, and
+/// magnitudes), whose logarithm is scaled to the height of the diagram; `None` without poles.
+///
+/// # Source
+/// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
+/// Analysis Conference (stabilisation diagram).
+pub fn stabilisation(poles: &StabilisationRows, sum: (&[f64], &[f64])) -> Option<Panel> {
+    let highest = *poles.order.iter().max()? as f64;
+    let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Order", ""));
+    let (frequency, magnitude) = (thinned(sum.0), thinned(sum.1));
+    let positive = || frequency.iter().zip(&magnitude).filter(|(_, value)| **value > 0.0);
+    let (low, high) =
+        positive().fold((f64::INFINITY, 0.0f64), |(a, b), (_, v)| (a.min(*v), b.max(*v)));
+    if high > low {
+        let x: Vec<f64> = positive().map(|(hz, _)| *hz).collect();
+        let scaled = |value: f64| highest * (value / low).ln() / (high / low).ln();
+        let y: Vec<f64> = positive().map(|(_, value)| scaled(*value)).collect();
+        let curve = Curve::line("sum of the responses, logarithm", &x, &y);
+        panel = panel.curve(curve.color(Color::GREY).width(1.2));
+    }
+    let looks =
+        [("stable pole", true, 0, Color::BLUE), ("new or moving pole", false, 5, Color::VERMILION)];
+    for (name, is_stable, slot, color) in looks {
+        let some: Vec<usize> =
+            (0..poles.order.len()).filter(|at| poles.is_stable[*at] == is_stable).collect();
+        if some.is_empty() {
+            continue;
+        }
+        let x: Vec<f64> = some.iter().map(|at| poles.frequency_hz[*at]).collect();
+        let y: Vec<f64> = some.iter().map(|at| poles.order[*at] as f64).collect();
+        let words = |at: &usize| {
+            format!(
+                "order {}: {} Hz, damping ratio {} %",
+                poles.order[*at],
+                compact(poles.frequency_hz[*at], 6),
+                significant(100.0 * poles.damping_ratio[*at], 3)
+            )
+        };
+        let notes = some.iter().map(words).collect();
+        panel = panel.curve(Curve::points(name, &x, &y).slot(slot).color(color).notes(notes));
+    }
+    Some(panel)
+}
+
+fn indicator(indicator: &ModeIndicator) -> Panel {
+    let frequency = thinned(&indicator.frequency_hz);
+    let name = if indicator.is_measured { "Mode indicator" } else { "Mode indicator of the modes" };
+    let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::log10(name, ""));
+    for (number, values) in (1..).zip(&indicator.singular_values) {
+        let pairs: Vec<(f64, f64)> =
+            frequency.iter().copied().zip(thinned(values)).filter(|(_, v)| *v > 0.0).collect();
+        if pairs.is_empty() {
+            continue;
+        }
+        let (x, y): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
+        panel = panel.curve(Curve::line(format!("singular value {number}"), &x, &y));
+    }
+    panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_are_drawn_with_their_words_over_the_scaled_sum() {
+        let poles = StabilisationRows {
+            order: vec![2, 4],
+            frequency_hz: vec![5.0, 5.01],
+            damping_ratio: vec![0.02; 2],
+            is_stable: vec![false, true],
+        };
+        let sum: (&[f64], &[f64]) = (&[1.0, 5.0, 9.0], &[1e-6, 1e-3, 0.0]);
+        let figure = Figure::new("").panel(stabilisation(&poles, sum).unwrap());
+        let curves = figure.panels()[0].data();
+        assert_eq!(curves[0].y(), [0.0, 4.0]);
+        let svg = figure.to_interactive_svg("s", "s").unwrap();
+        assert!(svg.contains("order 4: 5.01 Hz, damping ratio 2.00 %"), "{svg}");
+        assert!(stabilisation(&StabilisationRows::default(), sum).is_none());
+    }
 }

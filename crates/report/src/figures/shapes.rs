@@ -1,9 +1,9 @@
-//! Shapes of modes on the points of a structure: deflected lines, likeness of the shapes, stabilisation.
+//! Shapes of modes on the points of a structure: deflected lines and likeness of the shapes.
 
 use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::text::{compact, significant};
 use mechid_io::{Geometry, PointShape};
-use mechid_plot::{Axis, Color, Curve, DrawnMode, DrawnSet, Figure, Panel, ShapeDrawing};
+use mechid_plot::{DrawnMode, DrawnSet, ShapeDrawing};
 use nalgebra::Complex;
 
 /// Modes with their shapes at the points of a structure.
@@ -13,19 +13,6 @@ pub struct ModeShapes {
     pub geometry: Geometry,
     /// The modes, by rising frequency; each with a displacement for every point.
     pub modes: Vec<PointShape>,
-}
-
-/// A pole of a model of some order, in a stabilisation diagram.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StabilisationPole {
-    /// Order of the model.
-    pub order: usize,
-    /// Natural frequency, in Hz.
-    pub frequency_hz: f64,
-    /// Damping ratio, a pure number.
-    pub damping_ratio: f64,
-    /// `true` if frequency and damping repeat those of the order below.
-    pub is_stable: bool,
 }
 
 impl ModeShapes {
@@ -95,49 +82,6 @@ impl ModeShapes {
     }
 }
 
-/// Draws the poles of models of rising order over the sum of the responses, which is scaled to the
-/// height of the diagram: its logarithm from the smallest to the largest value. `sum` has
-/// frequencies, in Hz, and magnitudes, one for each frequency.
-///
-/// # Source
-/// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
-/// Analysis Conference (stabilisation diagram).
-pub fn stabilisation(title: &str, poles: &[StabilisationPole], sum: (&[f64], &[f64])) -> Figure {
-    let highest = poles.iter().map(|pole| pole.order).max().unwrap_or(1) as f64;
-    let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Order", ""));
-    let positive = || sum.0.iter().zip(sum.1).filter(|(_, value)| **value > 0.0);
-    let (low, high) =
-        positive().fold((f64::INFINITY, 0.0f64), |(a, b), (_, v)| (a.min(*v), b.max(*v)));
-    if high > low {
-        let x: Vec<f64> = positive().map(|(hz, _)| *hz).collect();
-        let scaled = |value: f64| highest * (value / low).ln() / (high / low).ln();
-        let y: Vec<f64> = positive().map(|(_, value)| scaled(*value)).collect();
-        let curve = Curve::line("sum of the responses, logarithm", &x, &y);
-        panel = panel.curve(curve.color(Color::GREY).width(1.2));
-    }
-    for (name, is_stable, slot) in [("stable", true, 0), ("new or moving", false, 5)] {
-        let some: Vec<&StabilisationPole> =
-            poles.iter().filter(|pole| pole.is_stable == is_stable).collect();
-        if some.is_empty() {
-            continue;
-        }
-        let x: Vec<f64> = some.iter().map(|pole| pole.frequency_hz).collect();
-        let y: Vec<f64> = some.iter().map(|pole| pole.order as f64).collect();
-        let words = |pole: &&StabilisationPole| {
-            format!(
-                "order {}: {} Hz, damping ratio {} %",
-                pole.order,
-                compact(pole.frequency_hz, 6),
-                significant(100.0 * pole.damping_ratio, 3)
-            )
-        };
-        let notes = some.iter().map(words).collect();
-        let color = if is_stable { Color::BLUE } else { Color::VERMILION };
-        panel = panel.curve(Curve::points(name, &x, &y).slot(slot).color(color).notes(notes));
-    }
-    Figure::new(title).panel(panel)
-}
-
 #[cfg(test)]
 mod tests {
     use mechid_plot::matrix_of_squares;
@@ -189,21 +133,5 @@ mod tests {
         assert_eq!(drawing(&one), drawing(&hundred));
         assert!(one.svg.contains("class=\"shape\""));
         assert_eq!(one.map.len(), 1);
-    }
-
-    #[test]
-    fn poles_are_drawn_with_their_words_over_the_scaled_sum() {
-        let pole = |order, frequency_hz, is_stable| StabilisationPole {
-            order,
-            frequency_hz,
-            damping_ratio: 0.02,
-            is_stable,
-        };
-        let poles = [pole(2, 5.0, false), pole(4, 5.01, true)];
-        let figure = stabilisation("", &poles, (&[1.0, 5.0, 9.0], &[1e-6, 1e-3, 0.0]));
-        let curves = figure.panels()[0].data();
-        assert_eq!(curves[0].y(), [0.0, 4.0]);
-        let svg = figure.to_interactive_svg("s", "s").unwrap();
-        assert!(svg.contains("order 4: 5.01 Hz, damping ratio 2.00 %"), "{svg}");
     }
 }

@@ -1,15 +1,22 @@
-//! Checks of a modal test: channels before the fit, and what the fit leaves.
+//! Checks of a modal test: channels and tables before the fit, what the fit leaves, and the modes.
+
+mod driving_point;
+mod idle_force;
+mod reciprocity;
+mod table;
+mod tested;
 
 use mechid_checks::Verdict;
+use mechid_modal::IdentifiedMode;
 
+pub(super) use self::table::of_tables;
+use self::tested::Tested;
+use super::sources::Output;
 use super::summary::ModalCheck;
 use crate::AnalysisError;
 use crate::identify::checks;
+use crate::limits::LEAST_EXPLAINED;
 use crate::measurement::Measurement;
-
-/// Share of the variance of a response that the modes must explain; below it most of the motion is
-/// something else, and shapes there mean little.
-const EXPLAINED: f64 = 0.5;
 
 /// Returns the checks of all channels: clipped, constant, spiked, quantised.
 pub(super) fn of_channels(measurements: &[Measurement]) -> Result<Vec<ModalCheck>, AnalysisError> {
@@ -32,7 +39,7 @@ pub(super) fn of_channels(measurements: &[Measurement]) -> Result<Vec<ModalCheck
 pub(super) fn of_outputs(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let row = |(share, name): (&f64, &String)| ModalCheck {
         code: "explained",
-        passed: *share >= EXPLAINED,
+        passed: *share >= LEAST_EXPLAINED,
         value: *share,
         text: format!(
             "the modes explain {:.1} % of the variance of {name} in the band: the rest is noise, a \
@@ -41,4 +48,19 @@ pub(super) fn of_outputs(explained: &[f64], names: &[String]) -> Vec<ModalCheck>
         ),
     };
     explained.iter().zip(names).map(row).collect()
+}
+
+/// Returns the checks of the modes: forces that drive none, modal masses at driving points, and
+/// reciprocity between these.
+pub(super) fn of_modes(
+    modes: &[IdentifiedMode],
+    inputs: &[String],
+    outputs: &[Output],
+    driving_points: &[(usize, usize)],
+) -> Vec<ModalCheck> {
+    let mut rows = idle_force::checks(modes, inputs);
+    let mut tests: Vec<Tested> = driving_point::tests(modes, inputs, outputs, driving_points);
+    tests.extend(reciprocity::tests(modes, inputs, outputs, driving_points));
+    rows.extend(tested::adjusted(tests));
+    rows
 }

@@ -1,0 +1,178 @@
+//! Responses that are averages over segments of records: what ties their lines together, and what the
+//! window of the segments blunts.
+
+use std::f64::consts::TAU;
+
+use mechid_io::FrequencyResponses;
+use mechid_modal::{IdentifiedMode, ModalEstimate, ModalSettings, identify_modes};
+use mechid_spectra::LineData;
+use mechid_spectra::frf::{Segments, smoothing_bias};
+use nalgebra::{Complex, DMatrix};
+
+use super::tables::Tables;
+use crate::AnalysisError;
+use crate::limits::{LINE_CORRELATION, MOST_SEGMENT_WORK, SHARPENING_ROUNDS, SHARPENING_SETTLED};
+
+/// Deviation of a frequency from a line, in lines, up to which it is one in spite of the digits of a
+/// file.
+const OF_LINE: f64 = 1e-3;
+
+/// Segments that the responses of a table are averages over.
+#[derive(Debug, Clone)]
+pub(super) struct Averaged {
+    /// Number of the spectral line of each row of the table.
+    lines: Vec<usize>,
+    /// Distance of the lines of a segment, in Hz.
+    pub spacing_hz: f64,
+    /// Distance, in lines, from which on errors are independent.
+    step: usize,
+    /// Ratio of a standard error to that of independent lines, of lines `step` apart.
+    pub inflation: f64,
+    /// Weights by which the window smooths the responses; empty where it does not.
+    smoothing: Vec<f64>,
+}
+
+impl Averaged {
+    /// Returns the segments that a table states; `None` if it states none, has other frequencies than
+    /// their lines, or states segments so long that their window costs more than the table.
+    pub fn new(table: &FrequencyResponses) -> Option<Self> {
+        let stated = table.segments?;
+        if stated.samples.saturating_mul(stated.samples.div_ceil(stated.hop)) > MOST_SEGMENT_WORK {
+            return None;
+        }
+        let spacing_hz = stated.sample_rate_hz / stated.samples as f64;
+        let lines: Vec<f64> = table.frequency_hz.iter().map(|hz| hz / spacing_hz).collect();
+        if lines.iter().any(|line| (line - line.round()).abs() > OF_LINE || *line < 0.0) {
+            return None;
+        }
+        let segments = match stated.window {
+            None => Segments::Periods(stated.samples),
+            Some(window) => Segments::Windowed { len: stated.samples, hop: stated.hop, window },
+        };
+        let correlation = segments.line_correlation(stated.count);
+        let tied = |apart: usize| correlation.get(apart).copied().unwrap_or(0.0);
+        let step = (1..).find(|apart| tied(*apart) < LINE_CORRELATION).unwrap_or(1);
+        let rest: f64 = (1..).map_while(|k| correlation.get(k * step)).sum();
+        let lines = lines.into_iter().map(|line| line.round() as usize).collect();
+        let inflation = (1.0 + 2.0 * rest).sqrt();
+        let smoothing = segments.smoothing();
+        Some(Self { lines, spacing_hz, step, inflation, smoothing })
+    }
+
+    /// Returns whether the window of the segments blunts resonances.
+    pub fn is_smoothed(&self) -> bool {
+        !self.smoothing.is_empty()
+    }
+
+    /// Returns those of some rows whose errors are independent of one another.
+    pub fn independent(&self, rows: impl Iterator<Item = usize>) -> Vec<usize> {
+        let mut next = 0;
+        rows.filter(|row| {
+            let is_taken = self.lines[*row] >= next;
+            if is_taken {
+                next = self.lines[*row] + self.step;
+            }
+            is_taken
+        })
+        .collect()
+    }
+
+    /// Returns what the averages add to the responses of a model on some rows.
+    pub fn bias(
+        &self,
+        rows: &[usize],
+        model: &ModalEstimate,
+    ) -> Vec<Option<DMatrix<Complex<f64>>>> {
+        if !self.is_smoothed() {
+            return Vec::new();
+        }
+        let lines: Vec<usize> = rows.iter().map(|row| self.lines[*row]).collect();
+        let response = |omega: f64| (omega > 0.0).then(|| model.response(omega));
+        smoothing_bias(&self.smoothing, &lines, TAU * self.spacing_hz, &response)
+    }
+}
+
+/// Modes of tables, the lines that they were fitted to, and whether what a window blunts was separated
+/// from them.
+pub(super) struct Sharpened {
+    pub data: LineData,
+    pub estimate: ModalEstimate,
+    pub settled: bool,
+}
+
+impl Sharpened {
+    /// Fits the modes, and again to the responses less what their window blunts of these modes, until
+    /// they stay.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias by a window).
+    pub fn new(
+        tables: &Tables,
+        band_hz: [f64; 2],
+        settings: &ModalSettings,
+    ) -> Result<Self, AnalysisError> {
+        let data = tables.lines(band_hz, None)?;
+        let estimate = identify_modes(&data, settings)?;
+        let mut fit = Self { data, estimate, settled: !tables.is_smoothed() };
+        for _ in 0..SHARPENING_ROUNDS {
+            if fit.settled {
+                break;
+            }
+            let data = tables.lines(band_hz, Some(&fit.estimate))?;
+            let estimate = identify_modes(&data, settings)?;
+            let change = largest_change(fit.estimate.modes(), estimate.modes());
+            let settled = change < SHARPENING_SETTLED;
+            fit = Self { data, estimate, settled };
+        }
+        Ok(fit)
+    }
+}
+
+/// Returns the largest change of a frequency or damping ratio in standard errors; infinite if the
+/// numbers of modes differ.
+fn largest_change(before: &[IdentifiedMode], after: &[IdentifiedMode]) -> f64 {
+    if before.len() != after.len() {
+        return f64::INFINITY;
+    }
+    let change = |(one, two): (&IdentifiedMode, &IdentifiedMode)| {
+        let frequency = two.natural_frequency_hz.value - one.natural_frequency_hz.value;
+        let damping = two.damping_ratio.value - one.damping_ratio.value;
+        let frequency = frequency.abs() / two.natural_frequency_hz.standard_error;
+        frequency.max(damping.abs() / two.damping_ratio.standard_error)
+    };
+    before.iter().zip(after).map(change).fold(0.0, f64::max)
+}
+
+/// Returns a mode without the decay rate (1/s) that an exponential window adds, and with standard
+/// errors `inflation` times as large.
+pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64) -> IdentifiedMode {
+    let mut mode = mode.clone();
+    let scaled = |errors: &mut Vec<Complex<f64>>| errors.iter_mut().for_each(|e| *e *= inflation);
+    scaled(&mut mode.shape_standard_error);
+    scaled(&mut mode.participation_standard_error);
+    let (f, zeta) = (mode.natural_frequency_hz.clone(), mode.damping_ratio.clone());
+    let variance = [f.standard_error.powi(2), zeta.standard_error.powi(2)];
+    let between = mode.frequency_damping_covariance;
+    // (f, ζ) → (σ, ω_d) of the windowed pole → (f, ζ) of the pole without the window.
+    let windowed = mode.pole;
+    mode.pole.re += added_decay;
+    let to_pole = frequency_and_damping_slopes(windowed).try_inverse().unwrap_or_default();
+    let slopes = frequency_and_damping_slopes(mode.pole) * to_pole;
+    let covariance = nalgebra::Matrix2::new(variance[0], between, between, variance[1]);
+    let covariance = slopes * covariance * slopes.transpose() * inflation.powi(2);
+    let size = mode.pole.norm();
+    mode.natural_frequency_hz.value = size / TAU;
+    mode.natural_frequency_hz.standard_error = covariance[(0, 0)].max(0.0).sqrt();
+    mode.damping_ratio.value = -mode.pole.re / size;
+    mode.damping_ratio.standard_error = covariance[(1, 1)].max(0.0).sqrt();
+    mode.frequency_damping_covariance = covariance[(0, 1)];
+    mode
+}
+
+/// Derivatives of natural frequency (Hz) and damping ratio (rows) by real and imaginary part of the
+/// pole (columns).
+fn frequency_and_damping_slopes(pole: Complex<f64>) -> nalgebra::Matrix2<f64> {
+    let (re, im, size) = (pole.re, pole.im, pole.norm());
+    let cubed = size.powi(3);
+    nalgebra::Matrix2::new(re / size / TAU, im / size / TAU, -im * im / cubed, re * im / cubed)
+}

@@ -1,0 +1,71 @@
+//! Reciprocity between driving points: the response at one to a force at the other, and the reverse.
+
+use mechid_io::derivative;
+use mechid_modal::IdentifiedMode;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::super::sources::Output;
+use super::driving_point::{receptance_residue, relative_error};
+use super::tested::Tested;
+
+/// Returns, for each pair of driving points, the test that the residues of all modes are the same in
+/// both directions.
+///
+/// Errors of shapes and participations are taken as independent; those of the common scale are not,
+/// which makes the test a cautious one.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.7 (Maxwell's reciprocity of receptances).
+pub(super) fn tests(
+    modes: &[IdentifiedMode],
+    inputs: &[String],
+    outputs: &[Output],
+    driving_points: &[(usize, usize)],
+) -> Vec<Tested> {
+    let mut tests = Vec::new();
+    for (at, one) in driving_points.iter().enumerate() {
+        for two in &driving_points[at + 1..] {
+            tests.extend(test(modes, inputs, outputs, [*one, *two]));
+        }
+    }
+    tests
+}
+
+fn test(
+    modes: &[IdentifiedMode],
+    inputs: &[String],
+    outputs: &[Output],
+    [(force, point), (other_force, other_point)]: [(usize, usize); 2],
+) -> Option<Tested> {
+    let power = |output: usize| Some(derivative(outputs[output].quantity?) as i32);
+    let (first_power, second_power) = (power(point)?, power(other_point)?);
+    let (mut statistic, mut worst) = (0.0, (0.0, 0.0, 0.0));
+    for mode in modes {
+        let first = receptance_residue(mode, point, other_force, first_power);
+        let second = receptance_residue(mode, other_point, force, second_power);
+        let variance = (first.norm() * relative_error(mode, point, other_force)).powi(2)
+            + (second.norm() * relative_error(mode, other_point, force)).powi(2);
+        let square = 2.0 * (first - second).norm_sqr() / variance;
+        statistic += square;
+        if square > worst.0 {
+            let ratio = (first - second).norm() / first.norm().max(second.norm());
+            worst = (square, mode.natural_frequency_hz.value, ratio);
+        }
+    }
+    let distribution = ChiSquared::new(2.0 * modes.len() as f64).ok()?;
+    let (_, hz, ratio) = worst;
+    Some(Tested {
+        code: "reciprocity",
+        p_value: distribution.sf(statistic.min(f64::MAX)),
+        text: format!(
+            "{} per {} and {} per {} differ, most in the mode at {hz:.4} Hz, by {:.2} %: a wrong \
+             calibration or place, forces that are not the ones measured, or a structure that \
+             is not reciprocal",
+            outputs[point].name,
+            inputs[other_force],
+            outputs[other_point].name,
+            inputs[force],
+            100.0 * ratio
+        ),
+    })
+}

@@ -1,0 +1,122 @@
+//! Checks of tables of frequency responses: units, coherence, and resonances against the segments.
+
+use mechid_checks::Verdict;
+use mechid_checks::limits::{INCOHERENCE_DOUBTFUL, RESONANCE_LINES};
+use mechid_io::FrequencyResponses;
+use mechid_modal::IdentifiedMode;
+
+use super::super::averaged::Averaged;
+use super::super::summary::ModalCheck;
+use super::super::tables::{Tables, rows};
+use crate::identify::checks::sentence;
+use crate::measurement::Channels;
+use crate::measurement::units::doubt;
+use crate::text::significant;
+
+/// Returns the checks of tables; `settled` says whether what a window blunts was separated from the modes.
+pub(in super::super) fn of_tables(
+    tables: &Tables,
+    band_hz: [f64; 2],
+    modes: &[IdentifiedMode],
+    settled: bool,
+) -> Vec<ModalCheck> {
+    let mut checks = Vec::new();
+    for (table, averaged) in tables.with_segments() {
+        checks.extend(units(table));
+        checks.extend(coherence(table, &rows(table, None, band_hz)));
+        checks.extend(leakage(table, averaged, modes, settled));
+    }
+    checks
+}
+
+/// Texts of a header that may be units.
+fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
+    let doubts = table.doubts.iter();
+    let findings = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
+    let check = |finding: mechid_checks::Finding| ModalCheck {
+        code: "unit",
+        passed: finding.verdict() == Verdict::Good,
+        value: finding.value(),
+        text: format!("{}: {}", table.file, sentence(&finding, &Channels::default())),
+    };
+    findings.map(check).collect()
+}
+
+/// Median coherence over the rows and functions of a table. It does not weigh the fit, in which noise
+/// and unmeasured forces are estimated from the residual.
+fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
+    let values = table.coherence.iter();
+    let mut values: Vec<f64> = values.flat_map(|c| rows.iter().map(|row| c.values[*row])).collect();
+    values.sort_by(f64::total_cmp);
+    let median = *values.get(values.len() / 2)?;
+    let impossible = values.iter().filter(|value| !(0.0..=1.0).contains(*value)).count();
+    let text = if impossible > 0 {
+        format!(
+            "{}: {impossible} of {} values of the coherence are not between 0 and 1, so it is none",
+            table.file,
+            values.len()
+        )
+    } else {
+        format!(
+            "{}: median coherence {median:.4} in the band: noise, leakage, or other forces",
+            table.file
+        )
+    };
+    let passed = impossible == 0 && median >= 1.0 - INCOHERENCE_DOUBTFUL;
+    Some(ModalCheck { code: "coherence", passed, value: median, text })
+}
+
+/// Width of the narrowest resonance in lines; `None` of periods and of hits, which no window blunts, and
+/// of unevenly spaced frequencies without segments.
+fn leakage(
+    table: &FrequencyResponses,
+    averaged: Option<&Averaged>,
+    modes: &[IdentifiedMode],
+    settled: bool,
+) -> Option<ModalCheck> {
+    let spacing_hz = match averaged {
+        Some(averaged) => Some(averaged.spacing_hz).filter(|_| averaged.is_smoothed())?,
+        None => even_spacing_hz(&table.frequency_hz)?,
+    };
+    let width = |mode: &IdentifiedMode| {
+        2.0 * mode.damping_ratio.value.abs() * mode.natural_frequency_hz.value / spacing_hz
+    };
+    let narrowest = modes.iter().min_by(|a, b| width(a).total_cmp(&width(b)))?;
+    let lines = width(narrowest);
+    let why = match averaged {
+        Some(_) if settled => {
+            "a segment wide: its damping follows from what the window blunts, and its intervals are not \
+             reliable; use longer segments, or fit the record itself"
+        }
+        Some(_) => {
+            "a segment wide: what the window blunts could not be separated from it, and its intervals \
+             are not reliable; use longer segments, or fit the record itself"
+        }
+        None => {
+            "the table wide, which does not state its segments: if they are averages under a window, the \
+             damping is that of the window; fit the record itself"
+        }
+    };
+    Some(ModalCheck {
+        code: "leakage",
+        passed: settled && lines >= RESONANCE_LINES,
+        value: lines,
+        text: format!(
+            "{}: the resonance at {:.4} Hz is {} lines of {why}",
+            table.file,
+            narrowest.natural_frequency_hz.value,
+            significant(lines, 2)
+        ),
+    })
+}
+
+/// Deviation of a distance of two frequencies from the first one, relative to it, in spite of the digits of
+/// a file.
+const EVEN: f64 = 1e-2;
+
+/// Returns the distance of the frequencies, in Hz, if all are the same.
+fn even_spacing_hz(frequency_hz: &[f64]) -> Option<f64> {
+    let mut distances = frequency_hz.windows(2).map(|pair| pair[1] - pair[0]);
+    let first = distances.next()?;
+    distances.all(|distance| (distance - first).abs() <= EVEN * first).then_some(first)
+}

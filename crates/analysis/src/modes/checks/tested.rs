@@ -1,0 +1,54 @@
+//! Checks that are tests of a hypothesis, with one error rate for all of them.
+
+use super::super::summary::ModalCheck;
+use crate::limits::MODAL_SIGNIFICANCE;
+use crate::text::significant;
+
+/// Test of modes against what a structure of constant M, C and K obeys.
+pub(super) struct Tested {
+    /// Name of the check, in snake case.
+    pub code: &'static str,
+    /// Probability of a statistic as large, by the errors of the modes alone.
+    pub p_value: f64,
+    /// The finding if the test fails, in a sentence.
+    pub text: String,
+}
+
+/// Returns tests as checks, their p-values adjusted for their number.
+///
+/// # Source
+/// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
+pub(super) fn adjusted(mut tests: Vec<Tested>) -> Vec<ModalCheck> {
+    let mut order: Vec<usize> = (0..tests.len()).collect();
+    order.sort_by(|a, b| tests[*a].p_value.total_cmp(&tests[*b].p_value));
+    let mut least = 0.0_f64;
+    for (rank, at) in order.iter().enumerate() {
+        least = least.max((tests.len() - rank) as f64 * tests[*at].p_value).min(1.0);
+        tests[*at].p_value = least;
+    }
+    let row = |Tested { code, p_value, text }: Tested| ModalCheck {
+        code,
+        passed: p_value >= MODAL_SIGNIFICANCE,
+        value: p_value,
+        text: format!("{text} (p = {})", significant(p_value, 2)),
+    };
+    tests.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.
+    #[test]
+    fn p_values_are_those_of_holm() {
+        let test = |p_value| Tested { code: "a", p_value, text: String::new() };
+        let checks = adjusted([0.01, 0.04, 0.03, 0.005].map(test).into());
+        for (check, expected) in checks.iter().zip([0.03, 0.06, 0.06, 0.02]) {
+            assert!((check.value - expected).abs() < 1e-12, "{} {expected}", check.value);
+            assert!(check.passed);
+        }
+        let [check] = adjusted(vec![test(0.001)]).try_into().unwrap();
+        assert!(!check.passed);
+    }
+}

@@ -1,0 +1,305 @@
+//! Comparison of two sets of modes: a structure before and after a change, or a test and a model.
+
+use std::fmt;
+
+use mechid_io::Direction;
+use mechid_modal::compare::{self, Difference, Measured, ModePair, PairingRule};
+use mechid_modal::indicators::mac;
+use mechid_signal::message;
+use serde::Serialize;
+
+use super::mode_set::ModeSet;
+use crate::AnalysisError;
+use crate::limits::MODAL_SIGNIFICANCE;
+use crate::text::{paged_table, significant, text_table};
+
+/// Two sets of modes side by side.
+///
+/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModeComparison {
+    /// Names of the two sets.
+    pub sets: [String; 2],
+    /// Points that both sets have, by their names in the first.
+    pub points: Vec<String>,
+    /// Modes of one set and the other that are one, by rising frequency of the first set.
+    pub pairs: Vec<PairRow>,
+    /// Modes of the first set without a partner.
+    pub only_first: Vec<LoneRow>,
+    /// Modes of the second set without a partner.
+    pub only_second: Vec<LoneRow>,
+    /// Modal assurance criterion of each mode of the first set (rows) with each of the second, a pure
+    /// number from 0 to 1.
+    pub mac: Vec<Vec<f64>>,
+}
+
+/// A pair of modes.
+#[derive(Debug, Clone, Serialize)]
+pub struct PairRow {
+    /// Number of the mode in the first set, from 1.
+    pub first: usize,
+    /// Number of the mode in the second set, from 1.
+    pub second: usize,
+    /// Natural frequencies, in Hz.
+    pub natural_frequency_hz: DifferenceRow,
+    /// Damping ratios, pure numbers; `None` if one set has none.
+    pub damping_ratio: Option<DifferenceRow>,
+    /// Modal assurance criterion, a pure number.
+    pub mac: f64,
+    /// Its standard error, a pure number.
+    pub mac_standard_error: f64,
+    /// Probability of a difference of the shapes as large by their errors alone, adjusted for all tests;
+    /// `None` without errors, or at a single point.
+    pub shape_p_value: Option<f64>,
+}
+
+/// A quantity in both sets, in its unit.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct DifferenceRow {
+    /// Value in the first set.
+    pub first: f64,
+    /// Value in the second set.
+    pub second: f64,
+    /// Second less first.
+    pub difference: f64,
+    /// Standard error of the difference; 0 if both values are exact.
+    pub standard_error: f64,
+    /// Probability of a difference as large by the errors alone, adjusted for all tests of the
+    /// comparison; `None` if both values are exact.
+    pub p_value: Option<f64>,
+}
+
+/// A mode without a partner.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct LoneRow {
+    /// Number of the mode, from 1.
+    pub mode: usize,
+    /// Natural frequency, in Hz.
+    pub natural_frequency_hz: f64,
+}
+
+/// Compares two sets of modes at the points that they have in common: pairs by frequency and shape,
+/// differences over their standard errors, and modes without a partner.
+///
+/// Points are the same if their names are. A name without a direction (`3`) is that of the only
+/// direction that the other set has there (`3+Z`). Sets without a name in common, but with as many
+/// entries, are compared entry by entry where the names of one of them are numbers from 1.
+///
+/// # Errors
+/// [`AnalysisError::NoCommonPoint`] if they have none.
+///
+/// # Source
+/// That of [`mechid_modal::compare::compare`].
+pub fn compare_modes(first: &ModeSet, second: &ModeSet) -> Result<ModeComparison, AnalysisError> {
+    let common = common_points(first, second)?;
+    let one: Vec<(usize, f64)> = common.iter().map(|(i, _, _)| (*i, 1.0)).collect();
+    let two: Vec<(usize, f64)> = common.iter().map(|(_, j, sign)| (*j, *sign)).collect();
+    let (one, two) = (first.at(&one)?, second.at(&two)?);
+    let comparison = compare::compare(&one, &two, PairingRule::default())?;
+    let pair = |pair: &ModePair| {
+        let (a, b) = (&one[pair.first], &two[pair.second]);
+        PairRow {
+            first: pair.first + 1,
+            second: pair.second + 1,
+            natural_frequency_hz: DifferenceRow::new(
+                a.natural_frequency_hz,
+                b.natural_frequency_hz,
+                pair.natural_frequency_hz,
+            ),
+            damping_ratio: pair.damping_ratio.and_then(|difference| {
+                Some(DifferenceRow::new(a.damping_ratio?, b.damping_ratio?, difference))
+            }),
+            mac: pair.mac.value,
+            mac_standard_error: pair.mac.standard_error,
+            shape_p_value: pair.shape.map(|test| test.adjusted_p_value),
+        }
+    };
+    let lone = |set: &[compare::ComparedMode], at: &usize| LoneRow {
+        mode: at + 1,
+        natural_frequency_hz: set[*at].natural_frequency_hz.value,
+    };
+    let row = |a: &compare::ComparedMode| {
+        two.iter().map(|b| mac(a.shape.shape(), b.shape.shape())).collect()
+    };
+    Ok(ModeComparison {
+        sets: [first.name.clone(), second.name.clone()],
+        points: common.iter().map(|(i, _, _)| first.points[*i].clone()).collect(),
+        pairs: comparison.pairs.iter().map(pair).collect(),
+        only_first: comparison.only_first.iter().map(|at| lone(&one, at)).collect(),
+        only_second: comparison.only_second.iter().map(|at| lone(&two, at)).collect(),
+        mac: one.iter().map(row).collect(),
+    })
+}
+
+/// Returns the entries of both sets that belong together, with the sign of the second.
+fn common_points(
+    first: &ModeSet,
+    second: &ModeSet,
+) -> Result<Vec<(usize, usize, f64)>, AnalysisError> {
+    let partner = |name: &String| {
+        second.points.iter().position(|other| other == name).map(|at| (at, 1.0)).or_else(|| {
+            let directions = |at: &usize| same_direction(name, &second.points[*at]);
+            let mut some = (0..second.points.len()).filter_map(|at| Some((at, directions(&at)?)));
+            // Of several directions at a point, a name without one means none of them.
+            some.next().filter(|_| some.next().is_none())
+        })
+    };
+    let names = first.points.iter().enumerate();
+    let common: Vec<_> =
+        names.filter_map(|(i, name)| partner(name).map(|(j, sign)| (i, j, sign))).collect();
+    let numbered = |set: &ModeSet| {
+        set.points.iter().enumerate().all(|(at, name)| *name == (at + 1).to_string())
+    };
+    let len = first.points.len();
+    if common.is_empty() && len == second.points.len() && (numbered(first) || numbered(second)) {
+        return Ok((0..len).map(|at| (at, at, 1.0)).collect());
+    }
+    if common.is_empty() {
+        let list = |set: &ModeSet| message::list(&set.points, ", ", LISTED);
+        return Err(AnalysisError::NoCommonPoint {
+            first: first.name.clone(),
+            points: list(first),
+            second: second.name.clone(),
+            other_points: list(second),
+        });
+    }
+    Ok(common)
+}
+
+/// Number of points that a message lists.
+const LISTED: usize = 6;
+
+/// Returns the sign of one name for the other if both may be the same point and direction.
+fn same_direction(one: &str, other: &str) -> Option<f64> {
+    match (Direction::parse(one), Direction::parse(other)) {
+        (Some(a), Some(b)) if a.point == b.point && a.axis == b.axis => {
+            Some(if a.is_negative == b.is_negative { 1.0 } else { -1.0 })
+        }
+        (Some(a), None) if a.point == other => Some(if a.is_negative { -1.0 } else { 1.0 }),
+        (None, Some(b)) if b.point == one => Some(if b.is_negative { -1.0 } else { 1.0 }),
+        _ => None,
+    }
+}
+
+impl DifferenceRow {
+    fn new(first: Measured, second: Measured, difference: Difference) -> Self {
+        Self {
+            first: first.value,
+            second: second.value,
+            difference: difference.value,
+            standard_error: difference.standard_error,
+            p_value: difference.adjusted_p_value,
+        }
+    }
+
+    /// First, second, difference and its error, and probability, of values times a factor.
+    fn cells(&self, factor: f64, digits: usize) -> Vec<String> {
+        let number = |value: f64, digits| significant(factor * value, digits);
+        let mut cells = vec![number(self.first, digits), number(self.second, digits)];
+        cells.push(number(self.difference, 3));
+        let dash = || "–".to_owned();
+        let is_exact = self.standard_error == 0.0;
+        cells.push(if is_exact { dash() } else { number(self.standard_error, 2) });
+        cells.push(self.p_value.map_or_else(dash, |p| significant(p, 2)));
+        cells
+    }
+
+    fn has_changed(&self) -> bool {
+        self.p_value.is_some_and(|p| p < MODAL_SIGNIFICANCE)
+    }
+}
+
+impl PairRow {
+    fn name(&self) -> String {
+        format!("{} – {}", self.first, self.second)
+    }
+
+    /// What differs by more than the errors allow.
+    fn changes(&self) -> Vec<&'static str> {
+        let mut changes = Vec::new();
+        if self.natural_frequency_hz.has_changed() {
+            changes.push("frequency");
+        }
+        if self.damping_ratio.as_ref().is_some_and(DifferenceRow::has_changed) {
+            changes.push("damping");
+        }
+        if self.shape_p_value.is_some_and(|p| p < MODAL_SIGNIFICANCE) {
+            changes.push("shape");
+        }
+        changes
+    }
+}
+
+impl ModeComparison {
+    fn pair_table(
+        &self,
+        header: [&str; 6],
+        cells: impl Fn(&PairRow) -> Option<Vec<String>>,
+    ) -> String {
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for pair in &self.pairs {
+            rows.extend(cells(pair).map(|cells| [vec![pair.name()], cells].concat()));
+        }
+        if rows.len() > 1 { format!("\n{}", text_table(&rows)) } else { String::new() }
+    }
+
+    fn shape_table(&self) -> String {
+        let mut rows = vec![["modes", "MAC", "±", "p"].map(String::from).to_vec()];
+        for pair in &self.pairs {
+            let p = pair.shape_p_value.map_or("–".into(), |p| significant(p, 2));
+            let error = match pair.mac_standard_error {
+                0.0 => "–".into(),
+                error => significant(error, 2),
+            };
+            rows.push(vec![pair.name(), format!("{:.5}", pair.mac), error, p]);
+        }
+        if rows.len() > 1 { format!("\n{}", text_table(&rows)) } else { String::new() }
+    }
+
+    fn mac_table(&self) -> String {
+        let columns = self.mac.first().map_or(0, Vec::len);
+        let header = std::iter::once("MAC".to_owned()).chain((1..=columns).map(|n| n.to_string()));
+        let mut rows = vec![header.collect::<Vec<_>>()];
+        for (number, values) in (1..).zip(&self.mac) {
+            let cells = values.iter().map(|value| format!("{value:.3}"));
+            rows.push(std::iter::once(number.to_string()).chain(cells).collect());
+        }
+        format!("\n{}", paged_table(&rows, 1))
+    }
+}
+
+impl fmt::Display for ModeComparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [first, second] = &self.sets;
+        writeln!(f, "first: {first}\nsecond: {second}")?;
+        let points = message::count(self.points.len(), "point");
+        writeln!(f, "{points} in common; p is adjusted for all tests; ± is one standard error")?;
+        let frequencies = ["frequency (Hz)", "first", "second", "difference", "±", "p"];
+        f.write_str(
+            &self.pair_table(frequencies, |pair| Some(pair.natural_frequency_hz.cells(1.0, 6))),
+        )?;
+        let dampings = ["damping (%)", "first", "second", "difference", "±", "p"];
+        f.write_str(&self.pair_table(dampings, |pair| Some(pair.damping_ratio?.cells(100.0, 4))))?;
+        if self.points.len() > 1 {
+            f.write_str(&self.shape_table())?;
+            f.write_str(&self.mac_table())?;
+        }
+        writeln!(f)?;
+        for pair in self.pairs.iter().filter(|pair| !pair.changes().is_empty()) {
+            writeln!(f, "modes {}: different {}", pair.name(), pair.changes().join(", "))?;
+        }
+        for (rows, which) in [(&self.only_first, "first"), (&self.only_second, "second")] {
+            for row in rows {
+                let hz = significant(row.natural_frequency_hz, 5);
+                writeln!(f, "only in the {which} set: mode {}, {hz} Hz", row.mode)?;
+            }
+        }
+        if self.points.len() == 1 {
+            writeln!(
+                f,
+                "note: at one point shapes cannot be compared: pairs are by frequency alone"
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,138 @@
+//! Rows of modes and candidates of a test with forces, and notes on them.
+
+use mechid_io::derivative;
+use mechid_modal::{DropReason, DroppedCandidate, IdentifiedMode, ModalEstimate, indicators};
+use nalgebra::{Complex, DVector};
+
+use super::sources::Output;
+use super::summary::{DroppedRow, ModalModeRow};
+use crate::identify::rows::Uncertain;
+use crate::limits::NOTED_UNMEASURED;
+use crate::modal::{ShapeEntry, ShapedMode};
+use crate::text::{compact, significant};
+
+/// Returns the row of a mode; masses follow from `fitted`, the mode as it was fitted, which has the decay
+/// of an exponential window.
+pub(super) fn row(
+    mode: &IdentifiedMode,
+    fitted: &IdentifiedMode,
+    outputs: &[Output],
+    points: &[(usize, usize)],
+) -> ModalModeRow {
+    let entries = |values: &[Complex<f64>], errors: &[Complex<f64>], scale: Complex<f64>| {
+        let of = |(value, error): (&Complex<f64>, &Complex<f64>)| {
+            let value = value / scale;
+            let size = scale.norm();
+            let standard_error = Some([error.re / size, error.im / size]);
+            ShapeEntry { value: [value.re, value.im], standard_error }
+        };
+        values.iter().zip(errors).map(of).collect::<Vec<_>>()
+    };
+    let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
+    let modal_mass = points.iter().filter_map(|&(input, output)| {
+        let power = derivative(outputs[output].quantity?) as i32;
+        Some((mode.residue(output, input).norm(), fitted.modal_mass(output, input, power).re))
+    });
+    // The driving point that moves most in this mode determines the mass best.
+    let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
+    let values = [
+        uncertain(&mode.natural_frequency_hz),
+        damped_frequency(mode),
+        uncertain(&mode.damping_ratio),
+    ];
+    let shape = entries(&mode.shape, &mode.shape_standard_error, Complex::from(1.0));
+    ModalModeRow {
+        mode: ShapedMode::from_pole([mode.pole.re, mode.pole.im], values, shape),
+        participation: entries(&mode.participation, &mode.participation_standard_error, scale),
+        phase_collinearity: indicators::mpc(&vector(&mode.shape)),
+        driven_share: mode.driven_share,
+        modal_mass,
+        decay_times: None,
+    }
+}
+
+/// f√(1 − ζ²), with its standard error to first order.
+fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
+    let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
+    let root = (1.0 - zeta.value * zeta.value).sqrt();
+    let slope = -f.value * zeta.value / root;
+    let variance = (root * f.standard_error).powi(2)
+        + (slope * zeta.standard_error).powi(2)
+        + 2.0 * root * slope * mode.frequency_damping_covariance;
+    normal(root * f.value, variance.max(0.0).sqrt())
+}
+
+/// Value with a normal interval: the noise is averaged over many lines.
+fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
+    normal(value.value, value.standard_error)
+}
+
+fn normal(value: f64, standard_error: f64) -> Uncertain {
+    let half = NORMAL_95 * standard_error;
+    Uncertain::new(value, standard_error, [value - half, value + half])
+}
+
+/// Half width of the 95 % interval of a normal distribution, in standard deviations.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+pub(super) fn mac(modes: &[IdentifiedMode]) -> Vec<Vec<f64>> {
+    let shapes: Vec<_> = modes.iter().map(|mode| vector(&mode.shape)).collect();
+    let row = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
+    shapes.iter().map(row).collect()
+}
+
+fn vector(shape: &[Complex<f64>]) -> DVector<Complex<f64>> {
+    DVector::from_column_slice(shape)
+}
+
+pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
+    let reason = match candidate.reason {
+        DropReason::Insignificant { gain, required } => format!(
+            "it improves the fit by {} (−2 log L) where {} is needed",
+            significant(gain, 3),
+            significant(required, 3)
+        ),
+        DropReason::UndeterminedDamping { standard_error } => format!(
+            "its damping ratio is not above zero: ± {} %",
+            significant(100.0 * standard_error, 2)
+        ),
+        DropReason::TooDamped => {
+            "it is too damped for a mode: the response of modes outside of the band".into()
+        }
+        DropReason::OutsideBand => "it left the band".into(),
+        DropReason::Twin { other_hz } => format!(
+            "its shape is that of the mode at {} Hz, within whose width it lies",
+            significant(other_hz, 5)
+        ),
+        DropReason::Undriven { ratio } => format!(
+            "forces that were not measured drive it: {} times the measured ones",
+            significant(ratio, 2)
+        ),
+        DropReason::BeyondNumber { .. } => "`modes` asks for fewer, and others explain more".into(),
+        _ => "it is no mode of the record".into(),
+    };
+    let DroppedCandidate { frequency_hz, damping_ratio, .. } = *candidate;
+    DroppedRow { frequency_hz, damping_ratio, reason }
+}
+
+pub(super) fn notes(estimate: &ModalEstimate) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (number, mode) in (1..).zip(estimate.modes()) {
+        let hz = significant(mode.natural_frequency_hz.value, 4);
+        if mode.near_edge {
+            notes.push(format!(
+                "mode {number} ({hz} Hz) is at an edge of the band: choose a wider one (`band_hz`) if the \
+                 forces reach further"
+            ));
+        }
+        if let Some(share) = mode.driven_share.filter(|share| 1.0 - share > NOTED_UNMEASURED) {
+            notes.push(format!(
+                "{} % of the motion of mode {number} ({hz} Hz) answers forces that were not measured; its \
+                 intervals allow for that",
+                compact(100.0 * (1.0 - share), 2)
+            ));
+        }
+    }
+    notes
+}

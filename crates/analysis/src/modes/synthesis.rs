@@ -1,0 +1,66 @@
+//! Frequency responses of identified modes, for other programs.
+
+use std::f64::consts::TAU;
+
+use mechid_io::{FrequencyResponses, ResponseFunction};
+
+use super::Modes;
+use super::diagrams::Source;
+
+impl Modes {
+    /// Returns the frequency responses of modes and residual terms at the lines of the first record,
+    /// in m/N, m/(s·N) or m/(s²·N); `None` without measured forces.
+    ///
+    /// Places that are nodes of a universal file (`3`, `12+Z`) are the points. Others get numbers:
+    /// responses from 1 on, then forces.
+    pub fn synthesis(&self) -> Option<FrequencyResponses> {
+        let Source::Forced { data, estimate, quantities, added_decay, .. } = &self.source else {
+            return None;
+        };
+        let summary = self.summary();
+        let rows = data.records().first().map_or(0..0, |(rows, _)| rows.clone());
+        let omega = &data.omega()[rows];
+        let responses: Vec<_> = omega.iter().map(|omega| estimate.response(*omega)).collect();
+        let places = &summary.analysis.places;
+        let columns: Vec<String> = summary.outputs.iter().map(|row| row.column.clone()).collect();
+        let named = if places.responses.is_empty() { &columns } else { &places.responses };
+        let outputs = nodes(named, 1);
+        let stated = places.forces.len() == summary.inputs.len();
+        let named = if stated { &places.forces } else { &summary.inputs };
+        let inputs = nodes(named, columns.len() + 1);
+        let mut functions = Vec::new();
+        for (input, reference) in inputs.iter().enumerate() {
+            for (output, response) in outputs.iter().enumerate() {
+                functions.push(ResponseFunction {
+                    response: response.clone(),
+                    reference: reference.clone(),
+                    quantity: quantities[output],
+                    values: responses.iter().map(|h| h[(output, input)]).collect(),
+                    standard_error: None,
+                });
+            }
+        }
+        let files: Vec<&str> = summary.records.iter().map(|record| record.file.as_str()).collect();
+        Some(FrequencyResponses {
+            file: files.join(", "),
+            frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
+            functions,
+            added_decay: *added_decay,
+            ..FrequencyResponses::default()
+        })
+    }
+}
+
+/// Returns names as nodes with directions, or, unless all are, numbers from `first` on.
+fn nodes(names: &[String], first: usize) -> Vec<String> {
+    let is_node = |name: &String| {
+        let (node, direction) = name.split_at(name.find(['+', '-']).unwrap_or(name.len()));
+        node.parse::<u32>().is_ok()
+            && (direction.is_empty()
+                || ["X", "Y", "Z", "RX", "RY", "RZ"].contains(&&direction[1..]))
+    };
+    if names.iter().all(is_node) {
+        return names.to_vec();
+    }
+    (first..first + names.len()).map(|number| number.to_string()).collect()
+}

@@ -1,0 +1,57 @@
+//! Prediction of records that the modes were not fitted to.
+
+use nalgebra::{Complex, DMatrix, DVectorView};
+
+use super::diagrams::Source;
+use super::settings::ModalTest;
+use super::sources::Recorded;
+use super::{Modes, ModesSummary};
+use crate::AnalysisError;
+use crate::measurement::Measurement;
+
+impl Modes {
+    /// Predicts other records of the same structure from their forces; returns the share of the variance of
+    /// each response in the band that the modes explain. The state at the beginning of each record is
+    /// estimated.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] of modes without measured forces, [`AnalysisError::Modal`] for other numbers
+    /// of forces or responses, and if a file cannot be read.
+    pub fn predict(&self, measurements: &[Measurement]) -> Result<Vec<f64>, AnalysisError> {
+        let ModesSummary { analysis, band_hz, .. } = self.summary();
+        let (Source::Forced { estimate, .. }, ModalTest::Forced { hits }) =
+            (&self.source, &analysis.test)
+        else {
+            let why = "without measured forces there is nothing to predict from".into();
+            return Err(AnalysisError::Setting { setting: "validate", why });
+        };
+        let recorded = Recorded::from_forced(measurements, hits.as_ref(), &analysis.places)?;
+        let data = recorded.lines(*band_hz)?;
+        Ok(explained(data.outputs(), &estimate.synthesis(&data)?))
+    }
+
+    /// Predicts other records as [`Modes::predict`] does, and adds the shares to the summary.
+    ///
+    /// # Errors
+    /// As [`Modes::predict`].
+    pub fn add_validation(&mut self, measurements: &[Measurement]) -> Result<(), AnalysisError> {
+        let shares = self.predict(measurements)?;
+        let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
+        self.summary.variance_predicted = Some(mean);
+        for (row, share) in self.summary.outputs.iter_mut().zip(shares) {
+            row.variance_predicted = Some(share);
+        }
+        Ok(())
+    }
+}
+
+/// Share of the variance of each measured response that modelled ones explain.
+pub(super) fn explained(
+    measured: &DMatrix<Complex<f64>>,
+    modelled: &DMatrix<Complex<f64>>,
+) -> Vec<f64> {
+    let share = |(measured, model): (DVectorView<'_, _>, DVectorView<'_, Complex<f64>>)| {
+        1.0 - (measured - model).norm_squared() / measured.norm_squared()
+    };
+    measured.column_iter().zip(modelled.column_iter()).map(share).collect()
+}

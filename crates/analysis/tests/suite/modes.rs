@@ -1,0 +1,355 @@
+//! Modes of tables of frequency responses in closed form, their checks, comparison and export.
+
+use std::f64::consts::{PI, TAU};
+
+use mechid_analysis::modes::{ModalCheck, ModalModeRow, ModalTest};
+use mechid_analysis::{
+    Channels, HitRule, Measurement, ModeSet, Modes, ModesSettings, SavedAnalysis, compare_modes,
+    modes_of_responses,
+};
+use mechid_io::{AveragedSegments, FrequencyResponses, NodalModes, ResponseFunction};
+use mechid_model::ResponseQuantity::{self, Acceleration, Displacement};
+use mechid_signal::Window;
+use nalgebra::{Complex, DMatrix};
+use rand::SeedableRng;
+use rand_chacha::ChaCha20Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+type C = Complex<f64>;
+
+/// Natural frequencies, in Hz, and damping ratios.
+const MODES: [(f64, f64); 3] = [(20.0, 0.01), (41.0, 0.015), (66.0, 0.008)];
+
+/// Mass-normalised shapes at four points, a row a mode, in 1/√kg.
+const SHAPES: [[f64; 4]; 3] = [[0.3, 0.5, 0.4, 0.2], [0.4, 0.1, -0.5, -0.3], [0.5, -0.4, 0.2, 0.6]];
+
+/// Points of the forces among the four.
+const FORCES: [usize; 2] = [0, 3];
+
+/// Receptance at s, 4 × 2, of modes whose frequencies are multiplied by `factors`.
+fn receptance(s: C, factors: [f64; 3]) -> DMatrix<C> {
+    DMatrix::from_fn(4, 2, |i, j| {
+        let of_mode = |mode: usize| {
+            let (hz, zeta) = MODES[mode];
+            let omega = TAU * hz * factors[mode];
+            let gain = SHAPES[mode][i] * SHAPES[mode][FORCES[j]];
+            C::from(gain) / (s * s + s * (2.0 * zeta * omega) + omega * omega)
+        };
+        (0..3).map(of_mode).sum()
+    })
+}
+
+/// A table from 5 to 90 Hz with white noise of a part of the RMS of each response.
+fn table(
+    quantity: ResponseQuantity,
+    spacing_hz: f64,
+    noise: f64,
+    seed: u64,
+    response: impl Fn(f64) -> DMatrix<C>,
+) -> FrequencyResponses {
+    let mut rng = ChaCha20Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let first = (5.0 / spacing_hz) as usize;
+    let frequency_hz: Vec<f64> =
+        (first..(90.0 / spacing_hz) as usize).map(|k| spacing_hz * k as f64).collect();
+    let exact: Vec<DMatrix<C>> = frequency_hz.iter().map(|hz| response(TAU * hz)).collect();
+    let mut functions = Vec::new();
+    for (j, force) in FORCES.iter().enumerate() {
+        for i in 0..4 {
+            let power = exact.iter().map(|h| h[(i, j)].norm_sqr()).sum::<f64>();
+            let level = noise * (power / exact.len() as f64 / 2.0).sqrt();
+            functions.push(ResponseFunction {
+                response: format!("{}+Z", i + 1),
+                reference: format!("{}+Z", force + 1),
+                quantity: Some(quantity),
+                values: exact
+                    .iter()
+                    .map(|h| h[(i, j)] + C::new(normal(), normal()) * level)
+                    .collect(),
+                standard_error: None,
+            });
+        }
+    }
+    FrequencyResponses { file: "table".into(), frequency_hz, functions, ..Default::default() }
+}
+
+fn plain(factors: [f64; 3], seed: u64) -> FrequencyResponses {
+    table(Displacement, 0.05, 0.01, seed, |omega| receptance(C::new(0.0, omega), factors))
+}
+
+fn modes(table: &FrequencyResponses) -> Modes {
+    modes_of_responses(std::slice::from_ref(table), &ModesSettings::default()).unwrap()
+}
+
+/// Asserts frequencies and damping ratios within five standard errors, plus `bias` times the damping ratio.
+fn are_true(rows: &[ModalModeRow], bias: f64) {
+    assert_eq!(rows.len(), MODES.len());
+    for (row, (hz, zeta)) in rows.iter().zip(MODES) {
+        let [f, damping] = [row.mode.row.natural_frequency_hz, row.mode.row.damping_ratio];
+        let error = f.standard_error.unwrap();
+        assert!((f.value - hz).abs() < 5.0 * error + bias * zeta * hz, "{f:?} {hz}");
+        let error = damping.standard_error.unwrap();
+        assert!((damping.value - zeta).abs() < 5.0 * error + bias * zeta, "{damping:?} {zeta}");
+        assert!(error < 0.02 * zeta, "{damping:?}");
+    }
+}
+
+fn failed(modes: &Modes) -> Vec<&ModalCheck> {
+    modes.summary().checks.iter().filter(|check| !check.passed).collect()
+}
+
+#[test]
+fn a_table_gives_modes_masses_and_good_checks() {
+    let found = modes(&plain([1.0; 3], 1));
+    are_true(&found.summary().modes, 0.0);
+    assert!(failed(&found).is_empty(), "{found}");
+    for (row, shape) in found.summary().modes.iter().zip(SHAPES) {
+        let largest = shape.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let mass = row.modal_mass.unwrap();
+        assert!((mass * largest * largest - 1.0).abs() < 0.02, "{mass}");
+    }
+    let diagrams = found.diagrams().unwrap();
+    let stable = diagrams.stabilisation.is_stable.iter().filter(|stable| **stable).count();
+    assert!(stable > 20, "{stable}");
+    let indicator = diagrams.mode_indicator.unwrap();
+    assert!(indicator.is_measured && indicator.singular_values.len() == 2);
+    let peak = (0..indicator.frequency_hz.len()).max_by(|a, b| {
+        indicator.singular_values[0][*a].total_cmp(&indicator.singular_values[0][*b])
+    });
+    let peak = indicator.frequency_hz[peak.unwrap()];
+    assert!(MODES.iter().any(|(hz, _)| (peak - hz).abs() < 0.2), "{peak}");
+}
+
+/// Judge: under the window e^(−σt) the response is that at s = jω + σ.
+#[test]
+fn the_decay_of_an_exponential_window_is_subtracted() {
+    const RATE: f64 = 2.5;
+    let windowed = |omega: f64| {
+        let s = C::new(RATE, omega);
+        receptance(s, [1.0; 3]) * (s * s)
+    };
+    let mut table = table(Acceleration, 0.05, 0.01, 2, windowed);
+    table.added_decay = Some(RATE);
+    let found = modes(&table);
+    are_true(&found.summary().modes, 0.0);
+    assert!(found.summary().notes.iter().any(|note| note.contains("exponential window")));
+    table.added_decay = None;
+    let wrong = modes(&table).summary().modes[0].mode.row.damping_ratio.value;
+    assert!(wrong > 2.0 * MODES[0].1, "{wrong}");
+}
+
+/// Judge: averages over Hann segments of a random force give the response smoothed by |W|², which has a
+/// closed form.
+#[test]
+fn what_a_hann_window_blunts_is_subtracted() {
+    const SPACING: f64 = 0.2;
+    let weight = |lines: f64| {
+        let sinc = if lines == 0.0 { 1.0 } else { (PI * lines).sin() / (PI * lines) };
+        let tail = 1.0 - lines * lines;
+        if tail.abs() < 1e-9 { 0.25 } else { (sinc / tail).powi(2) }
+    };
+    let smoothed = |omega: f64| {
+        let (mut sum, mut all) = (DMatrix::zeros(4, 2), 0.0);
+        for step in -256..=256 {
+            let lines = f64::from(step) / 32.0;
+            let there = omega + TAU * SPACING * lines;
+            sum += receptance(C::new(0.0, there), [1.0; 3]) * C::from(weight(lines));
+            all += weight(lines);
+        }
+        sum / C::from(all)
+    };
+    let mut table = table(Displacement, SPACING, 0.002, 3, smoothed);
+    let blunt = modes(&table).summary().modes[0].mode.row.damping_ratio.value;
+    assert!(blunt > 1.05 * MODES[0].1, "{blunt}");
+    table.segments = Some(AveragedSegments {
+        samples: 1280,
+        hop: 640,
+        count: 200,
+        window: Some(Window::Hann),
+        sample_rate_hz: 256.0,
+    });
+    let found = modes(&table);
+    are_true(&found.summary().modes, 2e-3);
+    let leakage = found.summary().checks.iter().find(|check| check.code == "leakage").unwrap();
+    assert!(leakage.passed && leakage.value > 1.0, "{leakage:?}");
+}
+
+fn check<'a>(modes: &'a Modes, code: &str) -> &'a ModalCheck {
+    modes.summary().checks.iter().find(|check| check.code == code).unwrap()
+}
+
+#[test]
+fn a_wrong_gain_and_a_wrong_sign_are_named() {
+    let mut table = plain([1.0; 3], 4);
+    let of_point = |function: &&mut ResponseFunction| function.response == "4+Z";
+    for function in table.functions.iter_mut().filter(of_point) {
+        function.values.iter_mut().for_each(|value| *value *= 1.03);
+    }
+    let found = modes(&table);
+    assert!(!check(&found, "reciprocity").passed && check(&found, "driving_point").passed);
+    for function in table.functions.iter_mut().filter(of_point) {
+        function.values.iter_mut().for_each(|value| *value *= -1.0 / 1.03);
+    }
+    let found = modes(&table);
+    let signs: Vec<_> = failed(&found).into_iter().map(|check| check.code).collect();
+    assert!(signs.contains(&"driving_point") && signs.contains(&"reciprocity"), "{found}");
+}
+
+/// Under the hypothesis the probability of the reciprocity check is rarely small: it is cautious.
+#[test]
+fn right_tables_rarely_fail_the_tests() {
+    for seed in 10..16 {
+        let found = modes(&plain([1.0; 3], seed));
+        let named: Vec<_> = failed(&found).into_iter().map(|check| &check.text).collect();
+        assert!(named.is_empty(), "{seed}: {named:?}");
+    }
+}
+
+#[test]
+fn a_force_that_drives_nothing_is_named() {
+    let mut table = plain([1.0; 3], 5);
+    let mut rng = ChaCha20Rng::seed_from_u64(6);
+    for function in table.functions.iter_mut().filter(|function| function.reference == "4+Z") {
+        for value in &mut function.values {
+            let part = |rng: &mut ChaCha20Rng| -> f64 { StandardNormal.sample(rng) };
+            *value = C::new(part(&mut rng), part(&mut rng)) * 1e-6;
+        }
+    }
+    let found = modes(&table);
+    let idle: Vec<_> = failed(&found).into_iter().filter(|c| c.code == "idle_force").collect();
+    assert!(idle.len() == 1 && idle[0].text.contains("force 4+Z"), "{found}");
+}
+
+/// Judge: the second mode of the second structure is 1 % higher; everything else is the same.
+#[test]
+fn a_comparison_names_the_mode_that_changed() {
+    let first = modes(&plain([1.0; 3], 7));
+    let second = modes(&plain([1.0, 1.01, 1.0], 8));
+    let [a, b] = [&first, &second].map(|modes| ModeSet::from_summary(modes.summary()).unwrap());
+    let comparison = compare_modes(&a, &b).unwrap();
+    assert_eq!(comparison.points.len(), 4);
+    assert_eq!(comparison.pairs.len(), 3);
+    for (at, pair) in comparison.pairs.iter().enumerate() {
+        assert_eq!((pair.first, pair.second), (at + 1, at + 1));
+        assert!(pair.mac > 0.9999, "{}", pair.mac);
+        let p = pair.natural_frequency_hz.p_value.unwrap();
+        assert_eq!(p < 0.01, at == 1, "{pair:?}");
+        assert!(pair.damping_ratio.unwrap().p_value.unwrap() > 0.01, "{pair:?}");
+        assert!(pair.shape_p_value.unwrap() > 0.01, "{pair:?}");
+    }
+    let text = comparison.to_string();
+    assert!(text.contains("modes 2 – 2: different frequency"), "{text}");
+    // The saved result says the same as the result, and other points have nothing in common.
+    let saved = ModeSet::from_json("saved", serde_json::to_value(&second).unwrap()).unwrap();
+    assert_eq!(compare_modes(&a, &saved).unwrap().pairs.len(), 3);
+    let mut elsewhere = saved;
+    elsewhere.points.iter_mut().for_each(|point| point.push('x'));
+    let error = compare_modes(&a, &elsewhere).unwrap_err();
+    assert_eq!(error.code(), "analysis.no-common-point");
+}
+
+/// Judge: shapes of a model without errors, in nodes and directions of which the test has some, one of
+/// them against its direction.
+#[test]
+fn a_finite_element_model_is_compared_at_the_common_points() {
+    let mut file = String::new();
+    for (number, ((hz, _), shape)) in (1..).zip(MODES.iter().zip(SHAPES)) {
+        file += "    -1\n    55\nmodel\nNONE\nNONE\nNONE\nNONE\n";
+        file += &format!("{:10}{:10}{:10}{:10}{:10}{:10}\n", 1, 2, 2, 8, 2, 3);
+        file += &format!("{:10}{:10}{:10}{number:10}\n", 2, 4, 1);
+        file += &format!("{:13.5e}{:13.5e}{:13.5e}{:13.5e}\n", hz * 1.02, 1.0, 0.0, 0.0);
+        for (node, value) in (1..).zip(shape) {
+            file += &format!("{node:10}\n{:13.5e}{:13.5e}{:13.5e}\n", 0.0, 0.1, value);
+        }
+        file += &format!("{:10}\n{:13.5e}{:13.5e}{:13.5e}\n    -1\n", 9, 0.0, 0.1, 0.3);
+    }
+    let nodal = NodalModes::parse("model.unv", &file).unwrap();
+    assert_eq!(nodal.points.len(), 10, "{:?}", nodal.points);
+    let mut test = ModeSet::from_summary(modes(&plain([1.0; 3], 9)).summary()).unwrap();
+    test.points[3] = "4-Z".into();
+    test.modes.truncate(2);
+    let model = ModeSet::from_nodal(&nodal).unwrap();
+    let comparison = compare_modes(&test, &model).unwrap();
+    assert_eq!(comparison.points, ["1+Z", "2+Z", "3+Z", "4-Z"]);
+    // With the fourth entry turned the shapes are others; turned back they are the same.
+    assert!(comparison.mac[0][0] < 0.95, "{:?}", comparison.mac);
+    test.points[3] = "4+Z".into();
+    let comparison = compare_modes(&test, &model).unwrap();
+    assert_eq!((comparison.pairs.len(), comparison.only_second.len()), (2, 1));
+    for (at, pair) in comparison.pairs.iter().enumerate() {
+        assert!(pair.mac > 0.9999 && pair.damping_ratio.is_none(), "{pair:?}");
+        let difference = pair.natural_frequency_hz.difference;
+        assert!((difference / MODES[at].0 - 0.02).abs() < 1e-4, "{difference}");
+    }
+}
+
+/// Judge: the responses that were fitted, read back from the file.
+#[test]
+fn the_synthesis_is_read_back_from_a_universal_file() {
+    let measured = plain([1.0; 3], 11);
+    let found = modes(&measured);
+    let text = found.synthesis().unwrap().to_universal_file().unwrap();
+    let read = FrequencyResponses::parse("synthesis.unv", text.as_bytes()).unwrap();
+    assert_eq!(read.functions.len(), 8);
+    for function in &read.functions {
+        assert_eq!(function.quantity, Some(Displacement));
+        let of_pair = |f: &&ResponseFunction| {
+            f.response == function.response && f.reference == function.reference
+        };
+        let original = measured.functions.iter().find(of_pair).unwrap();
+        let power = |values: &mut dyn Iterator<Item = C>| values.map(|z| z.norm_sqr()).sum::<f64>();
+        let pairs = original.values.iter().zip(&function.values);
+        let rest = power(&mut pairs.map(|(a, b)| a - b));
+        assert!(rest < 2e-4 * power(&mut original.values.iter().copied()), "{rest}");
+    }
+}
+
+fn hammer(file: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(file)
+}
+
+/// Judge: the machine behind the examples, 12 Hz and 31 Hz; one accelerometer of two shows both.
+#[test]
+fn a_modal_test_is_an_analysis_of_many_records() {
+    let analysis = SavedAnalysis {
+        channels: Channels {
+            force: vec!["force".into()],
+            acceleration: vec!["a1".into(), "a2".into()],
+            ..Channels::default()
+        },
+        modes: Some(ModesSettings {
+            test: ModalTest::Forced { hits: Some(HitRule::default()) },
+            band_hz: Some([2.0, 100.0]),
+            ..ModesSettings::default()
+        }),
+        ..SavedAnalysis::default()
+    };
+    let row = analysis.row("hammer", || analysis.open(hammer("hammer-1.csv")));
+    assert_eq!(row.error, None);
+    let frequencies: Vec<f64> = row.modes.iter().map(|mode| mode.natural_frequency_hz).collect();
+    assert_eq!(frequencies.len(), 2, "{frequencies:?}");
+    assert!((frequencies[0] - 12.0).abs() < 0.01 && (frequencies[1] - 31.0).abs() < 0.01);
+    assert!(row.unexplained_motion.unwrap() < 0.05 && row.parameters.is_empty());
+    let saved = serde_json::to_string(&analysis).unwrap();
+    assert_eq!(serde_json::from_str::<SavedAnalysis>(&saved).unwrap(), analysis);
+    let without = SavedAnalysis { channels: Channels::default(), ..analysis };
+    assert!(without.check().is_err());
+}
+
+#[test]
+fn modes_predict_a_record_that_was_not_fitted() {
+    let settings = ModesSettings {
+        test: ModalTest::Forced { hits: Some(HitRule::default()) },
+        band_hz: Some([2.0, 100.0]),
+        ..ModesSettings::default()
+    };
+    let channels = Channels::new("force", Acceleration, "a1");
+    let open = |file: &str| Measurement::open(hammer(file), &channels).unwrap();
+    let mut found = mechid_analysis::modes(&[open("hammer-1.csv")], &settings).unwrap();
+    let same = found.predict(&[open("hammer-1.csv")]).unwrap()[0];
+    // The second record is of another struck point: what was fitted to the first does not predict it.
+    let other = found.predict(&[open("hammer-2.csv")]).unwrap()[0];
+    assert!(same > 0.999 && other < 0.9, "{same} {other}");
+    found.add_validation(&[open("hammer-1.csv")]).unwrap();
+    assert_eq!(found.summary().variance_predicted, Some(same));
+}
