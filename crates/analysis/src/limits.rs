@@ -59,6 +59,10 @@ pub const NOTED_UNMEASURED: f64 = 0.01;
 /// lines; with a larger one, smooth noise passes for modes.
 pub const LINE_CORRELATION: f64 = 0.1;
 
+/// Half-power bandwidth, in lines of a segment, below which what a window blunts of a mode is not
+/// subtracted: between lines, the response of a narrower one is larger than its averages tell.
+pub const LEAST_SHARPENED_LINES: f64 = 0.5;
+
 /// Largest number of samples of a segment times the number of segments that overlap it, of a table that
 /// states segments. Beyond it, the weights of its window take minutes, and the statement is not used.
 pub const MOST_SEGMENT_WORK: usize = 1 << 22;

@@ -90,6 +90,55 @@ def test_modes_of_a_roving_hammer_are_those_of_the_program(program: Callable[...
     assert np.all(found.driven_shares > 0.98) and found.mac.shape == (2, 2)
 
 
+def test_modes_of_a_table_are_those_of_the_program(program: Callable[..., str], tmp_path: Path) -> None:
+    """Judge: two modes in closed form, as arrays and as a file."""
+    hz = np.arange(5, 60, 0.05)
+    s = 2j * np.pi * hz
+    shapes = np.array([[1.0, 0.8], [-0.6, 1.0]])
+    omega, zeta = 2 * np.pi * np.array([12.0, 31.0]), np.array([0.01, 0.02])
+    gains = 1 / (s[:, None] ** 2 + 2 * zeta * omega * s[:, None] + omega**2)
+    exact = np.einsum("kr,ri,rj->kij", gains, shapes, shapes[:, :1])
+    rng = np.random.default_rng(3)
+    noise = rng.normal(size=exact.shape) + 1j * rng.normal(size=exact.shape)
+    response = exact + 1e-6 * noise
+    table = mechid.ResponseTable(hz, response, quantity="displacement")
+    found = mechid.modes(table, diagrams=True)
+    for mode, truth, ratio in zip(found.modes, [12.0, 31.0], zeta, strict=True):
+        assert abs(mode.natural_frequency_hz.value - truth) < 1e-3
+        assert mode.damping_ratio.value == pytest.approx(ratio, rel=0.01)
+    assert found.diagrams is not None and len(found.diagrams["mode_indicator"]["singular_values"]) == 1
+    assert {check["code"] for check in found.checks} >= {"driving_point", "explained"}
+    names = ["h_1_1_real", "h_1_1_imaginary", "h_2_1_real", "h_2_1_imaginary"]
+    columns = np.column_stack([hz, *(part for i in (0, 1) for part in (response[:, i, 0].real, response[:, i, 0].imag))])
+    path = tmp_path / "table.csv"
+    np.savetxt(path, columns, delimiter=",", header=",".join(["frequency_hz", *names]), comments="", fmt="%.17g")
+    told = program("modes", str(path), "--quantity", "displacement", "--json")
+    assert mechid.modes(path, quantity="displacement").to_json() + "\n" == told
+
+
+def test_a_comparison_is_that_of_the_program(program: Callable[..., str], tmp_path: Path) -> None:
+    options: dict[str, Any] = {"force": "force", "acceleration": "a1,a2", "hits": True, "band_hz": (2, 100)}
+    first, second = (
+        mechid.modes(f"examples/hammer-{k}.csv", **{**options, "acceleration": ["a1", "a2"]}) for k in (1, 2)
+    )
+    path = tmp_path / "second.json"
+    path.write_text(second.to_json(), encoding="utf-8")
+    found = mechid.compare_modes(first, path)
+    assert [(pair["first"], pair["second"]) for pair in found.pairs] == [(1, 1), (2, 2)]
+    assert found.mac.shape == (2, 2) and found.points == ("a1", "a2")
+    assert found.only_first == found.only_second == () and "MAC" in str(found)
+    told = program("modes", "examples/hammer-1.csv", *words(options), "--compare", str(path), "--json")
+    assert json.loads(told)["pairs"] == json.loads(found.to_json())["pairs"]
+    # A model as arrays, of which one mode is 5 % higher.
+    model = {"natural_frequency_hz": [12.0, 31.0 * 1.05], "shape": [[1, 0.57], [0.83, -1]], "points": ["a1", "a2"]}
+    changed = mechid.compare_modes(first, model).pairs[1]["natural_frequency_hz"]
+    assert changed["difference"] == pytest.approx(0.05 * 31, rel=1e-2) and changed["p_value"] < 1e-6
+    with pytest.raises(ValueError, match="`shape` has the shape"):
+        mechid.compare_modes(first, {"natural_frequency_hz": [1.0], "shape": [1.0]})
+    with pytest.raises(TypeError, match="modes are a result"):
+        mechid.compare_modes(first, 3)
+
+
 def test_a_free_decay_of_arrays_is_found() -> None:
     t = np.arange(800) / 200
     omega, zeta = 2 * np.pi * 7, 0.01

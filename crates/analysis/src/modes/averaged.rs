@@ -1,7 +1,7 @@
 //! Responses that are averages over segments of records: what ties their lines together, and what the
 //! window of the segments blunts.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use mechid_io::FrequencyResponses;
 use mechid_modal::{IdentifiedMode, ModalEstimate, ModalSettings, identify_modes};
@@ -11,7 +11,10 @@ use nalgebra::{Complex, DMatrix};
 
 use super::tables::Tables;
 use crate::AnalysisError;
-use crate::limits::{LINE_CORRELATION, MOST_SEGMENT_WORK, SHARPENING_ROUNDS, SHARPENING_SETTLED};
+use crate::limits::{
+    LEAST_SHARPENED_LINES, LINE_CORRELATION, MOST_SEGMENT_WORK, SHARPENING_ROUNDS,
+    SHARPENING_SETTLED,
+};
 
 /// Deviation of a frequency from a line, in lines, up to which it is one in spite of the digits of a
 /// file.
@@ -77,19 +80,39 @@ impl Averaged {
         .collect()
     }
 
-    /// Returns what the averages add to the responses of a model on some rows.
+    /// Returns what the averages add to the responses of modes on some rows.
+    ///
+    /// What lies outside of the band is smooth there, so its bias is nothing; beyond the edges of the band
+    /// its residual terms are no response at all.
     pub fn bias(
         &self,
         rows: &[usize],
-        model: &ModalEstimate,
+        modes: &[IdentifiedMode],
     ) -> Vec<Option<DMatrix<Complex<f64>>>> {
         if !self.is_smoothed() {
             return Vec::new();
         }
         let lines: Vec<usize> = rows.iter().map(|row| self.lines[*row]).collect();
-        let response = |omega: f64| (omega > 0.0).then(|| model.response(omega));
+        let lines_wide = |mode: &IdentifiedMode| -mode.pole.re / (PI * self.spacing_hz);
+        let wide: Vec<&IdentifiedMode> =
+            modes.iter().filter(|mode| lines_wide(mode) >= LEAST_SHARPENED_LINES).collect();
+        let response = |omega: f64| Some(modal_response(&wide, omega));
         smoothing_bias(&self.smoothing, &lines, TAU * self.spacing_hz, &response)
     }
+}
+
+/// Returns the response of some modes at ω (rad/s), outputs × inputs.
+fn modal_response(modes: &[&IdentifiedMode], omega: f64) -> DMatrix<Complex<f64>> {
+    let s = Complex::new(0.0, omega);
+    let size = |mode: &&IdentifiedMode| (mode.shape.len(), mode.participation.len());
+    let (outputs, inputs) = modes.first().map_or((0, 0), size);
+    DMatrix::from_fn(outputs, inputs, |output, input| {
+        let of_mode = |mode: &&IdentifiedMode| {
+            let residue = mode.residue(output, input);
+            residue / (s - mode.pole) + residue.conj() / (s - mode.pole.conj())
+        };
+        modes.iter().map(of_mode).sum()
+    })
 }
 
 /// Modes of tables, the lines that they were fitted to, and whether what a window blunts was separated
@@ -118,7 +141,7 @@ impl Sharpened {
             if fit.settled {
                 break;
             }
-            let data = tables.lines(band_hz, Some(&fit.estimate))?;
+            let data = tables.lines(band_hz, Some(fit.estimate.modes()))?;
             let estimate = identify_modes(&data, settings)?;
             let change = largest_change(fit.estimate.modes(), estimate.modes());
             let settled = change < SHARPENING_SETTLED;

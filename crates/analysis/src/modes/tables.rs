@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use mechid_io::{FrequencyResponses, ResponseFunction};
-use mechid_modal::ModalEstimate;
+use mechid_modal::IdentifiedMode;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix};
@@ -110,7 +110,7 @@ impl Tables {
     pub fn lines(
         &self,
         band_hz: [f64; 2],
-        model: Option<&ModalEstimate>,
+        model: Option<&[IdentifiedMode]>,
     ) -> Result<LineData, AnalysisError> {
         let mut all: Option<LineData> = None;
         for (table, averaged) in self.with_segments() {
@@ -131,7 +131,8 @@ impl Tables {
                 inputs.column_mut(input).fill(Complex::from(1.0));
                 let outputs = DMatrix::from_fn(rows.len(), functions.len(), |at, output| {
                     let bias = bias.get(at).and_then(Option::as_ref);
-                    let bias = bias.map_or(Complex::default(), |bias| bias[(output, input)]);
+                    let bias = bias.and_then(|bias| bias.get((output, input)).copied());
+                    let bias = bias.unwrap_or_default();
                     functions[output].values[rows[at]] - bias
                 });
                 let one = LineData::new(omega, inputs, outputs, Transient::None)?;

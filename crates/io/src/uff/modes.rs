@@ -165,3 +165,57 @@ fn columns<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
     let rest = line.text.get(from..).unwrap_or_default();
     rest.get(..width).unwrap_or(rest)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Geometry, PointShape};
+
+    /// Two nodes with complex shapes, as this crate writes them.
+    fn written() -> String {
+        let geometry = Geometry::from_names(["1+Z", "2+Z"].into_iter());
+        let names = ["1+Z".to_owned(), "2+Z".to_owned()];
+        let shape = |hz: f64, entries: [[f64; 2]; 2]| PointShape {
+            frequency_hz: hz,
+            damping_ratio: 0.02,
+            displacement: geometry.displacement(&names, &entries).unwrap(),
+        };
+        geometry.universal_file(&[
+            shape(12.5, [[1.0, 0.0], [0.5, 0.25]]),
+            shape(31.0, [[-0.5, 0.0], [1.0, -0.125]]),
+        ])
+    }
+
+    #[test]
+    fn modes_that_are_written_are_read() {
+        let text = written();
+        let read = read_modes("a.unv", text.as_bytes()).unwrap();
+        assert_eq!(read.points, ["1+Z", "2+Z"]);
+        let modes = read.modes.iter().map(|mode| (mode.frequency_hz, mode.damping_ratio));
+        for ((hz, ratio), expected) in modes.zip([12.5, 31.0]) {
+            assert!((hz / expected - 1.0).abs() < 1e-5 && (ratio - 0.02).abs() < 1e-6);
+        }
+        let (half, quarter) = (Complex::new(0.5, 0.25), Complex::new(1.0, -0.125));
+        assert_eq!(read.modes[0].shape, [Complex::from(1.0), half]);
+        assert_eq!(read.modes[1].shape, [Complex::from(-0.5), quarter]);
+        let geometry = Geometry::parse("a.unv", &text).unwrap();
+        assert_eq!((geometry.points.len(), geometry.lines.len()), (2, 1));
+    }
+
+    #[test]
+    fn a_file_that_is_cut_short_or_wrong_is_an_error_with_its_line() {
+        let text = written();
+        for end in 0..text.len() {
+            // Between datasets a shorter file is a file.
+            if let Ok(read) = read_modes("a.unv", &text.as_bytes()[..end]) {
+                assert!((1..=2).contains(&read.modes.len()));
+            }
+        }
+        let mut wrong = text.clone();
+        let at = text.rfind("  1.00000E+00").unwrap();
+        wrong.replace_range(at..at + 13, "  1.00q00E+00");
+        let error = read_modes("a.unv", wrong.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("no number in columns"), "{error}");
+        assert!(matches!(read_modes("a.unv", b""), Err(IoError::Empty { .. })));
+    }
+}

@@ -24,6 +24,7 @@ __all__ = [
     "bearing",
     "bearing_of_responses",
     "decay",
+    "compare_modes",
     "find_column",
     "fleet_begin",
     "fleet_part",
@@ -236,7 +237,7 @@ def modes(
     threads: int | None,
 ) -> Answer: ...
 def compare_modes(
-    first: tuple[str | os.PathLike[str], str | None], second: tuple[str | os.PathLike[str], str | None]
+    first: tuple[str | PathLike[str], str | None], second: tuple[str | PathLike[str], str | None]
 ) -> tuple[str, str]: ...
 def decay(record: Measurement, settings: str, threads: int | None) -> Answer: ...
 def bearing(
