@@ -68,8 +68,9 @@ pub const LEAST_SHARPENED_LINES: f64 = 0.5;
 pub const MOST_SEGMENT_WORK: usize = 1 << 22;
 
 /// Largest number of rounds in which modes are fitted to averaged responses less what their window
-/// blunts of these modes. Where resonances are wide enough for it, two or three are enough.
-pub const SHARPENING_ROUNDS: usize = 6;
+/// blunts of these modes. Each takes most of what is left; at two lines a resonance and little noise
+/// some ten are needed.
+pub const SHARPENING_ROUNDS: usize = 20;
 
 /// Change of a frequency or damping ratio in a round, in standard errors, below which the rounds end.
 pub const SHARPENING_SETTLED: f64 = 0.1;

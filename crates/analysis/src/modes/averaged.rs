@@ -124,8 +124,8 @@ pub(super) struct Sharpened {
 }
 
 impl Sharpened {
-    /// Fits the modes, and again to the responses less what their window blunts of these modes, until
-    /// they stay.
+    /// Fits the modes, and as many again to the responses less what their window blunts of these modes,
+    /// until they stay. Where a later fit fails, the one before it is kept and nothing has settled.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias by a window).
@@ -136,13 +136,19 @@ impl Sharpened {
     ) -> Result<Self, AnalysisError> {
         let data = tables.lines(band_hz, None)?;
         let estimate = identify_modes(&data, settings)?;
+        let count = estimate.modes().len();
+        let settings = if settings.near_hz.is_empty() {
+            ModalSettings { modes: Some(count), ..settings.clone() }
+        } else {
+            settings.clone()
+        };
         let mut fit = Self { data, estimate, settled: !tables.is_smoothed() };
         for _ in 0..SHARPENING_ROUNDS {
             if fit.settled {
                 break;
             }
             let data = tables.lines(band_hz, Some(fit.estimate.modes()))?;
-            let estimate = identify_modes(&data, settings)?;
+            let Ok(estimate) = identify_modes(&data, &settings) else { break };
             let change = largest_change(fit.estimate.modes(), estimate.modes());
             let settled = change < SHARPENING_SETTLED;
             fit = Self { data, estimate, settled };
