@@ -73,11 +73,10 @@ fn shortened(error: serde_json::Error) -> serde_json::Error {
     if text.len() <= MAX_MESSAGE {
         return error;
     }
-    let (start, end) = (
-        text.floor_char_boundary(MAX_MESSAGE / 2),
-        text.ceil_char_boundary(text.len() - MAX_MESSAGE / 4),
-    );
-    serde_json::Error::custom(format!("{} … {}", &text[..start], &text[end..]))
+    let beginning: String = text.chars().take(MAX_MESSAGE / 2).collect();
+    let end = text.chars().count().saturating_sub(MAX_MESSAGE / 4);
+    let end: String = text.chars().skip(end).collect();
+    serde_json::Error::custom(format!("{beginning} … {end}"))
 }
 
 /// Reads a word, one of the variants of an enum. Without this a value of another shape is refused

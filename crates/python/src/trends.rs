@@ -26,7 +26,7 @@ pub fn fleet_simulate(
     let fields = fields.into_iter().map(|(name, values)| (name, values.as_array().to_vec()));
     let runs = match runs {
         Some(runs) => StudyRuns::Seeds(runs),
-        None => StudyRuns::Table(Table::from_columns("the study", fields)),
+        None => StudyRuns::Table(Box::new(Table::from_columns("the study", fields))),
     };
     let study = work::brief(py, || match text {
         Some(text) => ExperimentStudy::parse(file.display().to_string(), text, &runs),

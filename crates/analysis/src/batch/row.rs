@@ -162,8 +162,8 @@ impl ResultRow {
                 return Ok(empty.with_elements(identify_elements(&data, how)?.summary()));
             }
             Ok(match &analysis.modes {
-                None => empty.with(identify(&records, &analysis.identify)?.summary()),
-                Some(settings) => empty.with_modes(modes(&records, settings)?.summary()),
+                None => empty.clone().with(identify(&records, &analysis.identify)?.summary()),
+                Some(settings) => empty.clone().with_modes(modes(&records, settings)?.summary()),
             })
         };
         let error = match catch_unwind(AssertUnwindSafe(work)) {

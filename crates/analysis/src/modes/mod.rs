@@ -89,9 +89,7 @@ pub fn modes(
         }
     };
     let recorded = Recorded::from_forced(measurements, hits.as_ref(), &settings.places)?;
-    let band_hz = settings.band_hz.unwrap_or_else(|| {
-        driven_band(recorded.parts.iter().filter_map(|part| part.forces.as_ref()))
-    });
+    let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());
     let records = measurements.iter().map(|measurement| {
         let block = measurement.whole_block()?;
         Ok(RecordRow::of_block(&block))

@@ -80,6 +80,11 @@ impl Recorded {
         Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
     }
 
+    /// Returns the band, in Hz, that the forces drive.
+    pub fn driven_band(&self) -> [f64; 2] {
+        driven_band(self.parts.iter().filter_map(|part| part.forces.as_ref()))
+    }
+
     /// Lines of all records in a band (Hz).
     pub fn lines(&self, band_hz: [f64; 2]) -> Result<LineData, AnalysisError> {
         let mut all: Option<LineData> = None;

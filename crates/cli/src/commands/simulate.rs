@@ -109,7 +109,9 @@ impl SimulateArgs {
         match (self.runs, &self.study) {
             (None, None) => self.one(),
             (Some(runs), _) => self.many("--runs", &StudyRuns::Seeds(runs)),
-            (None, Some(table)) => self.many("--study", &StudyRuns::Table(Table::read(table)?)),
+            (None, Some(table)) => {
+                self.many("--study", &StudyRuns::Table(Box::new(Table::read(table)?)))
+            }
         }
     }
 

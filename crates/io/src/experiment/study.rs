@@ -22,7 +22,7 @@ use crate::{Experiment, IoError, Table, escaped, json};
 ///     "noise": { "displacement": { "snr_db": 40 }, "seed": 1 }
 /// }"#;
 /// let table = Table::parse("runs.csv", b"system.mass,noise.seed\n10,1\n12.5,2\n")?;
-/// let study = ExperimentStudy::parse("machine.json", experiment, &StudyRuns::Table(table))?;
+/// let study = ExperimentStudy::parse("machine.json", experiment, &StudyRuns::Table(Box::new(table)))?;
 /// assert_eq!(study.runs(), 2);
 /// let second = study.experiment(2)?;
 /// assert_eq!(second.system()?.mass()[(0, 0)], 12.5);
@@ -45,7 +45,7 @@ pub enum StudyRuns {
     /// Number of runs that differ in their noise alone: its seed counts up from the one described.
     Seeds(usize),
     /// A row for each run, and a column for each field that changes.
-    Table(Table),
+    Table(Box<Table>),
 }
 
 /// A field of the description that changes from run to run.
@@ -217,7 +217,7 @@ mod tests {
     }
 
     fn table(text: &str) -> StudyRuns {
-        StudyRuns::Table(Table::parse("runs.csv", text.as_bytes()).unwrap())
+        StudyRuns::Table(Box::new(Table::parse("runs.csv", text.as_bytes()).unwrap()))
     }
 
     #[test]

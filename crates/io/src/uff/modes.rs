@@ -173,7 +173,7 @@ mod tests {
 
     /// Two nodes with complex shapes, as this crate writes them.
     fn written() -> String {
-        let geometry = Geometry::from_names(["1+Z", "2+Z"].into_iter());
+        let geometry = Geometry::from_names(["1+Z", "2+Z"]);
         let names = ["1+Z".to_owned(), "2+Z".to_owned()];
         let shape = |hz: f64, entries: [[f64; 2]; 2]| PointShape {
             frequency_hz: hz,

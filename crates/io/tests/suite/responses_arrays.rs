@@ -68,8 +68,11 @@ fn vectors_are_known_by_the_points_in_their_names() {
     assert_eq!(responses.functions[1].values[4], value(4, 1, 0));
 }
 
+/// Name, lengths, real and imaginary parts.
+type Variable<'a> = (&'a str, &'a [u32], &'a [f64], &'a [f64]);
+
 /// A MATLAB file of vectors, complex if they have imaginary parts.
-fn file(variables: &[(&str, &[u32], &[f64], &[f64])]) -> Vec<u8> {
+fn file(variables: &[Variable<'_>]) -> Vec<u8> {
     let mut file = b"MATLAB 5.0 MAT-file".to_vec();
     file.resize(124, b' ');
     file.extend(b"\x00\x01IM");

@@ -146,7 +146,7 @@ pub fn smoothing_bias(
     };
     // Neighbouring lines share most of the frequencies at which the system is asked.
     let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
-    let mut bias_at = |line: &usize| {
+    let bias_at = |line: &usize| {
         let place = (line * SMOOTHING_STEPS) as i64;
         let exact = known.entry(place).or_insert_with(|| finite(place)).clone()?;
         let mut smooth = &exact * Complex::from(smoothing[0]);
@@ -159,7 +159,7 @@ pub fn smoothing_bias(
         }
         Some(smooth - exact)
     };
-    lines.iter().map(|line| bias_at(line)).collect()
+    lines.iter().map(bias_at).collect()
 }
 
 impl Frf {
