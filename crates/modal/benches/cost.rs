@@ -4,7 +4,6 @@
 //! finds, so that a time bought by missing modes shows.
 #![allow(clippy::print_stdout, reason = "the lines are the result")]
 
-#[allow(dead_code, reason = "the study uses the rest")]
 #[path = "../tests/suite/generator.rs"]
 mod generator;
 

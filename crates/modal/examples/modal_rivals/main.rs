@@ -12,7 +12,6 @@
 //! each true pole, and the best setting is chosen mode by mode by the errors themselves.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
-#[allow(dead_code, reason = "the other study uses the rest")]
 #[path = "../../tests/suite/generator.rs"]
 mod generator;
 
@@ -219,6 +218,11 @@ fn responses(
     }
     let omega = (first..=last).map(|line| TAU * spacing * line as f64).collect();
     let responses = power.into_iter().zip(cross);
-    let responses = responses.map(|(power, cross)| cross * power.try_inverse().unwrap()).collect();
+    let responses = responses
+        .map(|(power, cross)| {
+            // Both are Hermitian products of the forces: H P = C is P Hᴴ = Cᴴ.
+            power.lu().solve(&cross.adjoint()).expect("the forces are independent").adjoint()
+        })
+        .collect();
     ResponseTable::new(omega, responses).unwrap()
 }

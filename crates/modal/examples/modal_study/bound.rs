@@ -33,7 +33,9 @@ impl Bound {
         let mut variance = vec![0.0; 2 * modes];
         for &seed in seeds {
             let information = information(case, seed);
-            let covariance = information.try_inverse().expect("the poles are determined");
+            let size = information.nrows();
+            let factor = information.cholesky().expect("the poles are determined");
+            let covariance = factor.solve(&DMatrix::identity(size, size));
             for (k, sum) in variance.iter_mut().enumerate() {
                 *sum += covariance[(k, k)] / seeds.len() as f64;
             }
@@ -185,10 +187,9 @@ fn noise_covariance(case: &Case, seed: u64) -> Covariance {
         let centre = (data.omega()[line] / step).round() as i64;
         let mut sum = DMatrix::from_diagonal(&sensor.row(line).transpose().map(C::from));
         for (shift, weight) in (-REACH..=REACH).zip(&weight) {
-            if let Some(response) = responses.get((centre + shift).unsigned_abs() as usize) {
-                if *weight > 1e-12 {
-                    sum += response * response.adjoint() * C::from(LINE_POWER * weight);
-                }
+            let place = (centre + shift).unsigned_abs() as usize;
+            if let Some(response) = responses.get(place).filter(|_| *weight > 1e-12) {
+                sum += response * response.adjoint() * C::from(LINE_POWER * weight);
             }
         }
         sum
