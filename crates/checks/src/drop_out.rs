@@ -5,11 +5,8 @@ use std::fmt::{self, Formatter};
 use mechid_signal::{Record, message};
 
 use super::finding::{Channel, Check, Finding, Names, Quantity};
-use super::limits::SIGNIFICANCE;
+use super::limits::{DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS};
 use super::{Subject, Verdict};
-
-/// Number of samples on either side of a run by which it is judged; a longer run is judged by as many as it has.
-const NEIGHBOURS: usize = 64;
 
 /// A channel keeps one value for some samples within its motion: the transmission dropped out.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,19 +27,20 @@ pub struct DropOut {
 /// Finds the channels of a response (any unit) whose longest run of equal samples is one that chance does not make
 /// ([`Finding::DropOut`]).
 ///
-/// Equal neighbours in the samples on both sides give the probability that the next sample is equal once more; that of
-/// the run, for all places where it may begin, is its p-value. A structure at rest, a coarse converter and a slow motion
-/// have equal neighbours on at least one side.
+/// The p-value is the probability that a run as long as the second longest one continues so far, by the share of equal
+/// neighbours that are followed by another one in the rest of the record: a coarse converter and a slow motion have many
+/// runs. A structure that comes to rest goes through a few steps of the converter: the channel has to move by many on both
+/// sides of the run.
 ///
 /// # Source
-/// Ours; Bonferroni's bound.
+/// Ours: runs of a Markov chain are distributed geometrically.
 pub fn dropped_channels(quantity: Quantity, response: &Record) -> Vec<Finding> {
     let one = |index: usize| {
         let x = response.channel(index);
         let (sample, samples) = longest_run(x)?;
         let channel = Channel { quantity, index };
         let finding = DropOut { channel, sample, samples, level: x[sample] };
-        (p_value(x, sample, samples)? <= SIGNIFICANCE).then_some(Finding::DropOut(finding))
+        (p_value(x, sample, samples)? <= DROP_OUT_LEVEL).then_some(Finding::DropOut(finding))
     };
     (0..response.channels()).filter_map(one).collect()
 }
@@ -58,29 +56,40 @@ fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
     runs.max_by_key(|(first, len)| (*len, std::cmp::Reverse(*first)))
 }
 
-/// Bound on the probability of such a run anywhere, by the side of it that has more equal neighbours; `None` without
-/// samples on both sides.
+/// Probability that such a run is one of those of the channel; `None` unless the channel moves on both sides.
 fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
-    let reach = NEIGHBOURS.max(samples);
-    let end = sample + samples;
-    let before = &x[sample.saturating_sub(reach)..sample];
-    let after = &x[end..x.len().min(end + reach)];
-    let least = NEIGHBOURS.min(samples);
-    if before.len() < least || after.len() < least {
+    let (before, after) = (&x[..sample], &x[sample + samples..]);
+    let changes = x.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
+    let step = changes.fold(f64::INFINITY, f64::min);
+    let near = DROP_OUT_NEIGHBOURS;
+    let moves =
+        |side: &[f64]| side.len() >= near.min(samples) && deviation(side) >= DROP_OUT_MOTION * step;
+    let near_before = &before[before.len().saturating_sub(near)..];
+    if !(moves(near_before) && moves(&after[..after.len().min(near)])) {
         return None;
     }
-    let again = continuation(before).max(continuation(after));
-    Some((x.len() as f64 * again.powf(samples as f64 - 1.0)).min(1.0))
+    let runs = before.chunk_by(|a, b| a == b).chain(after.chunk_by(|a, b| a == b));
+    let second = runs.map(<[f64]>::len).max()?;
+    Some(continuation([before, after]).powf((samples - second) as f64))
+}
+
+/// Standard deviation of samples.
+fn deviation(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
 }
 
 /// Probability that a sample equals the one before, where that did so, too.
-fn continuation(x: &[f64]) -> f64 {
-    let equal: Vec<bool> = x.windows(2).map(|pair| pair[0] == pair[1]).collect();
-    let count = equal.iter().filter(|equal| **equal).count() as f64;
-    let twice = equal.windows(2).filter(|pair| pair[0] && pair[1]).count() as f64;
-    // One sample more than was seen, with the frequency of equal neighbours at all.
-    let rate = (count + 1.0) / (equal.len() as f64 + 1.0);
-    (twice + rate) / (count + 1.0)
+fn continuation(parts: [&[f64]; 2]) -> f64 {
+    let (mut pairs, mut equal, mut twice) = (0_usize, 0_usize, 0_usize);
+    for x in parts {
+        pairs += x.len().saturating_sub(1);
+        equal += x.windows(2).filter(|x| x[0] == x[1]).count();
+        twice += x.windows(3).filter(|x| x[0] == x[1] && x[1] == x[2]).count();
+    }
+    // One pair more than was seen, with the frequency of equal neighbours at all.
+    let rate = (equal as f64 + 1.0) / (pairs as f64 + 1.0);
+    (twice as f64 + rate) / (equal as f64 + 1.0)
 }
 
 impl Check for DropOut {

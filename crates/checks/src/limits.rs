@@ -250,3 +250,13 @@ pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
 /// Likewise, maximum number of products, sensitivities times parameters: some seconds.
 pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
+
+/// Number of samples on either side of a run of equal ones by which a drop-out is judged.
+pub const DROP_OUT_NEIGHBOURS: usize = 64;
+
+/// Standard deviation of these samples, in steps of the converter, from which a channel moves: a structure that comes to
+/// rest goes through a few steps.
+pub const DROP_OUT_MOTION: f64 = 10.0;
+
+/// Probability at which a run of equal samples is a drop-out: those that are have far smaller ones.
+pub const DROP_OUT_LEVEL: f64 = 1e-4;
