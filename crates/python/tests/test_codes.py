@@ -38,7 +38,8 @@ VARIANTS = re.compile(
 def failures() -> dict[str, str]:
     """Codes of all failures of the library and what they are, from its sources."""
     found: dict[str, str] = {}
-    others = ["mechid/src/simulation", "modal/src/free_decay", "modal/src/ambient"]
+    others = ["mechid/src/simulation", "modal/src/free_decay", "modal/src/ambient", "model/src/elements",
+              "estimate/src/likelihood"]
     paths = [*ROOT.glob("crates/*/src/error.rs"), *(ROOT / f"crates/{at}/error.rs" for at in others)]
     for path in paths:
         for kind, body in ENUMS.findall(path.read_text(encoding="utf-8")):

@@ -111,7 +111,8 @@ def identify(
 ) -> Identified:
     """Identify mass, damping and stiffness from measured forces and responses.
 
-    Every option of the program's ``mechid identify`` is a keyword of the same name.
+    Every option of the program's ``mechid identify`` is a keyword of the same name, but those of
+    ``--machine``, which `identify_elements` has.
 
     Parameters
     ----------
@@ -338,7 +339,7 @@ def identify_elements(
         inner = _mechid.identify_elements([], tables, [], of_parts, settings, threads)
     else:
         if not all(isinstance(source, Measurement) for source in sources):
-            record = {**{kind: names for kind, names in columns.items() if names}, **record}  # type: ignore[assignment, typeddict-item]
+            record = {**{kind: names for kind, names in columns.items() if names}, **record}
         records = [one._inner for one in measurements(sources, "identify_elements", record)]
         inner = _mechid.identify_elements(records, [], [], of_parts, settings, threads)
     return IdentifiedElements(inner)
