@@ -23,7 +23,9 @@ impl Session {
     pub fn new(root: &Path) -> Self {
         let home = tempfile::tempdir().unwrap();
         let folder = home.path().to_owned();
-        fs::create_dir(folder.join("examples")).unwrap();
+        for name in ["examples", "examples/frame", "examples/rotor"] {
+            fs::create_dir(folder.join(name)).unwrap();
+        }
         for file in [
             "machine.json",
             "machine.csv",
@@ -32,6 +34,12 @@ impl Session {
             "hammer-1.csv",
             "hammer-2.csv",
             "decay.csv",
+            "frame/frame.csv",
+            "rotor/rotor.json",
+            "rotor/mass.mtx",
+            "rotor/stiffness.mtx",
+            "rotor/gyroscopic.mtx",
+            "rotor/runs.csv",
         ] {
             let name = Path::new("examples").join(file);
             fs::copy(root.join(&name), folder.join(&name)).unwrap();
