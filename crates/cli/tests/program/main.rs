@@ -2,6 +2,7 @@
 
 mod bearing;
 mod checks;
+mod elements;
 mod fleet;
 mod forces;
 mod hammer;

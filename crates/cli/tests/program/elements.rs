@@ -1,0 +1,336 @@
+//! `mechid identify --machine`: machines of named elements, from records and tables.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Complex;
+use serde_json::{Value, json};
+
+use super::{mechid, refused};
+
+/// Three masses in a row; all are recorded, and noisy.
+fn simulated() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = json!({
+        "system": {
+            "mass": [[2.0, 0, 0], [0, 1.5, 0], [0, 0, 1.2]],
+            "damping": [[10.0, -4, 0], [-4, 7, -3], [0, -3, 3]],
+            "stiffness": [[50000.0, -20000, 0], [-20000, 45000, -25000], [0, -25000, 25000]]
+        },
+        "sampling": {"samples": 512, "rate_hz": 128},
+        "excitation": [{"dof": 1, "lines": "4:200", "amplitude": 1, "phases": "random", "seed": 1}],
+        "periods": 6,
+        "scheme": {"name": "exact"},
+        "response": "periodic",
+        "noise": {"displacement": {"fraction_of_rms": 0.01}, "seed": 3}
+    });
+    write(folder.path(), "rig.json", &experiment);
+    mechid(folder.path(), "simulate rig.json --output rig.csv");
+    write(folder.path(), "three.json", &three());
+    folder
+}
+
+/// The same as its engineer draws it: two sensors, springs and dampers unknown.
+fn three() -> Value {
+    let link = |name: &str, ends: Value| {
+        let mut link =
+            json!({"name": name, "k": {"start": 3e4, "min": 0}, "c": {"start": 4, "min": 0}});
+        let field = if ends.is_array() { "between" } else { "at" };
+        link[field] = ends;
+        link
+    };
+    json!({
+        "dofs": ["x1", "x2", "x3"],
+        "elements": [
+            {"name": "m1", "at": "x1", "m": 2.0},
+            {"name": "m2", "at": "x2", "m": 1.5},
+            {"name": "m3", "at": "x3", "m": 1.2},
+            link("s1", json!("x1")),
+            link("s2", json!(["x1", "x2"])),
+            link("s3", json!(["x2", "x3"]))
+        ],
+        "sensors": [
+            {"name": "displacement_1", "at": "x1", "quantity": "displacement"},
+            {"name": "displacement_3", "at": "x3", "quantity": "displacement"}
+        ],
+        "inputs": [{"kind": "force", "name": "force_1", "at": "x1"}]
+    })
+}
+
+fn write(folder: &Path, name: &str, value: &Value) {
+    fs::write(folder.join(name), value.to_string()).unwrap();
+}
+
+fn identified(folder: &Path, arguments: &str) -> Value {
+    serde_json::from_str(&mechid(folder, &format!("identify {arguments} --json"))).unwrap()
+}
+
+/// Value and standard error of an unknown.
+fn unknown(report: &Value, name: &str) -> [f64; 2] {
+    let rows = report["parameters"].as_array().unwrap();
+    let row = rows.iter().find(|row| row["name"] == name).unwrap();
+    ["value", "standard_error"].map(|field| row[field].as_f64().unwrap())
+}
+
+/// Judge: the springs and dampers behind the matrices of the simulation.
+const TRUTH: [(&str, f64); 6] =
+    [("s1.k", 3e4), ("s1.c", 6.0), ("s2.k", 2e4), ("s2.c", 4.0), ("s3.k", 2.5e4), ("s3.c", 3.0)];
+
+fn is_true(report: &Value) {
+    for (name, truth) in TRUTH {
+        let [value, error] = unknown(report, name);
+        assert!((value - truth).abs() < 4.5 * error, "{name}: {value} ± {error}, {truth}");
+        assert!(error < 0.05 * truth, "{name}: {value} ± {error}");
+    }
+}
+
+#[test]
+fn two_sensors_find_springs_and_dampers_and_other_commands_read_the_result() {
+    let folder = simulated();
+    let at = folder.path();
+    let periodic = identified(at, "rig.csv --machine three.json --period 512");
+    is_true(&periodic);
+    assert_eq!(periodic["tests"][0]["kind"], "periods");
+    assert!(periodic["misfit_p_value"].as_f64().unwrap() > 1e-4);
+    let open = identified(at, "rig.csv --machine three.json --band-hz 1:50 --starts 1");
+    is_true(&open);
+    assert_eq!(open["tests"][0]["kind"], "open");
+    write(at, "found.json", &periodic);
+    // The saved settings hold the whole description.
+    assert_eq!(periodic["analysis"]["machine"]["elements"].as_array().unwrap().len(), 6);
+    let modes: Value = serde_json::from_str(&mechid(at, "modes found.json --json")).unwrap();
+    let error = modes["modes"][0]["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
+    assert!(error > 0.0 && error < 1e-2, "{error}");
+    let force = mechid(
+        at,
+        "force rig.csv --system found.json --displacement displacement_1,0,displacement_3 \
+         --forced 1 --period 512 --lines 4:200",
+    );
+    assert!(force.contains("standard error (N)"), "{force}");
+    let all = "--displacement displacement_1,displacement_2,displacement_3";
+    let predicted =
+        mechid(at, &format!("predict found.json rig.csv --force force_1,0,0 {all} --period 512"));
+    assert!(predicted.contains("displacement_2"), "{predicted}");
+}
+
+/// Frequency responses of `mechid frf` in place of the record.
+#[test]
+fn a_table_of_frequency_responses_gives_the_same() {
+    let folder = simulated();
+    let at = folder.path();
+    let columns = "--force force_1 --displacement displacement_1,displacement_2,displacement_3";
+    mechid(at, &format!("frf rig.csv {columns} --period 512 --output frf.csv"));
+    let mut machine = three();
+    for (sensor, name) in machine["sensors"].as_array_mut().unwrap().iter_mut().zip(["1", "3"]) {
+        sensor["name"] = json!(name);
+    }
+    machine["inputs"][0]["name"] = json!("1");
+    write(at, "table.json", &machine);
+    let report = identified(at, "frf.csv --frf-table --machine table.json");
+    assert_eq!(report["tests"][0]["kind"], "responses");
+    is_true(&report);
+}
+
+/// A rigid rotor on a bearing with trial weights over the speed; its response is known in closed form.
+#[test]
+fn unbalance_over_the_speed_gives_a_bearing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mass, stiffness, damping) = (10.0, [1.2e6, 8e5], [900.0, 700.0]);
+    let (trial, residual) = (Complex::new(1e-4, 0.0), Complex::new(3e-5, -2e-5));
+    let mut text = String::from(
+        "speed_rpm,u_real,u_imaginary,x_amplitude [um],x_phase_deg,x_standard_error [um],\
+         y_real,y_imaginary,y_standard_error\n",
+    );
+    for (run, weight) in [Complex::default(), trial].into_iter().enumerate() {
+        for step in 0..12 {
+            let rpm = 1200.0 + 200.0 * f64::from(step);
+            let omega = rpm * TAU / 60.0;
+            let unbalance = (weight + residual) * omega * omega;
+            let motion = |at: usize, force: Complex<f64>| {
+                force / Complex::new(stiffness[at] - mass * omega * omega, omega * damping[at])
+            };
+            // An error of two standard errors or less, without a pattern.
+            let error = |at: usize| {
+                let phase = f64::from(step * 7 + 3) * (1.3 + at as f64) + run as f64;
+                Complex::from_polar(1e-7, phase)
+            };
+            let x = motion(0, unbalance) + error(0);
+            let y = motion(1, unbalance * Complex::new(0.0, -1.0)) + error(1);
+            let (amplitude, phase) = (x.norm() * 1e6, x.arg().to_degrees());
+            writeln!(
+                text,
+                "{rpm},{},{},{amplitude},{phase},0.1,{},{},1e-7",
+                weight.re, weight.im, y.re, y.im
+            )
+            .unwrap();
+        }
+    }
+    fs::write(folder.path().join("runs.csv"), text).unwrap();
+    let machine = json!({
+        "dofs": ["x", "y"],
+        "elements": [
+            {"name": "disc", "dofs": ["x", "y"], "mass": "disc.csv"},
+            {"name": "film", "at": ["x", "y"], "kxx": {"start": 1e6}, "kyy": {"start": 1e6},
+             "cxx": {"start": 500}, "cyy": {"start": 500}},
+            {"name": "rest", "kind": "unbalance", "at": ["x", "y"],
+             "real": {"start": 0}, "imaginary": {"start": 0}}
+        ],
+        "sensors": [
+            {"at": "x", "quantity": "displacement"},
+            {"at": "y", "quantity": "displacement"}
+        ],
+        "inputs": [{"kind": "unbalance", "name": "u", "at": ["x", "y"]}],
+        "speed": "synchronous",
+        "candidates": {"sensors": [{"at": "x", "quantity": "velocity"}]}
+    });
+    fs::write(folder.path().join("disc.csv"), "10,0\n0,10\n").unwrap();
+    write(folder.path(), "rotor.json", &machine);
+    let report = identified(folder.path(), "runs.csv --machine rotor.json --speed-table");
+    for (name, truth) in [
+        ("film.kxx", stiffness[0]),
+        ("film.kyy", stiffness[1]),
+        ("film.cxx", damping[0]),
+        ("film.cyy", damping[1]),
+        ("rest.real", residual.re),
+        ("rest.imaginary", residual.im),
+    ] {
+        let [value, error] = unknown(&report, name);
+        assert!((value - truth).abs() < 4.0 * error, "{name}: {value} ± {error}, {truth}");
+        assert!(error < 0.05 * truth.abs(), "{name}: {value} ± {error}");
+    }
+    assert_eq!(report["candidates"][0]["name"], "x");
+    let message = refused(folder.path(), "identify runs.csv --machine rotor.json");
+    assert!(message.contains("give a table over the speed (--speed-table)"), "{message}");
+}
+
+/// One line each, with the name of what does not make sense.
+#[test]
+fn bad_descriptions_are_told_by_name() {
+    let folder = simulated();
+    let at = folder.path();
+    let message = |change: &dyn Fn(&mut Value)| {
+        let mut machine = three();
+        change(&mut machine);
+        write(at, "bad.json", &machine);
+        let message = refused(at, "identify rig.csv --machine bad.json --period 512");
+        assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+        message
+    };
+    let told = message(&|m| m["elements"][4]["between"] = json!(["x1", "x9"]));
+    assert!(told.contains("element \"s2\" is at \"x9\", which is none of"), "{told}");
+    let told = message(&|m| m["elements"][3]["k"] = json!({"start": 2, "min": 3, "max": 1}));
+    assert!(told.contains("the bounds of \"s1.k\" contradict each other"), "{told}");
+    let told = message(&|m| m["sensors"][0]["at"] = json!("nowhere"));
+    assert!(told.contains("sensor \"displacement_1\" is at \"nowhere\""), "{told}");
+    let told = message(&|m| m["elements"][2] = m["elements"][1].clone());
+    assert!(told.contains("the element \"m2\" appears twice"), "{told}");
+    let told = message(&|m| drop(m["elements"].as_array_mut().unwrap().remove(2)));
+    assert!(told.contains("degree of freedom \"x3\" has no mass (it belongs to \"s3\")"), "{told}");
+    let told = message(&|m| m["dofs"] = json!(["x1", "x2", "x3", "x4"]));
+    assert!(told.contains("no element holds degree of freedom \"x4\""), "{told}");
+    let told = message(&|m| m["elements"][3]["k"] = json!({"begin": 2}));
+    assert!(told.contains("elements[3].k.begin: unknown field `begin`"), "{told}");
+    let told = message(&|m| {
+        m["elements"] = json!([
+            {"name": "body", "dofs": ["x1", "x2", "x3"],
+             "mass": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "stiffness": "lost.mtx"}
+        ]);
+    });
+    assert!(told.contains("lost.mtx"), "{told}");
+    // Nothing that the data could determine is a failure, one combination of several is not.
+    let told = message(&|m| {
+        for at in 3..6 {
+            (m["elements"][at]["k"], m["elements"][at]["c"]) = (json!(3e4), json!(4));
+        }
+        let nothing = json!({"name": "none", "dofs": ["x1"], "stiffness": [[0]],
+            "stiffness_factor": {"start": 1}});
+        m["elements"].as_array_mut().unwrap().push(nothing);
+    });
+    assert!(told.contains("the data do not determine none.stiffness: add a sensor"), "{told}");
+    let mut machine = three();
+    let beside = json!({"name": "beside", "at": "x1", "k": {"start": 1e3}});
+    machine["elements"].as_array_mut().unwrap().push(beside);
+    write(at, "beside.json", &machine);
+    let text = mechid(at, "identify rig.csv --machine beside.json --period 512");
+    let told = "the data determine s1.k and beside only by their sum s1.k + beside";
+    assert!(text.contains(told), "{text}");
+    let message = refused(at, "identify rig.csv --machine three.json --mass 3");
+    assert!(message.contains("cannot be used with"), "{message}");
+}
+
+/// Samples of the acceleration along the table, of a logger whose table begins at `PacketCounter`.
+fn logged(file: &Path) -> Option<Vec<f64>> {
+    let text = fs::read_to_string(file).ok()?;
+    let rows = text.lines().skip_while(|line| !line.starts_with("PacketCounter")).skip(2);
+    let along = |row: &str| row.split(',').nth(5)?.trim().parse::<f64>().ok();
+    let values: Vec<f64> = rows.map_while(along).collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    Some(values.iter().map(|value| value - mean).collect())
+}
+
+/// A model of one storey under an earthquake, on two wireless loggers at 120 Hz. Judge: the highest peak of the
+/// spectrum of the storey is at 21.98 Hz.
+#[test]
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
+fn two_loggers_on_a_shake_table() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/shake-table");
+    let [ground, top] =
+        ["ground", "top"].map(|place| logged(&data.join(format!("stiff1_elcentro1_{place}.csv"))));
+    let Some((ground, top)) = ground.zip(top) else {
+        eprintln!("skipped: there is no {}", data.display());
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("ground,top\n");
+    for (ground, top) in ground.iter().zip(&top) {
+        writeln!(text, "{ground},{top}").unwrap();
+    }
+    fs::write(folder.path().join("quake.csv"), text).unwrap();
+    let machine = json!({
+        "dofs": ["top"],
+        "elements": [
+            {"name": "m", "at": "top", "m": 1},
+            {"name": "frame", "at": "top", "k": {"start": 1.5e4, "min": 1e3, "max": 1e5},
+             "c": {"start": 5, "min": 0}}
+        ],
+        "sensors": [{"at": "top", "quantity": "acceleration",
+            "delay": {"start": 0, "min": -0.05, "max": 0.05}}],
+        "inputs": [{"kind": "support", "name": "ground", "quantity": "acceleration"}]
+    });
+    write(folder.path(), "storey.json", &machine);
+    for band in ["10:35", "18:26"] {
+        let report = identified(
+            folder.path(),
+            &format!("quake.csv --machine storey.json --sample-rate 120 --band-hz {band}"),
+        );
+        let hz = report["modes"][0]["natural_frequency_hz"]["value"].as_f64().unwrap();
+        assert!((hz - 21.98).abs() < 0.1, "{hz}");
+        let [delay, error] = unknown(&report, "top.delay");
+        assert!((delay - 0.015).abs() < 3e-4 && error < 1e-4, "{delay} ± {error}");
+        // One storey is not all that moves: the residual says so.
+        let checks = report["checks"].as_array().unwrap();
+        let is_told = |check: &Value| check["subject"] == "whiteness" && check["verdict"] != "good";
+        assert!(checks.iter().any(is_told), "{checks:?}");
+    }
+}
+
+/// A saved analysis of the same kind makes a row of every record.
+#[test]
+fn fleets_identify_machines_of_elements() {
+    let folder = simulated();
+    let at = folder.path();
+    let settings = &identified(at, "rig.csv --machine three.json --period 512")["analysis"];
+    let window = json!({"start": 1, "period": 512});
+    write(at, "analysis.json", &json!({"window": window, "elements": settings}));
+    let report = mechid(at, "fleet rig.csv --analysis analysis.json --output results --json");
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!((&report["computed_records"], &report["failed"]), (&json!(1), &json!(0)));
+    let trends = mechid(at, "trends results");
+    assert!(trends.contains("s2.k"), "{trends}");
+    let both = json!({"elements": settings, "channels": {"force": ["force_1"]}});
+    write(at, "both.json", &both);
+    let message = refused(at, "fleet rig.csv --analysis both.json --output more");
+    assert!(message.contains("has columns and settings of its own"), "{message}");
+}
