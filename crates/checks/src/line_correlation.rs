@@ -5,9 +5,9 @@ use nalgebra::Complex;
 
 use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
 
-/// Correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l + d), less their
-/// expectation, at the distances d = 1, 2 … in lines; `explained` are orthonormal columns of what the
-/// parameters explain. `None` if there are too few lines or the residual is zero.
+/// Correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l + d), less
+/// their expectation, at the distances d = 1, 2 … in lines; `explained` are orthonormal columns of
+/// what the parameters explain. `None` if there are too few lines or the residual is zero.
 ///
 /// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
 /// gives the variances of the products and the covariances of their squares.
@@ -59,8 +59,8 @@ pub(crate) fn correlation_of_lines(
     })
 }
 
-/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the
-/// given squares |r|².
+/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases
+/// and the given squares |r|².
 fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
     let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
         .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])

@@ -16,8 +16,8 @@ use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
 /// Tests the power of the residual against the noise if `source` says where that is known from
-/// ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether several searches
-/// agree ([`Finding::SearchAgreement`]).
+/// ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
@@ -46,8 +46,8 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
     findings
 }
 
-/// Tests the residual of each output of one record of the data (its `rows`) for correlation from line to
-/// line ([`Finding::Whiteness`]); empty if there are too few lines.
+/// Tests the residual of each output of one record of the data (its `rows`) for correlation from
+/// line to line ([`Finding::Whiteness`]); empty if there are too few lines.
 ///
 /// # Source
 /// That of [`after_machine_fit`].

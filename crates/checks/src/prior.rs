@@ -9,8 +9,8 @@ use super::{Subject, Verdict};
 
 /// Prior of a parameter against what the data say of it.
 ///
-/// If both are right, estimate − mean has the variance s² − v, with the variance s² of the prior and v of
-/// the estimate.
+/// If both are right, estimate − mean has the variance s² − v, with the variance s² of the prior
+/// and v of the estimate.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PriorAgreement {

@@ -10,22 +10,23 @@ use crate::{IoError, Limits, Table, json, read_matrix_market};
 /// Fields of an element that may name a file with a matrix.
 const MATRICES: [&str; 4] = ["mass", "damping", "stiffness", "gyroscopic"];
 
-/// Reads the description of a machine with its sensors and inputs in a JSON file (`-`: standard input).
+/// Reads the description of a machine with its sensors and inputs in a JSON file (`-`: standard
+/// input).
 ///
-/// A matrix of an element is a list of rows, a sparse matrix by its `size`, `rows`, `columns` and `values`,
-/// or the name of a file beside the description: Matrix Market (`.mtx`, `.mtx.gz`), or a text with one row of
-/// numbers per row of the matrix, without a header.
+/// A matrix of an element is a list of rows, a sparse matrix by its `size`, `rows`, `columns` and
+/// `values`, or the name of a file beside the description: Matrix Market (`.mtx`, `.mtx.gz`), or a
+/// text with one row of numbers per row of the matrix, without a header.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`] with what is wrong and the name of the element,
-/// [`IoError::Malformed`] for a matrix.
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`] with what is wrong and the name of
+/// the element, [`IoError::Malformed`] for a matrix.
 pub fn read_machine(path: impl AsRef<Path>) -> Result<InstrumentedMachine, IoError> {
     let (file, described) = json::read::<Value>(path.as_ref())?;
     machine(&file, described, json::folder(path.as_ref()))
 }
 
-/// Reads the description of a machine in a JSON text, as [`read_machine`] does; `file` is its name in
-/// messages, and the files of its matrices lie in `folder`.
+/// Reads the description of a machine in a JSON text, as [`read_machine`] does; `file` is its name
+/// in messages, and the files of its matrices lie in `folder`.
 ///
 /// # Errors
 /// Those of [`read_machine`].

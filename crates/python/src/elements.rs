@@ -17,8 +17,8 @@ use crate::{answer, arrays, failure, work};
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct IdentifiedElements(Arc<mechid::IdentifiedElements>);
 
-/// Reads the description of a machine (its name in messages, its JSON, the folder of its matrices): the
-/// settings of its identification, and the columns of its records, as JSON.
+/// Reads the description of a machine (its name in messages, its JSON, the folder of its matrices):
+/// the settings of its identification, and the columns of its records, as JSON.
 #[pyfunction]
 pub fn described_machine(
     py: Python<'_>,
@@ -39,8 +39,8 @@ pub fn described_machine(
     Ok((failure::json(py, &how)?, failure::json(py, &channels)?))
 }
 
-/// Identifies a machine from records, tables of frequency responses or tables over the speed (their names
-/// and columns), and from the responses of its measured parts; settings are JSON.
+/// Identifies a machine from records, tables of frequency responses or tables over the speed (their
+/// names and columns), and from the responses of its measured parts; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (records, tables, speeds, parts, settings, threads))]
 pub fn identify_elements(

@@ -41,8 +41,8 @@ pub struct SavedAnalysis {
     pub window: Window,
     /// Settings of the identification.
     pub identify: Identify,
-    /// Settings of the identification of a machine of named elements, whose sensors and inputs name the
-    /// columns; then `channels` and `identify` are left out.
+    /// Settings of the identification of a machine of named elements, whose sensors and inputs name
+    /// the columns; then `channels` and `identify` are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elements: Option<IdentifyElements>,
     /// Settings of a modal test, which takes the place of the identification; `None`: none.
@@ -65,9 +65,9 @@ impl SavedAnalysis {
     /// Checks what no record could be identified with.
     ///
     /// # Errors
-    /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`],
-    /// and [`AnalysisError::Setting`] for a window that is counted from 0 or has no samples, and for two
-    /// kinds of identification at once.
+    /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`], and
+    /// [`AnalysisError::Setting`] for a window that is counted from 0 or has no samples, and for
+    /// two kinds of identification at once.
     pub fn check(&self) -> Result<(), AnalysisError> {
         let channels = self.record_channels()?;
         match (&self.elements, &self.modes) {
@@ -117,8 +117,8 @@ impl SavedAnalysis {
         plan.open()
     }
 
-    /// Returns a hash of all settings, in hexadecimal digits, which tells whether two rows come from
-    /// the same analysis.
+    /// Returns a hash of all settings, in hexadecimal digits, which tells whether two rows come
+    /// from the same analysis.
     pub fn hash(&self) -> String {
         // Structs of numbers and texts with named fields always have a JSON form.
         let json = serde_json::to_string(self).unwrap_or_default();

@@ -36,8 +36,8 @@ use crate::machine::Machine;
 /// Identifies the unknown coefficients of a machine of named elements by maximum likelihood.
 ///
 /// # Errors
-/// [`AnalysisError::Likelihood`] if the description does not make sense or no search ends at a minimum,
-/// [`AnalysisError::Undetermined`] if the data determine none of the unknowns.
+/// [`AnalysisError::Likelihood`] if the description does not make sense or no search ends at a
+/// minimum, [`AnalysisError::Undetermined`] if the data determine none of the unknowns.
 ///
 /// # Source
 /// That of [`identify_machine`].
@@ -94,8 +94,8 @@ impl ElementSpectrum {
     }
 }
 
-/// Amplitude of one sensor over frequency: measured, of the model, and of their difference, in the unit
-/// of the sensor.
+/// Amplitude of one sensor over frequency: measured, of the model, and of their difference, in the
+/// unit of the sensor.
 #[derive(Debug, Clone)]
 pub struct SensorSpectrum {
     /// Name of the sensor.
@@ -126,8 +126,9 @@ impl IdentifiedElements {
     /// Returns M, C (with Ω G) and K with their covariance, for `force`, `predict` and `modes`.
     ///
     /// # Errors
-    /// [`AnalysisError::Likelihood`] if a degree of freedom has no mass, [`AnalysisError::Undetermined`] if
-    /// an entry is not determined, [`AnalysisError::Setting`] if too many entries are uncertain.
+    /// [`AnalysisError::Likelihood`] if a degree of freedom has no mass,
+    /// [`AnalysisError::Undetermined`] if an entry is not determined, [`AnalysisError::Setting`] if
+    /// too many entries are uncertain.
     pub fn machine(&self) -> Result<Machine, AnalysisError> {
         machine::machine(&self.estimate, self.summary.equations)
     }

@@ -28,12 +28,12 @@ struct Signals {
 }
 
 impl ElementData {
-    /// Takes records with the columns of [`IdentifyElements::channels`]: whole periods where the window has a
-    /// period, otherwise open records.
+    /// Takes records with the columns of [`IdentifyElements::channels`]: whole periods where the
+    /// window has a period, otherwise open records.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] for settings that do not belong together or
-    /// leave no line, and if a file cannot be read.
+    /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] for settings that do not belong
+    /// together or leave no line, and if a file cannot be read.
     pub fn from_records(
         measurements: &[Measurement],
         how: &IdentifyElements,
@@ -113,7 +113,8 @@ impl Signals {
         let chosen = rule.lines(&self.inputs, period)?;
         let lines = Lines::new(self.inputs.sampling().with_len(period)?, chosen)?;
         let (p, q) = (self.outputs.channels(), self.inputs.channels());
-        // Periods of a machine have as many forces as responses; columns of zeros make up for the others.
+        // Periods of a machine have as many forces as responses; columns of zeros make up for the
+        // others.
         let channels = p.max(q);
         let padded = |record: &Record| {
             let data = record.data().rows(0, period * count);
@@ -169,8 +170,8 @@ impl Signals {
     }
 }
 
-/// The mean over the periods, with the noise that they show and its model in words; without, if there is one
-/// period or they differ by rounding only.
+/// The mean over the periods, with the noise that they show and its model in words; without, if
+/// there is one period or they differ by rounding only.
 fn with_noise(
     periods: &RepeatedPeriods,
     noise: Pooling,

@@ -17,11 +17,13 @@ use crate::limits::SAME_FREQUENCY;
 use crate::measurement::Channels;
 
 impl ElementData {
-    /// Takes tables of frequency responses, whose points have the names of the sensors and of the inputs.
+    /// Takes tables of frequency responses, whose points have the names of the sensors and of the
+    /// inputs.
     ///
     /// # Errors
     /// [`AnalysisError::NoResponse`] if a response of a sensor to a force is missing, and
-    /// [`AnalysisError::Setting`] for a table of another quantity, or without a force of the machine.
+    /// [`AnalysisError::Setting`] for a table of another quantity, or without a force of the
+    /// machine.
     pub fn from_responses(
         tables: &[FrequencyResponses],
         how: &IdentifyElements,
@@ -30,13 +32,13 @@ impl ElementData {
         joined(tables.iter().map(|table| from_table(table, how)))
     }
 
-    /// Returns the same for a machine of which a part is known by its measured receptance, in tables whose
-    /// points have the names of the degrees of freedom `measured` of the machine. Each table is one part, free
-    /// of all others.
+    /// Returns the same for a machine of which a part is known by its measured receptance, in
+    /// tables whose points have the names of the degrees of freedom `measured` of the machine. Each
+    /// table is one part, free of all others.
     ///
     /// # Errors
-    /// [`AnalysisError::NoResponse`] if a response between two degrees of freedom of a part is missing,
-    /// [`AnalysisError::Setting`] if a frequency of the data is missing.
+    /// [`AnalysisError::NoResponse`] if a response between two degrees of freedom of a part is
+    /// missing, [`AnalysisError::Setting`] if a frequency of the data is missing.
     pub fn with_parts(
         mut self,
         parts: &[FrequencyResponses],

@@ -13,8 +13,8 @@ use crate::measurement::Channels;
 
 /// Settings of the identification of a machine of named elements.
 ///
-/// Whether a record is taken as whole periods or as an open one follows from its window: whole periods
-/// where `period` is given.
+/// Whether a record is taken as whole periods or as an open one follows from its window: whole
+/// periods where `period` is given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentifyElements {

@@ -13,8 +13,8 @@ use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
 use crate::measurement::Channels;
 
-/// Names of the column of speeds, each with the number of hertz in its unit; `speed` needs a unit of its
-/// own.
+/// Names of the column of speeds, each with the number of hertz in its unit; `speed` needs a unit
+/// of its own.
 const SPEEDS: [(&str, Option<f64>); 6] = [
     ("speed_rpm", Some(1.0 / 60.0)),
     ("rpm", Some(1.0 / 60.0)),
@@ -25,16 +25,18 @@ const SPEEDS: [(&str, Option<f64>); 6] = [
 ];
 
 impl ElementData {
-    /// Takes tables of synchronous responses: one row per speed of a run, whose amplitudes turn as e^{iΩt}.
+    /// Takes tables of synchronous responses: one row per speed of a run, whose amplitudes turn as
+    /// e^{iΩt}.
     ///
-    /// The speed is in a column `speed_rpm`, `speed_hz`, `speed_rad_s`, or `speed` with a unit. Each sensor
-    /// and each input has the columns NAME_real and NAME_imaginary, or NAME_amplitude and NAME_phase_deg (or
-    /// NAME_phase_rad), in SI units or those of their headers; an unbalance is in kg·m. Beside them may stand
-    /// NAME_standard_error, of real and imaginary part alike, for every sensor.
+    /// The speed is in a column `speed_rpm`, `speed_hz`, `speed_rad_s`, or `speed` with a unit.
+    /// Each sensor and each input has the columns NAME_real and NAME_imaginary, or NAME_amplitude
+    /// and NAME_phase_deg (or NAME_phase_rad), in SI units or those of their headers; an unbalance
+    /// is in kg·m. Beside them may stand NAME_standard_error, of real and imaginary part alike, for
+    /// every sensor.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] for a machine whose speed is not `synchronous` and for a missing column, and
-    /// if a column is not of numbers.
+    /// [`AnalysisError::Setting`] for a machine whose speed is not `synchronous` and for a missing
+    /// column, and if a column is not of numbers.
     pub fn from_speeds(tables: &[Table], how: &IdentifyElements) -> Result<Self, AnalysisError> {
         how.machine.assembly().map_err(AnalysisError::machine)?;
         if how.machine.instruments.speed != Speed::Synchronous {

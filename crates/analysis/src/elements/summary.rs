@@ -21,7 +21,8 @@ use crate::identify::checks::{CheckRow, When};
 use crate::identify::rows::ModeRow;
 use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
 
-/// The identified coefficients of a machine with their uncertainty, and what they were identified from.
+/// The identified coefficients of a machine with their uncertainty, and what they were identified
+/// from.
 #[derive(Debug, Serialize)]
 pub struct ElementSummary {
     /// Tests that were fitted together.

@@ -73,7 +73,8 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Modes up to the highest frequency of the data, with an empty line above; nothing without any.
+    /// Modes up to the highest frequency of the data, with an empty line above; nothing without
+    /// any.
     fn mode_table(&self) -> String {
         let header = ["mode", "value", "±"].map(String::from).to_vec();
         let mut rows = vec![header];
@@ -98,7 +99,8 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Mean over the determined parameters of what a candidate takes off their standard errors, in per cent.
+    /// Mean over the determined parameters of what a candidate takes off their standard errors, in
+    /// per cent.
     fn reduction(&self, row: &CandidateRow) -> Option<f64> {
         let pairs = self.parameters.iter().zip(&row.standard_errors);
         let reductions: Vec<f64> = pairs

@@ -14,9 +14,10 @@ use crate::error::CliError;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Machine of named elements")]
 pub struct ElementArgs {
-    /// Find the unknown coefficients of the machine in this description: degrees of freedom, elements
-    /// (masses, springs and dampers, bearings, known matrices), sensors anywhere, and inputs (forces,
-    /// motion of the support, unbalance). Columns have the names of sensors and inputs. A record with
+    /// Find the unknown coefficients of the machine in this description: degrees of freedom,
+    /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
+    /// inputs (forces, motion of the support, unbalance). Columns have the names of sensors and
+    /// inputs. A record with
     /// --period is taken as whole periods, otherwise as an open record
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
@@ -24,17 +25,17 @@ pub struct ElementArgs {
           "derivatives", "refine", "from_frf", "segment", "validate", "fitted_lines", "more_starts", "quantity", "averages", "points"])]
     machine: Option<PathBuf>,
     /// The files are tables of synchronous responses, a row for each speed of a run: speed_rpm (or
-    /// speed_hz), and of each sensor and unbalance NAME_amplitude and NAME_phase_deg, or NAME_real and
-    /// NAME_imaginary; in SI units, unbalance in kg·m
+    /// speed_hz), and of each sensor and unbalance NAME_amplitude and NAME_phase_deg, or NAME_real
+    /// and NAME_imaginary; in SI units, unbalance in kg·m
     #[arg(long, requires = "machine", conflicts_with_all = ["frf_table", "period", "start",
           "sample_rate", "time", "detrend", "noise"])]
     speed_table: bool,
-    /// Table of frequency responses of a part whose receptance stands for a model of it, free of all
-    /// other parts; may be repeated
+    /// Table of frequency responses of a part whose receptance stands for a model of it, free of
+    /// all other parts; may be repeated
     #[arg(long, value_name = "TABLE", requires = "machine")]
     part: Vec<PathBuf>,
-    /// Number of searches at most: one from the first values of the description, the others from random
-    /// ones [default: 12]
+    /// Number of searches at most: one from the first values of the description, the others from
+    /// random ones [default: 12]
     #[arg(long, value_name = "COUNT", requires = "machine", value_parser = at_least_one)]
     starts: Option<usize>,
     /// Seed of the random first values [default: 0]

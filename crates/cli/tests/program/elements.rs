@@ -133,7 +133,8 @@ fn a_table_of_frequency_responses_gives_the_same() {
     is_true(&report);
 }
 
-/// A rigid rotor on a bearing with trial weights over the speed; its response is known in closed form.
+/// A rigid rotor on a bearing with trial weights over the speed; its response is known in closed
+/// form.
 #[test]
 fn unbalance_over_the_speed_gives_a_bearing() {
     let folder = tempfile::tempdir().unwrap();
@@ -270,8 +271,8 @@ fn logged(file: &Path) -> Option<Vec<f64>> {
     Some(values.iter().map(|value| value - mean).collect())
 }
 
-/// A model of one storey under an earthquake, on two wireless loggers at 120 Hz. Judge: the highest peak of the
-/// spectrum of the storey is at 21.98 Hz.
+/// A model of one storey under an earthquake, on two wireless loggers at 120 Hz. Judge: the highest
+/// peak of the spectrum of the storey is at 21.98 Hz.
 #[test]
 #[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn two_loggers_on_a_shake_table() {
