@@ -268,6 +268,27 @@ impl ModeComparison {
     }
 }
 
+impl ModeComparison {
+    /// What has changed, modes without a partner, and what to know of the numbers.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        for pair in self.pairs.iter().filter(|pair| !pair.changes().is_empty()) {
+            remarks.push(format!("modes {}: different {}", pair.name(), pair.changes().join(", ")));
+        }
+        for (rows, which) in [(&self.only_first, "first"), (&self.only_second, "second")] {
+            remarks.extend(rows.iter().map(|LoneRow { mode, natural_frequency_hz }| {
+                let hz = significant(*natural_frequency_hz, 5);
+                format!("only in the {which} set: mode {mode}, {hz} Hz")
+            }));
+        }
+        if self.points.len() == 1 {
+            let why = "note: at one point shapes cannot be compared: pairs are by frequency alone";
+            remarks.push(why.into());
+        }
+        remarks
+    }
+}
+
 impl fmt::Display for ModeComparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [first, second] = &self.sets;
@@ -284,22 +305,7 @@ impl fmt::Display for ModeComparison {
             f.write_str(&self.shape_table())?;
             f.write_str(&self.mac_table())?;
         }
-        writeln!(f)?;
-        for pair in self.pairs.iter().filter(|pair| !pair.changes().is_empty()) {
-            writeln!(f, "modes {}: different {}", pair.name(), pair.changes().join(", "))?;
-        }
-        for (rows, which) in [(&self.only_first, "first"), (&self.only_second, "second")] {
-            for row in rows {
-                let hz = significant(row.natural_frequency_hz, 5);
-                writeln!(f, "only in the {which} set: mode {}, {hz} Hz", row.mode)?;
-            }
-        }
-        if self.points.len() == 1 {
-            writeln!(
-                f,
-                "note: at one point shapes cannot be compared: pairs are by frequency alone"
-            )?;
-        }
-        Ok(())
+        let remarks = self.remarks();
+        if remarks.is_empty() { Ok(()) } else { writeln!(f, "\n{}", remarks.join("\n")) }
     }
 }

@@ -112,6 +112,14 @@ pub(super) fn of_tables(
             significant(decay, 4)
         ));
     }
+    if tables.is_smoothed() {
+        notes.push(
+            "averages under a window err most at narrow resonances, which the noise of a table follows only \
+             in part: intervals there can be half as wide as they should be; the record itself has \
+             better ones"
+                .into(),
+        );
+    }
     let remarks = tables.with_segments().flat_map(|(table, _)| table.remarks.iter().cloned());
     notes.extend(remarks);
     let context = Context {
