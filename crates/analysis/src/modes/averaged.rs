@@ -179,14 +179,12 @@ pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64)
     let scaled = |errors: &mut Vec<Complex<f64>>| errors.iter_mut().for_each(|e| *e *= inflation);
     scaled(&mut mode.shape_standard_error);
     scaled(&mut mode.participation_standard_error);
-    let (f, zeta) = (mode.natural_frequency_hz.clone(), mode.damping_ratio.clone());
+    let (f, zeta) = (mode.natural_frequency_hz, mode.damping_ratio);
     let variance = [f.standard_error.powi(2), zeta.standard_error.powi(2)];
     let between = mode.frequency_damping_covariance;
     // (f, ζ) → (σ, ω_d) of the windowed pole → (f, ζ) of the pole without the window.
-    let windowed = mode.pole;
     mode.pole.re += added_decay;
-    let to_pole = frequency_and_damping_slopes(windowed).try_inverse().unwrap_or_default();
-    let slopes = frequency_and_damping_slopes(mode.pole) * to_pole;
+    let slopes = frequency_and_damping_slopes(mode.pole) * pole_slopes(f.value, zeta.value);
     let covariance = nalgebra::Matrix2::new(variance[0], between, between, variance[1]);
     let covariance = slopes * covariance * slopes.transpose() * inflation.powi(2);
     let size = mode.pole.norm();
@@ -204,4 +202,12 @@ fn frequency_and_damping_slopes(pole: Complex<f64>) -> nalgebra::Matrix2<f64> {
     let (re, im, size) = (pole.re, pole.im, pole.norm());
     let cubed = size.powi(3);
     nalgebra::Matrix2::new(re / size / TAU, im / size / TAU, -im * im / cubed, re * im / cubed)
+}
+
+/// Derivatives of real and imaginary part of a pole (rows) by natural frequency (Hz) and damping ratio
+/// (columns).
+fn pole_slopes(natural_frequency_hz: f64, damping_ratio: f64) -> nalgebra::Matrix2<f64> {
+    let omega = TAU * natural_frequency_hz;
+    let root = (1.0 - damping_ratio * damping_ratio).sqrt();
+    nalgebra::Matrix2::new(-TAU * damping_ratio, -omega, TAU * root, -omega * damping_ratio / root)
 }

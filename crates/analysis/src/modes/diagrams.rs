@@ -54,16 +54,21 @@ pub struct ModeIndicator {
 /// Data from which the diagrams follow.
 #[derive(Debug)]
 pub(super) enum Source {
-    Forced {
-        data: LineData,
-        estimate: ModalEstimate,
-        is_table: bool,
-        /// Quantity of each response.
-        quantities: Vec<Option<ResponseQuantity>>,
-        /// Decay rate, in 1/s, that an exponential window adds.
-        added_decay: Option<f64>,
-    },
+    Forced(Box<Forced>),
     Ambient(Stabilisation),
+}
+
+/// Fit of a test with measured forces.
+#[derive(Debug)]
+pub(super) struct Forced {
+    pub data: LineData,
+    pub estimate: ModalEstimate,
+    /// `true` if the data are tables of frequency responses.
+    pub is_table: bool,
+    /// Quantity of each response.
+    pub quantities: Vec<Option<ResponseQuantity>>,
+    /// Decay rate, in 1/s, that an exponential window adds.
+    pub added_decay: Option<f64>,
 }
 
 impl Source {
@@ -73,7 +78,8 @@ impl Source {
                 stabilisation: StabilisationRows::new(stabilisation),
                 mode_indicator: None,
             },
-            Self::Forced { data, estimate, is_table, .. } => {
+            Self::Forced(forced) => {
+                let Forced { data, estimate, is_table, .. } = &**forced;
                 let stabilisation = mechid_modal::stabilisation_of(data)?;
                 Diagrams {
                     stabilisation: StabilisationRows::new(&stabilisation),
@@ -135,9 +141,12 @@ impl ModeIndicator {
     }
 }
 
+/// Frequencies (rad/s), and the response at each.
+type MeasuredResponses = (Vec<f64>, Vec<DMatrix<Complex<f64>>>);
+
 /// Returns the frequencies (rad/s) and responses, outputs × inputs, of a table in which every force has
 /// one record on the same lines; `None` of others.
-fn measured_responses(data: &LineData) -> Option<(Vec<f64>, Vec<DMatrix<Complex<f64>>>)> {
+fn measured_responses(data: &LineData) -> Option<MeasuredResponses> {
     let (inputs, outputs) = (data.inputs().ncols(), data.outputs().ncols());
     let records = data.records();
     let (first, _) = records.first()?;

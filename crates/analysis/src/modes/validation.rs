@@ -19,15 +19,14 @@ impl Modes {
     /// of forces or responses, and if a file cannot be read.
     pub fn predict(&self, measurements: &[Measurement]) -> Result<Vec<f64>, AnalysisError> {
         let ModesSummary { analysis, band_hz, .. } = self.summary();
-        let (Source::Forced { estimate, .. }, ModalTest::Forced { hits }) =
-            (&self.source, &analysis.test)
+        let (Source::Forced(forced), ModalTest::Forced { hits }) = (&self.source, &analysis.test)
         else {
             let why = "without measured forces there is nothing to predict from".into();
             return Err(AnalysisError::Setting { setting: "validate", why });
         };
         let recorded = Recorded::from_forced(measurements, hits.as_ref(), &analysis.places)?;
         let data = recorded.lines(*band_hz)?;
-        Ok(explained(data.outputs(), &estimate.synthesis(&data)?))
+        Ok(explained(data.outputs(), &forced.estimate.synthesis(&data)?))
     }
 
     /// Predicts other records as [`Modes::predict`] does, and adds the shares to the summary.
