@@ -7,15 +7,15 @@ use clap::Args;
 use mechid::analysis::identify::Band;
 use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
-use mechid::analysis::{AnalysisError, Machine, ModalSummary};
+use mechid::analysis::{AnalysisError, Machine, ModalSummary, ResponseQuantity};
 use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
 use mechid::report::{FigureStyle, ModeShapes, ToFigure, figure_page};
 use mechid::selected_modes::SelectedModes;
 use mechid::{DecaySettings, ModeSet, Modes};
 
-use crate::args::choices::QuantityChoice;
 use crate::args::hits::HitRuleArgs;
+use crate::args::word::word;
 use crate::args::{
     ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one, positive,
 };
@@ -89,8 +89,8 @@ pub struct ModesArgs {
     #[arg(long, value_name = "RECORD", conflicts_with = "validate_percent")]
     validate: Option<PathBuf>,
     /// Measured quantity of the responses of a table, if the table does not state it
-    #[arg(long, value_name = "QUANTITY", value_enum)]
-    quantity: Option<QuantityChoice>,
+    #[arg(long, value_name = "QUANTITY", value_parser = word::<ResponseQuantity>())]
+    quantity: Option<ResponseQuantity>,
     #[command(flatten)]
     hits: HitRuleArgs,
     #[command(flatten)]
@@ -346,7 +346,7 @@ impl ModesArgs {
             modes: self.modes,
             max_modes: self.max_modes,
             near_hz: self.near_hz.clone(),
-            quantity: self.quantity.map(Into::into),
+            quantity: self.quantity,
             places: Places { forces: self.force_at.clone(), responses: self.response_at.clone() },
             validate: self.validate_percent.unwrap_or(0.0) / 100.0,
         }

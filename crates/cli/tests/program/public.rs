@@ -51,6 +51,9 @@ fn mass(report: &Value) -> (f64, bool) {
     )
 }
 
+/// Lines above the numbers, the unit of the force, the response and its unit, the unit of time, and the delimiter.
+type Case<'a> = (&'a [&'a str], f64, &'a [f64], f64, f64, &'a str);
+
 /// F1, F2, F7, F31, F34, F39: units and instants that a person reads.
 #[test]
 fn units_that_stand_in_a_header_are_used() {
@@ -60,8 +63,7 @@ fn units_that_stand_in_a_header_are_used() {
     let lvm = "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tOne\n***End_of_Header***\t\n\nChannels\t2\t\t\n\
                Y_Unit_Label\tN\tg\t\nX0\t0\t0\t\nDelta_X\t0.0078125\t0.0078125\t\n***End_of_Header***\t\t";
     let meta = ["Serial,1234,5", "Range,10,100", "time,force,acc", "s,N,g"];
-    // Lines above the numbers, the force's unit, the response, its unit, the unit of time.
-    let cases: [(&[&str], f64, &[f64], f64, f64, &str); 13] = [
+    let cases: [Case<'_>; 13] = [
         (&["time,force_N,accel_g"], 1.0, &a, G, 1.0, ","),
         (&["time,Force (lbs),x [m]"], LBF, &x, 1.0, 1.0, ","),
         (&["time,{lbf} Force,x [m]"], LBF, &x, 1.0, 1.0, ","),
