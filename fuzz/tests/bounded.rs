@@ -1,4 +1,4 @@
-//! Some thousand cases of every target.
+//! Cases of every target, as many as fit into three seconds.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ fn no_target_breaks_a_promise() {
         seed: 1998,
         // Generous, for machines that do other work: a hang takes for ever.
         time_limit: Duration::from_secs(60),
-        total_time: Duration::from_secs(10),
+        total_time: Duration::from_secs(3),
     };
     let failures: Vec<String> = targets::all()
         .iter()

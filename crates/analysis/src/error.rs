@@ -191,11 +191,11 @@ pub enum AnalysisError {
     NoCommonPoint {
         /// The first set.
         first: String,
-        /// Its points.
+        /// Points of the first set.
         points: String,
         /// The second set.
         second: String,
-        /// Its points.
+        /// Points of the second set.
         other_points: String,
     },
     /// An indicator of modes cannot be computed.
@@ -418,7 +418,7 @@ pub enum AnalysisError {
     )]
     InstrumentalResponses,
     /// A steady state is predicted over whole periods.
-    #[error("`validate_samples` {samples} is less than one period of {period}")]
+    #[error("`validate`: {samples} samples are less than one period of {period}")]
     ValidationPeriod {
         /// Number of samples asked for.
         samples: usize,

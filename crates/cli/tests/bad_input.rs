@@ -94,9 +94,12 @@ fn noise_of_the_force_belongs_to_open_records() {
         ("--force-noise -1", ["--force-noise: ", "zero or positive, got -1"]),
         ("--force-noise nan", ["--force-noise: ", "zero or positive, got NaN"]),
         ("--force-noise 1,2", ["--force-noise: ", "one for each of 1 forces, not 2"]),
-        ("--force-noise 1 --period 20", ["--force-noise", "--period"]),
-        ("--force-noise 1 --from-frf h1", ["--force-noise ", "without --from-frf"]),
-        ("--force-noise 1 --method least-squares", ["--force-noise: ", "maximum-likelihood alone"]),
+        ("--force-noise 1 --period 20", ["--force-noise: ", "it is for open records"]),
+        ("--force-noise 1 --from-frf h1", ["--force-noise: ", "not to --from-frf"]),
+        (
+            "--force-noise 1 --method least-squares",
+            ["--method: ", "open records and hits take maximum-likelihood"],
+        ),
         ("--force-noise 1 --extent period", ["--force-noise: ", "it is for open records"]),
     ] {
         identify(&good(), arguments, &parts);
@@ -174,9 +177,9 @@ fn nonlinear_terms_that_cannot_be() {
     identify(&good(), "--nonlinear k3:x2^3", &["k3: x2^3", "degrees of freedom"]);
     let misplaced = ["--nonlinear: it belongs to nonlinear terms, not to --domain time"];
     identify(&good(), "--nonlinear k3:x^3 --domain time", &misplaced);
-    let not_periods = ["--nonlinear: nonlinear terms are fitted to spectra of whole periods"];
+    let not_periods = ["--nonlinear: it belongs to nonlinear terms, not to --from-frf"];
     identify(&good(), "--nonlinear k3:x^3 --from-frf h1 --segment 16", &not_periods);
-    identify(&good(), "--search phase", &["--nonlinear"]);
+    identify(&good(), "--search phase", &["--search: it belongs to nonlinear terms"]);
 }
 
 #[test]
@@ -219,7 +222,7 @@ fn no_excited_line() {
     identify(&good(), "--lines 1:20", &["line 20 is not between 1 and 15"]);
     identify(&good(), "--lines 5:1", &["\"5:1\" is no choice of lines", "first:step:last"]);
     identify(&good(), "--band-hz 60:30", &["low:high"]);
-    identify(&good(), "--period 2", &["over a period of 2 samples the force does not vary"]);
+    identify(&good(), "--period 2", &["2 equations do not determine 3 unknowns"]);
 }
 
 #[test]
@@ -354,7 +357,7 @@ fn a_free_decay_that_is_none() {
     fit("--modes 0", &["--modes"]);
     fit("--modes 99", &["99 modes cannot be fitted: from 1 to 40"]);
     fit("--from 0 --modes 5", &["the record has 32 samples where at least 61 are needed"]);
-    refused(&good(), "modes a.csv", &["the response is missing"]);
+    refused(&good(), "modes a.csv", &["name the columns of the response with --displacement"]);
     let still = record(|k| (0.004 * f64::from(k), 1.0, 2.5));
     refused(&still, "modes a.csv --displacement x --from 0", &["channel 1 is constant at 2.5"]);
     let growing = record(|k| {

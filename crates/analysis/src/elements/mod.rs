@@ -102,7 +102,7 @@ pub struct SensorSpectrum {
     pub name: String,
     /// Unit of the amplitudes.
     pub unit: &'static str,
-    /// Frequencies in Hz, rising.
+    /// Frequencies in Hz, rising, one per value below.
     pub frequency_hz: Vec<f64>,
     /// Measured amplitudes, one per frequency, in the unit of the sensor.
     pub measured: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What to know of the numbers of an identified machine.
+//! Notes on the numbers of an identified machine.
 
 use std::fmt;
 

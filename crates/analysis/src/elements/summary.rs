@@ -49,13 +49,13 @@ pub struct ElementSummary {
     pub parameter_covariance: ParameterCovariance,
     /// Unknowns of which the data determine combinations only.
     pub combinations: Vec<CombinationRow>,
-    /// Logarithm of the likelihood.
+    /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
     /// Minima found, the lowest first.
     pub minima: Vec<FoundMinimum>,
     /// Number of searches.
     pub searches: usize,
-    /// Power of the residual over its expectation; `None` where the noise comes from the residual.
+    /// Ratio of the power of the residual to its expectation; `None` where the noise comes from the residual.
     pub misfit_ratio: Option<f64>,
     /// Probability of a larger misfit if model and noise are right.
     pub misfit_p_value: Option<f64>,
@@ -71,7 +71,7 @@ pub struct ElementSummary {
     pub modes: Vec<ModeRow>,
     /// Every check, before the fit and after it.
     pub checks: Vec<CheckRow>,
-    /// What to know of the numbers.
+    /// Notes on the numbers.
     pub notes: Vec<ElementNote>,
     /// M, C (with Ω G) and K; `None` where they make no system.
     pub system: Option<SystemMatrices>,
@@ -98,7 +98,7 @@ pub struct SensorRow {
     pub name: String,
     /// Unit of the quantity.
     pub unit: &'static str,
-    /// Root mean square of the residual over that of the response.
+    /// Ratio of the root mean square of the residual to that of the response.
     pub relative_residual: f64,
 }
 
@@ -107,7 +107,7 @@ pub struct SensorRow {
 pub struct CombinationRow {
     /// The combinations, in a sentence.
     pub text: String,
-    /// Their numbers.
+    /// Numbers of the combinations.
     #[serde(flatten)]
     pub combination: Combination,
 }
@@ -122,7 +122,7 @@ pub struct CandidateRow {
     pub information_gain: Option<f64>,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
-    /// Standard errors with it, one for each parameter; `None` of what stays open.
+    /// Standard errors with it, one for each parameter, in its SI unit; `None` of what stays open.
     pub standard_errors: Vec<Option<f64>>,
 }
 

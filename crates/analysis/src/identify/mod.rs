@@ -55,6 +55,7 @@ pub mod validation;
 
 use std::fmt;
 
+use mechid_checks::Subject;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
@@ -137,7 +138,11 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     })?;
     let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
-    if is_linear && summary.fit.unexplained_motion > Some(CONSPICUOUS) {
+    let causes = [Subject::Delay, Subject::Linearity];
+    let is_named = |check: &CheckRow| check.is_conspicuous() && causes.contains(&check.subject);
+    let is_unexplained = summary.fit.unexplained_motion > Some(CONSPICUOUS);
+    // A cause that is named needs no other, and the search for modes takes seconds.
+    if is_linear && is_unexplained && !summary.checks.iter().any(is_named) {
         summary.remarks.extend(resonances::surplus(measurements));
     }
     if !period_given && is_linear && !matches!(how.source, Source::Hits(_)) {

@@ -51,13 +51,13 @@ pub const CHUNK_SAMPLES: usize = 1 << 16;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Measurement {
-    source: Arc<Source>,
+    source: Arc<RecordSource>,
     window: Window,
 }
 
 /// Samples of the columns used, and what one pass over them tells.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct RecordSource {
     /// Name for messages.
     pub name: String,
     /// Path that the record was read from; `None` for arrays.
@@ -169,7 +169,7 @@ impl Measurement {
             let place = file.head().find(column);
             place.map_or_else(|_| column.clone(), |place| file.head().short_name(place))
         };
-        let source = Source {
+        let source = RecordSource {
             names: Arc::new(channels.renamed(name)),
             name: file.head().file().to_owned(),
             path: path.map(Path::to_owned),
@@ -259,7 +259,7 @@ impl Measurement {
         let record = Record::new(sampling, data)?;
         let units = ToSi::new("the record", labels.into_iter(), &roles)?;
         let data = record.into_data();
-        let source = Source {
+        let source = RecordSource {
             name: "the record".into(),
             names: Arc::new(channels.renamed(|name| name_without_unit(name))),
             path: None,
@@ -352,7 +352,7 @@ impl Measurement {
         &self.window
     }
 
-    pub(crate) fn source(&self) -> &Arc<Source> {
+    pub(crate) fn source(&self) -> &Arc<RecordSource> {
         &self.source
     }
 
@@ -409,7 +409,7 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
     }
 }
 
-impl Source {
+impl RecordSource {
     /// Refuses work on so many samples of the columns used, of `bytes` bytes a number, that takes too
     /// much memory.
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {

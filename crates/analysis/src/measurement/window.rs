@@ -7,7 +7,7 @@ use mechid_signal::Record;
 use serde::{Deserialize, Serialize};
 
 use super::channels::ABSENT;
-use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, Source};
+use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, RecordSource};
 use crate::AnalysisError;
 use crate::limits::{STRETCH_BYTES, WHOLE_BYTES};
 
@@ -94,7 +94,7 @@ impl Hold {
 pub struct Windowed {
     /// Samples held in memory, from the first one on.
     pub held: Block,
-    source: Arc<Source>,
+    source: Arc<RecordSource>,
     /// Samples, counted from 0.
     window: Range<usize>,
 }
@@ -209,7 +209,7 @@ impl Windowed {
 }
 
 /// Returns the degrees of freedom whose force is not zero throughout.
-fn driven(source: &Source, held: &Block) -> Vec<usize> {
+fn driven(source: &RecordSource, held: &Block) -> Vec<usize> {
     let mut peaks = source.peaks.iter();
     let acts = |(dof, column): (usize, &String)| {
         let peak = if column == ABSENT { None } else { peaks.next() };

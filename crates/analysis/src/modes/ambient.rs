@@ -10,7 +10,7 @@ use mechid_modal::indicators;
 use mechid_spectra::LineData;
 
 use super::checks;
-use super::diagrams::Source;
+use super::diagrams::DiagramData;
 use super::settings::ModesSettings;
 use super::sources::{outputs_of, responses_of};
 use super::summary::{
@@ -85,7 +85,7 @@ pub(super) fn modes(
         analysis: settings.clone(),
     };
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
-    let source = Source::Ambient(estimate.stabilisation);
+    let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
 }
 

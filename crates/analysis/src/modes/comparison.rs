@@ -46,7 +46,7 @@ pub struct PairRow {
     pub damping_ratio: Option<DifferenceRow>,
     /// Modal assurance criterion, a pure number.
     pub mac: f64,
-    /// Its standard error, a pure number.
+    /// Standard error of the criterion, a pure number.
     pub mac_standard_error: f64,
     /// Probability of a difference of the shapes as large by their errors alone, adjusted for all tests;
     /// `None` without errors, or at a single point.
@@ -56,13 +56,13 @@ pub struct PairRow {
 /// A quantity in both sets, in its unit.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct DifferenceRow {
-    /// Value in the first set.
+    /// Value in the first set, in the unit of the quantity.
     pub first: f64,
     /// Value in the second set.
     pub second: f64,
     /// Second less first.
     pub difference: f64,
-    /// Standard error of the difference; 0 if both values are exact.
+    /// Standard error of the difference, in the same unit; 0 if both values are exact.
     pub standard_error: f64,
     /// Probability of a difference as large by the errors alone, adjusted for all tests of the
     /// comparison; `None` if both values are exact.

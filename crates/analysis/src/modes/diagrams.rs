@@ -31,8 +31,8 @@ pub struct StabilisationRows {
     pub frequency_hz: Vec<f64>,
     /// Damping ratios, pure numbers, one for each pole.
     pub damping_ratio: Vec<f64>,
-    /// Whether frequency and damping (and the shape, of ambient records) repeat those of a pole of the
-    /// order below, one for each pole.
+    /// Flags, one for each pole: frequency and damping (and the shape, of ambient records) repeat those of
+    /// a pole of the order below.
     pub is_stable: Vec<bool>,
 }
 
@@ -44,16 +44,16 @@ pub struct ModeIndicator {
     /// `true` of measured responses (tables), `false` of those of the identified modes and residual
     /// terms (records).
     pub is_measured: bool,
-    /// Frequencies, in Hz.
+    /// Frequencies, in Hz, one per singular value of a list.
     pub frequency_hz: Vec<f64>,
     /// Singular values, falling, each a list with one value for each frequency; responses over their
-    /// RMS in the band per force over its RMS.
+    /// RMS in the band per force over its RMS; pure numbers.
     pub singular_values: Vec<Vec<f64>>,
 }
 
 /// Data from which the diagrams follow.
 #[derive(Debug)]
-pub(super) enum Source {
+pub(super) enum DiagramData {
     Forced(Box<Forced>),
     Ambient(Stabilisation),
 }
@@ -71,7 +71,7 @@ pub(super) struct Forced {
     pub added_decay: Option<f64>,
 }
 
-impl Source {
+impl DiagramData {
     pub fn diagrams(&self) -> Result<Diagrams, AnalysisError> {
         Ok(match self {
             Self::Ambient(stabilisation) => Diagrams {

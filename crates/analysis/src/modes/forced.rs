@@ -9,7 +9,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::averaged::{Sharpened, corrected};
 use super::checks;
-use super::diagrams::{Forced, Source};
+use super::diagrams::{DiagramData, Forced};
 use super::rows::{dropped, mac, notes, row};
 use super::settings::ModesSettings;
 use super::sources::{Output, Part, Recorded};
@@ -247,8 +247,13 @@ impl Context {
         let spectrum = spectrum(&data, &estimate)?;
         let quantities = self.outputs.iter().map(|output| output.quantity).collect();
         let (is_table, added_decay) = (self.is_table, self.added_decay);
-        let source =
-            Source::Forced(Box::new(Forced { data, estimate, is_table, quantities, added_decay }));
+        let source = DiagramData::Forced(Box::new(Forced {
+            data,
+            estimate,
+            is_table,
+            quantities,
+            added_decay,
+        }));
         Ok(Modes { summary, spectrum, source })
     }
 }

@@ -23,7 +23,7 @@ use mechid_io::FrequencyResponses;
 use serde::{Serialize, Serializer};
 
 pub use self::comparison::{DifferenceRow, LoneRow, ModeComparison, PairRow, compare_modes};
-use self::diagrams::Source;
+use self::diagrams::DiagramData;
 pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
 pub use self::mode_set::ModeSet;
@@ -43,7 +43,7 @@ use crate::measurement::Measurement;
 pub struct Modes {
     summary: ModesSummary,
     spectrum: ModesSpectrum,
-    source: Source,
+    source: DiagramData,
 }
 
 /// Responses over frequency, measured and explained: root of the sum over all responses, each over its

@@ -74,12 +74,12 @@ pub struct RecordRow {
     /// Samples used; `None` of a table.
     #[serde(flatten)]
     pub window: Option<WindowRow>,
-    /// What a table states of its frequencies; `None` of a record.
+    /// Frequencies of a table and their segments; `None` of a record.
     #[serde(flatten)]
     pub table: Option<TableRow>,
 }
 
-/// What a table of frequency responses states.
+/// Frequencies and segments of a table of frequency responses.
 #[derive(Debug, Serialize)]
 pub struct TableRow {
     /// Number of frequencies.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use mechid_io::{FrequencyResponses, ResponseFunction};
 
 use super::Modes;
-use super::diagrams::{Forced, Source};
+use super::diagrams::{DiagramData, Forced};
 
 impl Modes {
     /// Returns the frequency responses of modes and residual terms at the lines of the first record,
@@ -14,7 +14,7 @@ impl Modes {
     /// Places that are nodes of a universal file (`3`, `12+Z`) are the points. Others get numbers:
     /// responses from 1 on, then forces.
     pub fn synthesis(&self) -> Option<FrequencyResponses> {
-        let Source::Forced(forced) = &self.source else { return None };
+        let DiagramData::Forced(forced) = &self.source else { return None };
         let Forced { data, estimate, quantities, added_decay, .. } = &**forced;
         let summary = self.summary();
         let rows = data.records().first().map_or(0..0, |(rows, _)| rows.clone());

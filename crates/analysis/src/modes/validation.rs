@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVectorView};
 
-use super::diagrams::Source;
+use super::diagrams::DiagramData;
 use super::settings::ModalTest;
 use super::sources::Recorded;
 use super::{Modes, ModesSummary};
@@ -19,7 +19,8 @@ impl Modes {
     /// of forces or responses, and if a file cannot be read.
     pub fn predict(&self, measurements: &[Measurement]) -> Result<Vec<f64>, AnalysisError> {
         let ModesSummary { analysis, band_hz, .. } = self.summary();
-        let (Source::Forced(forced), ModalTest::Forced { hits }) = (&self.source, &analysis.test)
+        let (DiagramData::Forced(forced), ModalTest::Forced { hits }) =
+            (&self.source, &analysis.test)
         else {
             let why = "without measured forces there is nothing to predict from".into();
             return Err(AnalysisError::Setting { setting: "validate", why });

@@ -11,11 +11,11 @@ use nalgebra::DMatrix;
 use super::scatter::{Scatter, Sums};
 use crate::AnalysisError;
 use crate::measurement::channels::ABSENT;
-use crate::measurement::{self, CHUNK_SAMPLES, Source};
+use crate::measurement::{self, CHUNK_SAMPLES, RecordSource};
 
 /// The responses in a record, of which no more is held in memory than is asked for.
 pub struct Recorded {
-    source: Arc<Source>,
+    source: Arc<RecordSource>,
     columns: Vec<String>,
     /// Number of force columns, which stand before those of the responses.
     forces: usize,

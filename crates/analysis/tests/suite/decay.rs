@@ -135,7 +135,7 @@ fn what_cannot_be_analysed_is_refused() {
 fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
     for bits in [8, 10, 12] {
         let step = 2e-3 / f64::from(1 << bits);
-        let sampling = Sampling::from_rate_hz(500.0, 16_000).unwrap();
+        let sampling = Sampling::from_rate_hz(125.0, 4_000).unwrap();
         let exact = |at: usize, t: f64| {
             let t = (t - RELEASE).max(0.0);
             let mode = |hz: f64, zeta: f64| (-zeta * TAU * hz * t).exp() * (TAU * hz * t).cos();

@@ -207,7 +207,7 @@ fn another_record_is_predicted() {
     refused(folder, &format!("{common} --validate d.csv"), &["cannot read d.csv"]);
     refused(folder, &format!("{common} --validate b.csv:700"), &["b.csv has 600"]);
     let short = "identify p.csv --force f --displacement x --period 256 --validate q.csv:1:100";
-    refused(folder, short, &["--validate-samples 100 is less than one period of 256"]);
+    refused(folder, short, &["--validate: 100 samples are less than one period of 256"]);
 }
 
 #[test]

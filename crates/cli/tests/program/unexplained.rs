@@ -79,7 +79,7 @@ fn a_force_sought_in_too_few_places_is_told() {
     for way in ways() {
         let found = report(folder.path(), &way);
         let told = remarks(&found);
-        for words in ["another force acts than on degree of freedom 1 (--forced)", "do not believe"]
+        for words in ["another force acts than on degree of freedom 1 (`forced`)", "do not believe"]
         {
             assert!(told.contains(words), "{way}: {told}");
         }

@@ -24,6 +24,9 @@ pub struct SensorRow {
 impl SensorRow {
     /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m, with the
     /// delay by `parameters` in their units.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 2.2 (a delay τ turns the phase by −ωτ).
     pub fn factor(&self, parameters: &[f64], omega: f64) -> Complex<f64> {
         let unknown = self.delay_parameter.map_or(0.0, |at| parameters[at]);
         let phase = omega * (self.delay + unknown);

@@ -12,6 +12,9 @@ const SHOWN: usize = 4000;
 
 /// Draws the root of the sum over all responses, each over its RMS in the band: measured, explained,
 /// and the difference; below it the stabilisation diagram and the mode indicator.
+///
+/// # Errors
+/// [`ReportError`] if the diagrams cannot be computed or drawn.
 pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
     let summary = modes.summary();
     let natural: Vec<f64> =

@@ -62,7 +62,10 @@ impl Segments {
     ///
     /// Noise and force leak by the window alike from a line to its neighbours, and so do pieces that
     /// overlap: Σ_j |ρ_j(d)|² over pieces j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop)
-    /// exp(−2πi d k/len), over the same at d = 0.
+    /// exp(−2πi d k/len), over the same at d = 0; pure numbers.
+    ///
+    /// # Source
+    /// Welch (1967), IEEE Transactions on Audio and Electroacoustics 15, 70–73 (pieces that overlap).
     pub fn line_correlation(self, pieces: usize) -> Vec<f64> {
         let Segments::Windowed { len, hop, window } = self else { return vec![1.0] };
         let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
@@ -85,7 +88,8 @@ impl Segments {
     }
 
     /// Weights by which averages over pieces smooth a frequency response under a random force, over the
-    /// distances of a line in steps of 1/[`SMOOTHING_STEPS`], and symmetric: |W|² of the window. None where nothing is smoothed:
+    /// distances of a line in steps of 1/[`SMOOTHING_STEPS`], and symmetric: |W|² of the window, a
+    /// pure number. None where nothing is smoothed:
     /// of periods, and of pieces that begin and end at rest, for which the rectangular window is.
     ///
     /// # Source
