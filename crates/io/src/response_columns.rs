@@ -3,6 +3,7 @@
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
 
+use crate::escape::escaped;
 use crate::responses::{FrequencyResponses, ResponseFunction};
 use crate::units::{ResponseUnit, label_notes, name_without_brackets, number_and_rest};
 use crate::{Evidence, IoError, Quantity, StatedUnit, Table};
@@ -351,6 +352,16 @@ fn function<'a>(
 /// Brings frequencies into rising order, leaves out the mirrored half of a spectrum, and says so.
 pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     let hz = &responses.frequency_hz;
+    if let Some(short) = responses.functions.iter().find(|one| one.values.len() != hz.len()) {
+        let (count, points) = (short.values.len(), [&short.response, &short.reference]);
+        let what = format!(
+            "the response at {} to {} has {count} values for {} frequencies",
+            escaped(points[0]),
+            escaped(points[1]),
+            hz.len()
+        );
+        return Err(IoError::Description { file: responses.file.clone(), what });
+    }
     let mut order: Vec<usize> = (0..hz.len()).collect();
     order.sort_by(|a, b| hz[*a].total_cmp(&hz[*b]));
     let negative = hz.iter().filter(|hz| **hz < 0.0).count();
