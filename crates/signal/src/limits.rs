@@ -70,8 +70,8 @@ pub(crate) const NEGLIGIBLE_NOISE: f64 = 1e-5;
 /// Fraction of its own peak above which a force belongs to the pulse of a hit.
 pub(crate) const PULSE_FRACTION: f64 = 0.1;
 
-/// Number of instants in a step at which the lobes of a ringing filter are looked at: between two of
-/// eight, an extreme of a lobe at half the sampling rate is missed by at most 2 %.
+/// Number of instants in a step at which the lobes of a ringing filter are looked at. Between two
+/// of eight, an extreme of a lobe at half the sampling rate is missed by at most 2 %.
 pub(crate) const RINGING_STEPS: usize = 8;
 
 /// Number of samples on either side that a value between samples is interpolated from.

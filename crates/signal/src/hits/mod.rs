@@ -68,8 +68,8 @@ impl Default for HitRule {
 impl FromStr for HitRule {
     type Err = String;
 
-    /// Reads `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, any of them: per cent,
-    /// seconds and samples. An empty text is the usual rule.
+    /// Reads `trigger=0.5,double=5,weak=25,bounce=0.1,before=20,samples=512`, any of them, in per
+    /// cent, seconds and samples. An empty text is the usual rule.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut rule = Self::default();
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -383,8 +383,9 @@ fn find_faults(all: &mut [Hit], force: &[f64], push: &[f64], dt: f64, floor: f64
     }
 }
 
-/// Returns whether a maximum is the ringing of an anti-alias filter: the next lobe towards the main
-/// pulse pulls as much as it pushes, but for noise. A hammer does not pull, and ringing falls off on both sides of a pulse.
+/// Returns whether a maximum is the ringing of an anti-alias filter: the next lobe towards the
+/// main pulse pulls as much as it pushes, but for noise. A hammer does not pull, and ringing falls
+/// off on both sides of a pulse.
 fn rings(push: &[f64], maxima: &[usize], at: usize, main: usize, noise: f64) -> bool {
     let peak = maxima[at];
     let inner = if peak > main {
