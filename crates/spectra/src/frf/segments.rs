@@ -88,7 +88,7 @@ impl Segments {
     }
 
     /// Weights by which averages over pieces smooth a frequency response under a random force, over the
-    /// distances of a line in steps of 1/[`SMOOTHING_STEPS`], and symmetric: |W|² of the window, a
+    /// distances of a line in steps of 1/`SMOOTHING_STEPS`, and symmetric: |W|² of the window, a
     /// pure number. None where nothing is smoothed:
     /// of periods, and of pieces that begin and end at rest, for which the rectangular window is.
     ///
