@@ -40,7 +40,7 @@ def words(options: dict[str, Any]) -> list[str]:
     [
         {"period": 256},
         {"period": 256, "estimator": "hv", "band_hz": (5, 20)},
-        {"segment": 128, "segment_window": "blackman", "segment_overlap": 66.0, "estimator": "h2"},
+        {"segment": "128:66:blackman", "estimator": "h2"},
         {"period": 128, "lines": "odd"},
     ],
 )

@@ -14,6 +14,7 @@ _Place: TypeAlias = tuple[Path, tuple[str, int, int] | None]
 __all__ = [
     "Answer",
     "Identified",
+    "IdentifiedElements",
     "IdentifiedResponses",
     "Machine",
     "Measurement",
@@ -25,6 +26,7 @@ __all__ = [
     "bearing_of_responses",
     "compare_modes",
     "decay",
+    "described_machine",
     "find_column",
     "fleet_begin",
     "fleet_part",
@@ -35,6 +37,7 @@ __all__ = [
     "fleet_trends",
     "frf",
     "identify",
+    "identify_elements",
     "identify_responses",
     "inspect",
     "integrate",
