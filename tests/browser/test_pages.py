@@ -262,7 +262,7 @@ class Tests:
         # Poles have words.
         left, top, right, bottom = box(page, "figure")
         spots = page.run(
-            "(() => { const p = [...document.querySelectorAll('figure .curve')].find(c => c.dataset.name === 'stable').querySelector('path');"
+            "(() => { const p = [...document.querySelectorAll('figure .curve')].find(c => c.dataset.name === 'stable pole').querySelector('path');"
             " const m = p.getAttribute('d').match(/M([\\d.]+) ([\\d.]+)/), s = p.ownerSVGElement, b = s.getBoundingClientRect();"
             " const u = b.width / s.viewBox.baseVal.width; return [b.left + m[1] * u, b.top + m[2] * u]; })()"
         )
