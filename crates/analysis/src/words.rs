@@ -12,7 +12,7 @@ use serde::forward_to_deserialize_any;
 /// ```
 pub fn all<T: DeserializeOwned>() -> &'static [&'static str] {
     let mut words: &'static [&'static str] = &[];
-    // The deserializer notes the words and gives no value.
+    // The deserializer notes the words, and always fails: it has no value to give.
     let _ = T::deserialize(Variants(&mut words));
     words
 }

@@ -23,12 +23,11 @@ use crate::words::written;
 /// Keywords of an identification, all of them optional. [`Identify`] is made of those that go together.
 ///
 /// ```
-/// use mechid_analysis::identify::{Identify, Keywords, Method};
+/// use mechid_analysis::identify::{Domain, Identify, Keywords, Method};
 ///
 /// let keywords = Keywords { method: Some(Method::LeastSquares), ..Keywords::default() };
 /// assert_eq!(Identify::try_from(keywords.clone())?, Identify::spectra(Method::LeastSquares));
-/// let refused = Identify::try_from(Keywords { from_frf: Some(Default::default()), domain: Domain::Time, ..keywords });
-/// # use mechid_analysis::identify::Domain;
+/// let refused = Identify::try_from(Keywords { domain: Domain::Time, ..keywords });
 /// assert!(refused.is_err());
 /// # Ok::<(), mechid_analysis::AnalysisError>(())
 /// ```
@@ -150,7 +149,7 @@ impl Kind {
         }
     }
 
-    /// Returns the keywords that it uses beside those of every fit.
+    /// Returns whether it uses a keyword that not every fit has.
     fn uses(self, keyword: &str) -> bool {
         const LINES: [&str; 4] = ["lines", "band_hz", "without_lines", "without_hz"];
         const SPECTRA: [&str; 4] = ["method", "noise", "force_noise", "extent"];
@@ -234,7 +233,7 @@ impl Keywords {
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
-            return Err(refused("noise", "it weights `method` maximum-likelihood alone"));
+            return Err(refused("noise", "it is for `method` maximum-likelihood alone"));
         }
         Ok(())
     }
@@ -492,7 +491,7 @@ mod tests {
         }
     }
 
-    /// Whatever keywords give settings, those are saved as keywords that give them again.
+    /// The refusal names the keyword that does not go with the others.
     #[test]
     fn keywords_that_do_not_go_together_are_refused() {
         let why = |json: &str| read(json).unwrap_err();

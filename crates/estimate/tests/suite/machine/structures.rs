@@ -1,12 +1,14 @@
-//! Bounds, priors, what is not determined, open records, bad input.
+//! Shake tables, bounds, priors, what is not determined, measured parts, open records, bad input.
 
 use std::f64::consts::TAU;
 
-use mechid_estimate::likelihood::machine::{Candidate, identify_machine};
+use mechid_estimate::likelihood::machine::{
+    Candidate, MeasuredReceptance, identify_joined, identify_machine,
+};
 use mechid_estimate::likelihood::{
     IntervalKind, LikelihoodError, LikelihoodEstimate, NoiseSource, Settings,
 };
-use mechid_model::ResponseQuantity::Displacement;
+use mechid_model::ResponseQuantity::{Acceleration, Displacement};
 use mechid_model::elements::{
     Element, FreeCoefficient, Input, Instruments, Machine, MachineError, Sensor,
 };
@@ -39,6 +41,47 @@ fn identified(data: &LineData, machine: &Machine, instruments: &Instruments) -> 
 fn deviation(estimate: &LikelihoodEstimate, name: &str, truth: f64) -> f64 {
     let parameter = estimate.parameter(name).unwrap();
     (parameter.value - truth) / parameter.standard_error.unwrap()
+}
+
+/// Two storeys on a table whose acceleration is the input: the roof reads absolute, the first storey relative
+/// acceleration.
+#[test]
+fn a_frame_on_a_shake_table() {
+    let (m, k, c) = ([120.0, 100.0], [2e5, 1.5e5], [150.0, 90.0]);
+    let omega = omega(5..=160, 0.1);
+    let ground = random_phases(omega.len(), 1, 3);
+    let stiffness = dmatrix![k[0] + k[1], -k[1]; -k[1], k[1]];
+    let damping = dmatrix![c[0] + c[1], -c[1]; -c[1], c[1]];
+    let mass = dmatrix![m[0], 0.0; 0.0, m[1]];
+    // Relative motion z under −M ι a, and x = z + x_g.
+    let force = DMatrix::from_fn(omega.len(), 2, |row, at| -ground[(row, 0)] * m[at]);
+    let relative = responses([&mass, &damping, &stiffness], &omega, &force);
+    let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
+        let of_relative = relative[(row, at)] * -omega[row] * omega[row];
+        if at == 0 { of_relative } else { of_relative + ground[(row, 0)] }
+    });
+    let data = measured(&omega, ground, outputs, 0.01, 5);
+    let machine = Machine::new(["first", "roof"])
+        .with("m1", Element::mass("first", m[0]))
+        .with("m2", Element::mass("roof", free(80.0)))
+        .with("s1", Element::spring_damper(["first", "support"], free(1.5e5), free(100.0)))
+        .with("s2", Element::spring_damper(["first", "roof"], free(1.5e5), free(100.0)));
+    let instruments = Instruments {
+        sensors: vec![
+            Sensor::new("first", Acceleration).relative_to_support(),
+            Sensor::new("roof", Acceleration),
+        ],
+        inputs: vec![Input::Support { name: "table".into(), quantity: Acceleration }],
+        ..Instruments::default()
+    };
+    let estimate = identified(&data, &machine, &instruments);
+    for (name, truth) in
+        [("m2", m[1]), ("s1.k", k[0]), ("s1.c", c[0]), ("s2.k", k[1]), ("s2.c", c[1])]
+    {
+        let z = deviation(&estimate, name, truth);
+        assert!(z.abs() < 4.0, "{name}: {z}");
+    }
+    assert!((estimate.misfit_ratio.unwrap() - 1.0).abs() < 0.3);
 }
 
 /// One mass on two springs; the true damper is none.
@@ -148,6 +191,79 @@ fn springs_in_series_and_side_by_side_are_named() {
     assert_eq!((gains[0].name.as_str(), gains[0].newly_determined), ("between", 1));
     assert_eq!(gains[1].newly_determined, 0);
     assert!(gains[0].standard_errors.iter().all(Option::is_some));
+}
+
+/// Free chains of four masses each, joined by a spring and a damper between their ends.
+#[test]
+fn a_joint_between_two_measured_parts() {
+    let omega = omega(20..=400, 0.1);
+    let (joint_k, joint_c) = (5e4, 12.0);
+    let part = |scale: f64| -> [DMatrix<f64>; 3] {
+        let link = |at: usize| scale * (4e4 + 1e4 * at as f64);
+        let mut stiffness = DMatrix::zeros(4, 4);
+        for at in 0..3 {
+            let mut block = stiffness.view_mut((at, at), (2, 2));
+            block += dmatrix![1.0, -1.0; -1.0, 1.0] * link(at);
+        }
+        [DMatrix::identity(4, 4) * scale, &stiffness * 2e-4, stiffness]
+    };
+    let parts = [part(1.0), part(1.6)];
+    let whole = |joined: bool| -> [DMatrix<f64>; 3] {
+        let mut all = [0, 1, 2].map(|which| {
+            let mut matrix = DMatrix::zeros(8, 8);
+            matrix.view_mut((0, 0), (4, 4)).copy_from(&parts[0][which]);
+            matrix.view_mut((4, 4), (4, 4)).copy_from(&parts[1][which]);
+            matrix
+        });
+        if joined {
+            for (which, value) in [(1, joint_c), (2, joint_k)] {
+                let mut block = all[which].view_mut((3, 3), (2, 2));
+                block += dmatrix![1.0, -1.0; -1.0, 1.0] * value;
+            }
+        }
+        all
+    };
+    // Receptances of the free parts at their ends, with 0.2 % noise.
+    let ends = [0, 3, 4, 7];
+    let [m, c, k] = whole(false);
+    let mut receptance: Vec<DMatrix<Complex<f64>>> = vec![DMatrix::zeros(4, 4); omega.len()];
+    for (column, dof) in ends.into_iter().enumerate() {
+        let mut force = DMatrix::zeros(omega.len(), 8);
+        force.column_mut(dof).fill(Complex::new(1.0, 0.0));
+        let all = responses([&m, &c, &k], &omega, &force);
+        for (row, table) in receptance.iter_mut().enumerate() {
+            for (at, end) in ends.into_iter().enumerate() {
+                table[(at, column)] = all[(row, end)];
+            }
+        }
+    }
+    let variance: Vec<DMatrix<f64>> =
+        receptance.iter().map(|table| table.map(|h| (0.002 * h.norm()).powi(2))).collect();
+    for (row, table) in receptance.iter_mut().enumerate() {
+        let noise = complex_noise(4, 4, 900 + row as u64);
+        *table += noise.zip_map(&variance[row], |z, v| z * v.sqrt());
+    }
+    let force = random_phases(omega.len(), 1, 5);
+    let mut forces = DMatrix::zeros(omega.len(), 8);
+    forces.column_mut(0).copy_from(&force.column(0));
+    let [m, c, k] = whole(true);
+    let outputs = responses([&m, &c, &k], &omega, &forces).select_columns(&[0, 7]);
+    let data = measured(&omega, force, outputs, 0.002, 8);
+    let mut machine = Machine::new(["a1", "a4", "b1", "b4"])
+        .with("joint", Element::spring_damper(["a4", "b1"], free(2e4), free(5.0)));
+    machine.measured = machine.dofs.clone();
+    let part = MeasuredReceptance { receptance, variance: Some(variance) };
+    let instruments = force_to_displacement(&["a1", "b4"], "a1");
+    let settings = Settings::default();
+    let estimate = identify_joined(&data, &machine, &instruments, &part, &settings).unwrap();
+    let estimate = estimate.likelihood;
+    for (name, truth) in [("joint.k", joint_k), ("joint.c", joint_c)] {
+        let p = estimate.parameter(name).unwrap();
+        let z = deviation(&estimate, name, truth);
+        assert!(z.abs() < 4.0 && p.standard_error.unwrap() < 0.05 * truth, "{name}: {z} {p:?}");
+    }
+    let ratio = estimate.misfit_ratio.unwrap();
+    assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
 }
 
 #[test]
