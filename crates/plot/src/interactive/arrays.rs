@@ -21,14 +21,17 @@ pub(super) struct Arrays {
 impl Arrays {
     /// Adds a list and returns its index; `[]` has none.
     pub fn add(&mut self, values: &[f64]) -> Option<usize> {
-        (!values.is_empty()).then(|| self.insert(text(values)))
+        (!values.is_empty()).then(|| self.insert(text(values, 4)))
+    }
+
+    /// Adds phases in degrees, of which four digits suffice.
+    pub fn add_phase(&mut self, degrees: &[f64]) -> Option<usize> {
+        (!degrees.is_empty()).then(|| self.insert(text(degrees, 3)))
     }
 
     /// Adds positive numbers of which two digits suffice, such as standard errors.
     pub fn add_rough(&mut self, values: &[f64]) -> Option<usize> {
-        let bytes = |value: &f64| (((*value as f32).to_bits() >> 16) as u16).to_le_bytes();
-        let all: Vec<u8> = values.iter().flat_map(bytes).collect();
-        (!values.is_empty()).then(|| self.insert(format!("h {}", STANDARD.encode(all))))
+        (!values.is_empty()).then(|| self.insert(single_precision(values, 1.0, 2)))
     }
 
     fn insert(&mut self, text: String) -> usize {
@@ -46,7 +49,8 @@ impl Arrays {
     }
 }
 
-fn text(values: &[f64]) -> String {
+/// Writes a list; a long one that is not even with this many bytes of single precision.
+fn text(values: &[f64], bytes: usize) -> String {
     let (first, last, len) = (values[0], values[values.len() - 1], values.len());
     if len <= EXACT {
         let digits: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
@@ -62,9 +66,15 @@ fn text(values: &[f64]) -> String {
     let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let scale =
         if largest > 0.0 { largest.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
-    let bytes: Vec<u8> =
-        values.iter().flat_map(|value| ((value / scale) as f32).to_le_bytes()).collect();
-    format!("f {scale:?} {}", STANDARD.encode(bytes))
+    single_precision(values, scale, bytes)
+}
+
+/// Writes values over a scale with the first two, three or four bytes of single precision.
+fn single_precision(values: &[f64], scale: f64, bytes: usize) -> String {
+    let kind = ["h", "m", "f"][bytes.clamp(2, 4) - 2];
+    let first = |value: &f64| ((value / scale) as f32).to_le_bytes().into_iter().skip(4 - bytes);
+    let all: Vec<u8> = values.iter().flat_map(first).collect();
+    format!("{kind} {scale:?} {}", STANDARD.encode(all))
 }
 
 #[cfg(test)]
@@ -73,11 +83,11 @@ mod tests {
 
     #[test]
     fn lists_are_exact_even_or_single_precision() {
-        assert_eq!(text(&[0.1, -2.0]), "t 0.1 -2.0");
+        assert_eq!(text(&[0.1, -2.0], 4), "t 0.1 -2.0");
         let even: Vec<f64> = (0..4096).map(|k| 0.25 * f64::from(k)).collect();
-        assert_eq!(text(&even), "e 0.0 1023.75 4096");
+        assert_eq!(text(&even, 4), "e 0.0 1023.75 4096");
         let values: Vec<f64> = (0..500).map(|k| 1e-9 * f64::from(k).sin()).collect();
-        let coded = text(&values);
+        let coded = text(&values, 4);
         let [kind, scale, coded] = coded.split(' ').collect::<Vec<_>>()[..] else { panic!() };
         let scale: f64 = scale.parse().unwrap();
         let bytes = STANDARD.decode(coded).unwrap();
@@ -95,5 +105,11 @@ mod tests {
         );
         assert_eq!(arrays.add(&[]), None);
         assert_eq!(arrays.into_texts().len(), 2);
+        // Phases have three bytes each, of which the last is cut off.
+        let phases = text(&[vec![-179.99], vec![0.5; 200]].concat(), 3);
+        let bytes = STANDARD.decode(phases.split(' ').nth(2).unwrap()).unwrap();
+        let first = f32::from_le_bytes([0, bytes[0], bytes[1], bytes[2]]);
+        assert_eq!((&phases[..6], bytes.len()), ("m 128.", 603));
+        assert!((128.0 * first + 179.99).abs() < 6e-3, "{first}");
     }
 }

@@ -221,7 +221,7 @@ fn curve_data<'a>(
         x: arrays.add(x),
         y: arrays.add(y),
         upper: arrays.add(upper),
-        phase_deg: arrays.add(&curve.phase_deg),
+        phase_deg: arrays.add_phase(&curve.phase_deg),
         error: if thinned.is_some() { None } else { arrays.add_rough(&curve.error) },
         notes: &curve.notes,
         color: style.color.0,

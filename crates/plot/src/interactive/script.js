@@ -19,13 +19,14 @@ const digits = (v, n = 6) => minus(!isFinite(v) ? "–" : v && (abs(v) >= 1e6 ||
 const px = v => round(v * 10) / 10;
 const within = (v, a, b) => max(a, min(b, v));
 
-// Numbers: digits (t), even (e), single precision (f), its upper half (h).
+// Numbers: digits (t), even (e), or the first two (h), three (m) or all four (f) bytes of single precision.
 const decode = text => {
-    const [kind, a, b, n] = text.split(" "), F = Float64Array, single = bytes => new Float32Array(bytes);
+    const [kind, a, b, n] = text.split(" "), F = Float64Array;
     if (kind === "t") return F.from(text.slice(2).split(" "), Number);
     if (kind === "e") return F.from({length: n}, (_, k) => +a + (b - a) * k / (n - 1));
-    const bytes = Uint8Array.from(atob(kind === "h" ? a : b), c => c.charCodeAt(0)).buffer;
-    return kind === "f" ? F.from(single(bytes), v => v * a) : F.from(single(Uint32Array.from(new Uint16Array(bytes), v => v << 16).buffer));
+    const bytes = atob(b), w = {h: 2, m: 3, f: 4}[kind], single = new Uint8Array(bytes.length / w * 4);
+    for (let k = 0; k < bytes.length; k++) single[floor(k / w) * 4 + 4 - w + k % w] = bytes.charCodeAt(k);
+    return F.from(new Float32Array(single.buffer), v => v * a);
 };
 
 const ticks = ({g, s}, [low, high], wanted) => {
