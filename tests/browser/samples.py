@@ -91,6 +91,7 @@ def make(program, pages, folder):
     columns = ("--force", ",".join(forces), "--displacement", ",".join(motions), "--period", "512", "--quiet")
     mechid(program, folder, "report", *records, *columns, "--about", "about.txt", "--output", "three.html",
            "--method", "maximum-likelihood")
+    mechid(program, folder, "report", records[0], *columns, "--output", "single.html", "--method", "maximum-likelihood")
     system = mechid(program, folder, "identify", *records, *columns[:-1], "--json")
     (folder / "system.json").write_text(system)
     mechid(program, folder, "force", "force1.csv", "--system", "system.json", *columns[2:], "--plot", "force.html")
