@@ -1,4 +1,4 @@
-//! The contents of a record file in the form that every format is read into.
+//! The contents of a record file, in the form into which every format is read.
 
 use std::fmt;
 
@@ -31,25 +31,25 @@ impl fmt::Display for Place {
     }
 }
 
-/// The contents of a record file, whatever its format.
+/// Contents of a record file of any format.
 #[derive(Debug, Default)]
 pub(crate) struct Contents {
-    /// Name of the format, for people.
+    /// Name of the format, as messages show it.
     pub format: String,
     pub columns: Vec<Column>,
-    /// Lines of the samples, in text.
+    /// Line numbers of the samples, in a text file.
     pub lines: Lines,
     /// Most frequent number of samples of a column.
     pub samples: usize,
-    /// Single numbers beside the columns.
+    /// Single numbers that the file has in addition to its columns.
     pub scalars: Vec<(String, f64)>,
-    /// Arrays of complex numbers, which are frequency responses and no channels.
+    /// Arrays of complex numbers, which are frequency responses rather than channels.
     pub complex: Vec<ComplexArray>,
-    /// Texts of MATLAB beside the columns, by their names.
+    /// MATLAB text variables, by their names.
     pub texts: Vec<(String, String)>,
-    /// Further information from the file.
+    /// Notes about the file, such as what was left out.
     pub remarks: Vec<String>,
-    /// Last line of a text, if no line break ends it.
+    /// Number of the last line of a text, if no line break ends it.
     pub open_line: Option<u64>,
 }
 
@@ -58,15 +58,15 @@ impl Contents {
     pub fn check_names(&self, file: &str, limits: &Limits) -> Result<(), IoError> {
         let most = limits.name_bytes;
         let is_long = |column: &Column| column.name.len().max(column.about.len()) > most;
-        let place = match self.columns.iter().position(is_long) {
+        let at = match self.columns.iter().position(is_long) {
             Some(column) => Place::Column(column + 1),
             None if self.scalars.iter().any(|(name, _)| name.len() > most) => Place::Byte(1),
             None => return Ok(()),
         };
-        Err(IoError::TooLarge { file: file.into(), at: place, limit: Limit::NameBytes(most) })
+        Err(IoError::TooLarge { file: file.into(), at, limit: Limit::NameBytes(most) })
     }
 
-    /// Sets `samples` to the most frequent length of a column, the longest of equally frequent ones.
+    /// Sets `samples` to the most frequent column length; of equally frequent ones, to the longest.
     pub fn with_usual_length(mut self) -> Self {
         let lengths: Vec<usize> =
             self.columns.iter().filter_map(|c| c.values.as_ref().ok()).map(Vec::len).collect();
@@ -78,25 +78,26 @@ impl Contents {
     }
 }
 
-/// An array of complex numbers of any number of dimensions.
+/// Array of complex numbers with any number of dimensions.
 #[derive(Debug)]
 pub(crate) struct ComplexArray {
     pub name: String,
-    /// Lengths of its dimensions, in the order in which its file's programs write its indices.
+    /// Lengths of its dimensions, in the order in which programs that write such files list the
+    /// indices.
     pub lengths: Vec<usize>,
-    /// Distance of two neighbours in `values`, along each dimension.
+    /// Distance between neighbouring elements in `values`, along each dimension.
     pub strides: Vec<usize>,
     pub values: Vec<Complex<f64>>,
 }
 
 impl ComplexArray {
-    /// An array whose first index runs fastest, as MATLAB and Fortran store it.
+    /// Creates an array whose first index varies fastest, as MATLAB and Fortran store it.
     pub fn first_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
         let strides = strides(lengths.iter());
         Self { name, strides, lengths, values }
     }
 
-    /// An array whose last index runs fastest, as C and Python store it.
+    /// Creates an array whose last index varies fastest, as C and Python store it.
     #[cfg(feature = "hdf5")]
     pub fn last_fastest(name: String, lengths: Vec<usize>, values: Vec<Complex<f64>>) -> Self {
         let mut strides = strides(lengths.iter().rev());
@@ -105,7 +106,8 @@ impl ComplexArray {
     }
 }
 
-/// Distances of neighbours along dimensions of which the first runs fastest.
+/// Returns the distances between neighbouring elements along dimensions in order, the fastest
+/// first.
 fn strides<'a>(lengths: impl Iterator<Item = &'a usize>) -> Vec<usize> {
     let next = |stride: &mut usize, len: &usize| {
         let this = *stride;
@@ -118,27 +120,28 @@ fn strides<'a>(lengths: impl Iterator<Item = &'a usize>) -> Vec<usize> {
 /// A column of a file.
 #[derive(Debug)]
 pub(crate) struct Column {
-    /// Empty if it has none.
+    /// Name; empty if the column has none.
     pub name: String,
-    /// Whether it has a name or a first value; false for a column made by a trailing delimiter.
+    /// `true` if it has a name or a first value; `false` for the column that a trailing delimiter
+    /// creates.
     pub filled: bool,
-    /// Its numbers, all finite, or the reason why it cannot be used.
+    /// Numbers, all finite, or the reason why the column cannot be used.
     pub values: Result<Vec<f64>, Unusable>,
-    /// Its time axis in the file.
+    /// Time axis of the column in the file.
     pub axis: Axis,
-    /// Description in the file besides its name.
+    /// Description in the file in addition to the name.
     pub about: String,
     /// Text for its unit in a line of units, a label or an attribute; empty if there is none.
     pub unit: String,
-    /// Quantity that the file states by a code; `None` if it does not.
+    /// Quantity that the file states by a code; `None` if it states none.
     pub kind: Option<Quantity>,
-    /// Whether its numbers are instants of dates or clocks, in s.
+    /// `true` if its numbers are instants, in s, that were read from dates or clock times.
     pub has_instants: bool,
-    /// Unit or factor that the user states.
+    /// Unit or factor that the user states; it replaces what the file states.
     pub overriding: Option<Override>,
 }
 
-/// Unit or factor that a user states for a column, whatever its name says.
+/// Unit or factor that a user states for a column; it has priority over the column's name.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Override {
     /// Unit of the numbers.
@@ -150,13 +153,14 @@ pub(crate) enum Override {
 /// The time axis that a file gives a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Axis {
-    /// None: a time column or a sample rate is needed.
+    /// No axis in the file: a time column or a sample rate is needed.
     Unknown,
     /// Uniform, in s.
     Even { start: f64, step: f64 },
-    /// Uniform from 0 s, with a step in s that a number beside the columns states by its name.
+    /// Uniform from 0 s, with a step in s that follows from a named number of the file, such as
+    /// `Fs`.
     Stated { step: f64, scalar: usize },
-    /// Two such numbers contradict each other.
+    /// Contradiction between two such numbers.
     Contradiction { scalars: [usize; 2], steps: [f64; 2] },
     /// Column with this index.
     Column(usize),
@@ -172,7 +176,7 @@ pub(crate) enum Unusable {
         line: u64,
         text: String,
     },
-    /// A number whose decimal sign differs from that of the file.
+    /// A number whose decimal sign differs from the other numbers.
     DecimalSign {
         line: u64,
         text: String,
@@ -186,7 +190,7 @@ pub(crate) enum Unusable {
 }
 
 impl Unusable {
-    /// The error for the column that `label` names.
+    /// Returns the error for the column with this label.
     pub fn error(&self, file: &str, label: String) -> IoError {
         let file = file.to_owned();
         match self.clone() {
@@ -202,8 +206,9 @@ impl Unusable {
 }
 
 impl Column {
-    /// A column of numbers from a file without lines; infinite values and NaN make it unusable.
-    pub fn of_numbers(name: String, values: Vec<f64>) -> Self {
+    /// Creates a column of numbers from a file without lines; infinite values and NaN make it
+    /// unusable.
+    pub fn from_numbers(name: String, values: Vec<f64>) -> Self {
         let values = match values.iter().position(|v| !v.is_finite()) {
             None => Ok(values),
             Some(k) => Err(Unusable::NotFinite { at: Place::Sample(k + 1), value: values[k] }),
@@ -211,7 +216,7 @@ impl Column {
         Self { filled: true, values, ..Self::named(name) }
     }
 
-    /// A column without numbers.
+    /// Creates a column without numbers.
     pub fn named(name: String) -> Self {
         Self {
             name,
@@ -226,7 +231,7 @@ impl Column {
         }
     }
 
-    /// A column that holds no real numbers in time, but `what`.
+    /// Creates a column that has no real numbers over time; `what` describes what it has instead.
     pub fn unusable(name: String, what: impl Into<String>) -> Self {
         let values = Err(Unusable::Kind(what.into()));
         Self { filled: true, values, ..Self::named(name) }
@@ -251,8 +256,8 @@ impl fmt::Display for DecimalSign {
     }
 }
 
-/// Lines of the samples, as runs of consecutive lines: a file of ten million rows and one comment
-/// has two.
+/// Line numbers of the samples, stored as runs of consecutive lines: a file of ten million rows
+/// with one comment has two runs.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     /// First sample, counted from 0, and first line of each run.
@@ -264,12 +269,12 @@ impl Lines {
         self.runs.clear();
     }
 
-    /// Appends the lines of samples that follow the first `samples`.
+    /// Appends the line numbers of the samples that follow the first `samples`.
     pub fn append(&mut self, samples: usize, other: &Self) {
         other.runs.iter().for_each(|(first, line)| self.push(samples + first, *line));
     }
 
-    /// Appends the line of `sample`; samples come in order.
+    /// Appends the line number of `sample`; samples are passed in order.
     pub fn push(&mut self, sample: usize, line: u64) {
         let expected = self.runs.last().map(|(first, at)| at + (sample - first) as u64);
         if expected != Some(line) {
@@ -277,8 +282,8 @@ impl Lines {
         }
     }
 
-    /// Line of a sample, counted from 0.
-    pub fn place(&self, sample: usize) -> Place {
+    /// Returns the line of a sample, counted from 0.
+    pub fn position(&self, sample: usize) -> Place {
         let after = self.runs.partition_point(|(first, _)| *first <= sample);
         match after.checked_sub(1).map(|run| self.runs[run]) {
             Some((first, line)) => Place::Line(line + (sample - first) as u64),
@@ -313,7 +318,7 @@ impl Fault {
         Self { at, cause: Cause::TooLarge(limit) }
     }
 
-    /// The error for a file, with the place of the byte.
+    /// Returns the error for a file at the given position.
     pub fn error(self, file: &str, at: Place) -> IoError {
         let file = file.to_owned();
         match self.cause {

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{IoError, json};
 
-/// The `covariance` of the report that `mechid identify --json` prints, which
-/// [`read_covariance`] reads back.
+/// Covariance of identified parameters: the `covariance` of the report that `mechid identify
+/// --json` prints, which [`read_covariance`] reads back.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterCovariance {
     /// Names of the parameters, such as `k12`.
@@ -21,17 +21,19 @@ pub struct ParameterCovariance {
 }
 
 impl ParameterCovariance {
-    /// Creates a covariance from a square matrix, one row and column per parameter, in the products of
-    /// their units.
+    /// Creates a covariance from a square matrix, one row and column per parameter, in the products
+    /// of their units.
     pub fn new(parameters: Vec<String>, matrix: &DMatrix<f64>, degrees_of_freedom: usize) -> Self {
         let matrix = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
         Self { parameters, matrix, degrees_of_freedom }
     }
 
-    /// The matrix, one row and column per parameter, in the products of their units (kg, N·s/m, N/m).
+    /// Returns the matrix, one row and column per parameter, in the products of their units (kg,
+    /// N·s/m, N/m).
     ///
     /// # Panics
-    /// If the rows are not as many and as long as the parameters, which [`read_covariance`] checks.
+    /// If the number or the length of the rows differs from the number of parameters, which
+    /// [`read_covariance`] excludes.
     pub fn matrix(&self) -> DMatrix<f64> {
         let n = self.parameters.len();
         DMatrix::from_fn(n, n, |row, column| self.matrix[row][column])
@@ -41,9 +43,9 @@ impl ParameterCovariance {
 /// Reads the covariance in a JSON report (`-`: standard input), if it has one.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is
-/// null, as JSON writes infinite numbers, and [`IoError::Description`] if it is not one row and one column per parameter
-/// with positive variances.
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Undetermined`] if an
+/// entry is null, as JSON writes infinite numbers, and [`IoError::Description`] if it is not one
+/// row and one column per parameter with positive variances.
 pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovariance>, IoError> {
     #[derive(Deserialize)]
     struct Described {
@@ -67,7 +69,7 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     }
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
     let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);
-    // A parameter without a variance has no covariances either.
+    // A parameter without a variance has no covariances either, so its row is reported once.
     let without_variance = |row: &usize| matrix[*row][*row].is_none();
     let rows = if (0..n).any(|row| without_variance(&row)) {
         (0..n).filter(without_variance).collect::<Vec<_>>()

@@ -10,7 +10,7 @@ use crate::{BegunFile, IoError};
 /// Number of bytes of text that are collected before they are written.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Writes a table with a `time` column in seconds and the named columns, which
+/// Returns a table with a `time` column in seconds and the named columns, which
 /// [`Table`](crate::Table) reads back bit for bit: every number has the fewest digits that identify
 /// it.
 ///
@@ -27,7 +27,7 @@ pub fn csv_text(sampling: Sampling, columns: &[(String, &[f64])]) -> String {
     text
 }
 
-/// The text of [`csv_text`], written in blocks of rows into a [`BegunFile`].
+/// Writer of the text of [`csv_text`], in blocks of rows, into a [`BegunFile`].
 ///
 /// ```
 /// use mechid_io::{CsvFile, write_all};
@@ -48,7 +48,7 @@ pub struct CsvFile {
     sampling: Sampling,
     /// Number of rows so far.
     rows: usize,
-    /// Text not written yet.
+    /// Text that is not written to the file yet.
     text: String,
 }
 
@@ -95,7 +95,7 @@ impl CsvFile {
     /// [`IoError::Write`].
     ///
     /// # Panics
-    /// If it has not as many rows as the sampling.
+    /// If its number of rows differs from the number of samples.
     pub fn finish(mut self) -> Result<BegunFile, IoError> {
         assert_eq!(self.rows, self.sampling.len(), "there is a row for every instant");
         self.file.append(&self.text)?;

@@ -6,9 +6,10 @@ use mechid_signal::{SignalError, message};
 use crate::escape::Message;
 use crate::{DecimalSign, Limit, Place, Quantity};
 
-/// A file that cannot be read or written; every message names the file and the place in it.
+/// Error of a file that cannot be read or written; every message names the file and the position in
+/// it.
 ///
-/// Lines and columns are counted from 1; lines as a text editor counts them.
+/// Lines and columns are counted from 1; lines are those of a text editor.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IoError {
@@ -20,7 +21,7 @@ pub enum IoError {
         /// Cause.
         source: std::io::Error,
     },
-    /// The file cannot be written; nothing was left behind.
+    /// The file cannot be written; no partial file remains.
     #[error("{}", Message(format_args!("cannot write {file}: {source}")))]
     Write {
         /// The file.
@@ -44,21 +45,21 @@ pub enum IoError {
         /// Cause.
         source: std::io::Error,
     },
-    /// The file is HDF5, which the feature `hdf5` reads.
+    /// The file is HDF5, but the feature `hdf5`, which reads it, is not enabled.
     #[error("{}", Message(format_args!("{file} is HDF5, as a MATLAB file of version 7.3 is, and this program was compiled without: save it \
         with -v7")))]
     Hdf5 {
         /// The file.
         file: String,
     },
-    /// The file is binary, but of no format known.
+    /// The file is binary and of an unknown format.
     #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7) or 7.3, \
          HDF5, universal file with datasets 58, Parquet, or gzip around a record")))]
     UnknownFormat {
         /// The file.
         file: String,
     },
-    /// The Parquet file is damaged, or written in a way that is not known here.
+    /// The Parquet file is damaged or uses a part of the format that is not supported.
     #[error("{}", Message(format_args!("{file} is damaged, or no Parquet file that can be read here: {what}")))]
     Parquet {
         /// The file.
@@ -66,7 +67,7 @@ pub enum IoError {
         /// Cause.
         what: String,
     },
-    /// A column that should name the record of each row does not.
+    /// A value in the column that identifies the record of each row is missing or of a wrong type.
     #[error("{}", Message(format_args!("{file}: column {column} should name the record of each row, by text or a whole number; \
         in row {row} (counted from 1) it holds {what}")))]
     RecordColumn {
@@ -76,10 +77,10 @@ pub enum IoError {
         column: String,
         /// The row, counted from 1.
         row: usize,
-        /// Contents of that row, in words.
+        /// Description of the content of that row.
         what: &'static str,
     },
-    /// The rows of a record do not follow one another.
+    /// The rows of one record are not consecutive.
     #[error("{}", Message(format_args!("{file}: record {id} goes on in row {row} (counted from 1) behind rows of other records: sort the \
         rows by record and time")))]
     RecordApart {
@@ -110,14 +111,14 @@ pub enum IoError {
         /// The limit, see [`Limits`](crate::Limits).
         limit: Limit,
     },
-    /// The file is JSON, which holds descriptions and reports.
+    /// The file is JSON, which contains descriptions and reports but no record.
     #[error("{}", Message(format_args!("{file} is JSON, no table of samples: simulate, sweep and stability read the description of \
          an experiment, force --system and modal read a machine or a report of identify")))]
     JsonRecord {
         /// The file.
         file: String,
     },
-    /// Other text precedes the table.
+    /// Text precedes the table.
     #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, skip the lines \
          above it with --skip-lines {}",
         message::count(*fields, "field"),
@@ -125,12 +126,12 @@ pub enum IoError {
     AboveTable {
         /// The file.
         file: String,
-        /// Line of the file with the header, or with the first row of numbers.
+        /// Line number of the header or of the first row of numbers.
         line: u64,
         /// Fields of the table.
         fields: usize,
     },
-    /// Lines are to be skipped in a file that is no text.
+    /// Header lines are to be skipped in a file that is not text.
     #[error("{}", Message(format_args!("{file} is no text: it has no lines to skip")))]
     NothingToSkip {
         /// The file.
@@ -144,7 +145,7 @@ pub enum IoError {
         /// Description of the content.
         found: &'static str,
     },
-    /// A line has more or fewer fields than the first one.
+    /// A line has more or fewer fields than the first line.
     #[error("{}", Message(format_args!("{file}, line {line}: {} where the first line has {expected}", message::count(*got, "field"))))]
     Ragged {
         /// The file.
@@ -156,41 +157,41 @@ pub enum IoError {
         /// Fields on the first line.
         expected: usize,
     },
-    /// The file has no such column.
+    /// The file has no column of this name or number.
     #[error("{}", Message(format_args!("{file} has no column \"{wanted}\"; its columns are {available}")))]
     MissingColumn {
         /// The file.
         file: String,
-        /// Name or number asked for.
+        /// Requested name or number.
         wanted: String,
-        /// Numbers and names of the columns there are.
+        /// Numbers and names of the columns of the file.
         available: String,
     },
-    /// Several columns bear the name asked for.
+    /// Several columns have the requested name.
     #[error("{}", Message(format_args!("{file} has several columns \"{wanted}\"; choose one by its number: {candidates}")))]
     AmbiguousColumn {
         /// The file.
         file: String,
-        /// Name or number asked for.
+        /// Requested name or number.
         wanted: String,
         /// Numbers and names of the columns of that name.
         candidates: String,
     },
-    /// One column was asked for twice.
+    /// One column was requested twice.
     #[error("{}", Message(format_args!("column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}")))]
     DuplicateColumn {
         /// The file.
         file: String,
         /// Number of the column.
         column: usize,
-        /// First way it was asked for.
+        /// First request for it.
         first: String,
-        /// Second way it was asked for.
+        /// Second request for it.
         second: String,
-        /// Numbers and names of the columns there are.
+        /// Numbers and names of the columns of the file.
         available: String,
     },
-    /// Text stands where a number is needed.
+    /// A field has text where a number is needed.
     #[error("{}", Message(format_args!("{file}, line {line}, column {column}: \"{text}\" is not a number")))]
     NotANumber {
         /// The file.
@@ -202,7 +203,7 @@ pub enum IoError {
         /// Content of the field.
         text: String,
     },
-    /// An empty field stands where a number is needed.
+    /// A field is empty where a number is needed.
     #[error("{}", Message(format_args!("{file}, line {line}, column {column}: the field is empty, a number is needed")))]
     EmptyField {
         /// The file.
@@ -227,7 +228,7 @@ pub enum IoError {
         /// The decimal sign of the other numbers.
         sign: DecimalSign,
     },
-    /// A column holds something else than real numbers.
+    /// The contents of a column are not real numbers.
     #[error("{}", Message(format_args!("{file}, column {column}: it holds {what}, a channel needs real numbers in time")))]
     NoNumbers {
         /// The file.
@@ -253,14 +254,14 @@ pub enum IoError {
         /// Quantity needed.
         wanted: Quantity,
     },
-    /// A text that should be a unit is none.
+    /// A text that should be a unit is not one.
     #[error("{}", Message(format_args!("\"{text}\" is no unit of a force, a response or a time that is known: examples are kN, lbf, \
         mm, in, m/s^2, g, ms")))]
     NoUnit {
         /// The text.
         text: String,
     },
-    /// A factor of a column is not usable.
+    /// The factor of a column is zero or not finite.
     #[error("{}", Message(format_args!("the scale of a column must be a finite number other than 0, got {factor}",
         factor = message::number(*factor))))]
     NoScale {
@@ -276,7 +277,7 @@ pub enum IoError {
         at: Place,
         /// Number and name of the column.
         column: String,
-        /// The value found, in the unit of the column.
+        /// The value, in the unit of the column.
         value: f64,
     },
     /// The instants of the time column are not equally spaced.
@@ -288,14 +289,14 @@ pub enum IoError {
     NonUniformTime {
         /// The file.
         file: String,
-        /// End of the worst step.
+        /// End of the step that differs most from the median.
         at: Place,
-        /// The worst step, in seconds.
+        /// The step that differs most from the median, in seconds.
         step: f64,
         /// The median step, in seconds.
         usual: f64,
     },
-    /// One sample has no time step.
+    /// A record of one sample has no time step.
     #[error("{}", Message(format_args!("{file} holds a single sample: a time column needs two to tell the time step")))]
     SingleSample {
         /// The file.
@@ -309,7 +310,7 @@ pub enum IoError {
         /// The columns and their lengths.
         lengths: String,
     },
-    /// A column of which the file does not say when it was sampled.
+    /// The file states no sampling instants for a column.
     #[error("{}", Message(format_args!("{file} does not say when column {column} was sampled: give a time column or a rate")))]
     NoTimeAxis {
         /// The file.
@@ -340,7 +341,7 @@ pub enum IoError {
         /// Step of the second column, in seconds.
         second_step: f64,
     },
-    /// The rate given is not that of the file.
+    /// The given rate contradicts the rate in the file.
     #[error("{}", Message(format_args!("the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
          the rate out)",
         own_hz = message::number(*own_hz), rate_hz = message::number(*rate_hz))))]
@@ -349,9 +350,9 @@ pub enum IoError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// The rate that the file gives it, in Hz.
+        /// Rate in the file, in Hz.
         own_hz: f64,
-        /// The rate given, in Hz.
+        /// Given rate, in Hz.
         rate_hz: f64,
     },
     /// Two numbers in a file state different sampling rates.
@@ -374,14 +375,14 @@ pub enum IoError {
         /// Rate that it states, in Hz.
         second_hz: f64,
     },
-    /// The sampling rate is not usable.
+    /// The sampling rate is not positive and finite.
     #[error("{}", Message(format_args!("the sample rate must be a positive finite number of Hz, got {rate_hz}",
         rate_hz = message::number(*rate_hz))))]
     SampleRate {
-        /// The rate given, in Hz.
+        /// Given rate, in Hz.
         rate_hz: f64,
     },
-    /// The numbers do not make a record.
+    /// The numbers do not form a valid record.
     #[error("{}", Message(format_args!("{file}: {source}")))]
     Signal {
         /// The file.
@@ -389,13 +390,13 @@ pub enum IoError {
         /// Cause.
         source: SignalError,
     },
-    /// The file is no JSON.
+    /// The file is not JSON.
     #[error("{}", Message(format_args!("{file} is not JSON: an experiment, a machine or a report is an object in braces, {{ … }}")))]
     NotJson {
         /// The file.
         file: String,
     },
-    /// The text is no description of an experiment.
+    /// The text is not a valid description of an experiment.
     #[error("{}", Message(format_args!("{file}: {field}{source}")))]
     Json {
         /// The file.
@@ -413,7 +414,7 @@ pub enum IoError {
         /// Cause.
         what: String,
     },
-    /// A covariance is not known.
+    /// A covariance in the report is not known.
     #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is null: the record it was identified from leaves \
          {parameters} undetermined; identify from one that moves the machine more, or take \
          \"covariance\" out of the file to count the machine as exactly known")))]
@@ -423,7 +424,7 @@ pub enum IoError {
         /// Names of the parameters.
         parameters: String,
     },
-    /// The matrices make no system.
+    /// The matrices do not form a valid system.
     #[error("{}", Message(format_args!("{file}: {source}")))]
     Model {
         /// The file.
@@ -431,7 +432,7 @@ pub enum IoError {
         /// Cause.
         source: ModelError,
     },
-    /// A text is no choice of spectral lines.
+    /// A text is not a valid choice of spectral lines.
     #[error("{}", Message(format_args!("\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
          1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
@@ -444,10 +445,10 @@ pub enum IoError {
     Responses {
         /// The file.
         file: String,
-        /// Numbers and names of the columns there are.
+        /// Numbers and names of the columns of the file.
         available: String,
     },
-    /// A point is not written as universal files number them.
+    /// A point does not have the form of node and direction that universal files use.
     #[error("{}", Message(format_args!("\"{point}\" is no point of a universal file: write a node and a direction such as 12+Z \
          (X, Y, Z, RX, RY or RZ)")))]
     Point {
@@ -460,21 +461,21 @@ pub enum IoError {
     LineOutside {
         /// Text of the choice.
         lines: String,
-        /// The line in question.
+        /// Line that does not exist.
         line: usize,
-        /// The last line there is.
+        /// Highest line of the period.
         highest: usize,
-        /// Samples in the period.
+        /// Number of samples in the period.
         len: usize,
     },
 }
 
-/// A number without the digits that rounding left behind.
+/// Rounds a number to six digits, which removes the digits that come from rounding errors.
 fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
-/// Remedy for a time step that differs from the usual one, both in s.
+/// Returns the remedy for a time step that differs from the usual one, both in s.
 fn remedy(step: f64, usual: f64) -> &'static str {
     if usual > 0.0 && step < 0.0 {
         "the time goes back, as where a second record was appended: keep them in files of their own"

@@ -1,15 +1,15 @@
-//! Text from files as it may be shown on a terminal.
+//! Text from files in a form that is safe on a terminal.
 
 use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-/// A text in which characters that a terminal obeys instead of showing them are written as Rust
-/// writes them, such as `\u{1b}` or `\n`: control characters, those that turn the direction of
-/// writing or are invisible, and characters that Unicode excludes from text.
+/// Returns a text in which unprintable characters are written as in Rust, such as `\u{1b}` or `\n`:
+/// control characters, invisible characters, those that change the direction of writing, and those
+/// that Unicode excludes from text.
 ///
-/// Names of columns and files may hold anything; shown raw, they could move the cursor, hide text or
-/// forge a line.
+/// Names of columns and files may have any characters; printed unchanged, they could move the
+/// cursor, hide text or imitate a line of output.
 ///
 /// ```
 /// use mechid_io::escaped;
@@ -28,8 +28,8 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Returns the name of a file as text. Bytes that are no UTF-8 are written as Rust writes them, such as
-/// `\xff`, so that two names never look alike.
+/// Returns the name of a file as text. Bytes that are not UTF-8 are written as in Rust, such as
+/// `\xff`, so that different names have different texts.
 ///
 /// ```
 /// use std::path::Path;
@@ -52,7 +52,7 @@ pub fn path_text(path: &Path) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Returns whether a character is not shown as it is.
+/// Returns whether a character must be escaped.
 fn is_unshown(c: char) -> bool {
     c.is_control()
         || matches!(c,
@@ -65,7 +65,7 @@ fn is_unshown(c: char) -> bool {
             | '\u{feff}'
             | '\u{fff0}'..='\u{fffb}'
             | '\u{e0000}'..='\u{e007f}')
-        // The last two of every plane, and 32 more, are no characters.
+        // Unicode reserves the last two code points of every plane and 32 more as non-characters.
         || u32::from(c) & 0xfffe == 0xfffe
         || ('\u{fdd0}'..='\u{fdef}').contains(&c)
 }
@@ -78,7 +78,7 @@ fn push(into: &mut String, c: char) {
     }
 }
 
-/// A message whose parts come from files, shown [`escaped`].
+/// Message whose parts come from files; it is shown [`escaped`].
 pub(crate) struct Message<'a>(pub fmt::Arguments<'a>);
 
 impl fmt::Display for Message<'_> {

@@ -1,4 +1,4 @@
-//! Folders of records and of results: what stands there, and how it was last changed.
+//! Folders of records and of results: which files are there, and how they were last changed.
 
 use std::fs;
 use std::io;
@@ -8,17 +8,18 @@ use std::time::UNIX_EPOCH;
 use crate::IoError;
 use crate::standard::{input_name, output_name};
 
-/// Size and time of modification of a file, by which another version of it is told apart.
+/// Size and modification time of a file, which identify a version of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileStamp {
     /// Number of bytes.
     pub bytes: u64,
-    /// Time of the last modification, in ns since the beginning of 1970; 0 where the system knows none.
+    /// Time of the last modification, in ns since the beginning of 1970; 0 if the system does not
+    /// know it.
     pub modified_ns: u128,
 }
 
 impl FileStamp {
-    /// Looks at a file; `None` if there is none or it must not be looked at.
+    /// Reads size and time of a file; `None` if the file does not exist or access is denied.
     pub fn of(path: impl AsRef<Path>) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         let since = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
@@ -29,8 +30,8 @@ impl FileStamp {
     }
 }
 
-/// Returns what a path is if it can be no record: `a named pipe`, `a socket`, `a device`. Opening one waits for
-/// whoever writes into it, for ever if nobody does.
+/// Returns the kind of a path that cannot be a record: `a named pipe`, `a socket`, `a device`.
+/// Opening one waits until another process writes into it, possibly forever.
 pub fn special_kind(path: impl AsRef<Path>) -> Option<&'static str> {
     let kind = fs::metadata(path).ok()?.file_type();
     if kind.is_file() || kind.is_dir() {
@@ -50,7 +51,7 @@ pub fn special_kind(path: impl AsRef<Path>) -> Option<&'static str> {
     Some("a device")
 }
 
-/// Creates a folder, with those above it, unless it exists.
+/// Creates a folder and its parents unless it exists.
 ///
 /// # Errors
 /// [`IoError::Write`].
@@ -59,8 +60,8 @@ pub fn create_folder(path: impl AsRef<Path>) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|source| IoError::Write { file: output_name(path), source })
 }
 
-/// Lists the files of a folder by name, without hidden ones and without folders in it; of anything
-/// else than a folder, the path itself.
+/// Returns the files of a folder, sorted by name, without hidden files and subfolders; if the path
+/// is not a folder, returns the path itself.
 ///
 /// # Errors
 /// [`IoError::Read`] for a folder that cannot be read.

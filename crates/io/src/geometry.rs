@@ -1,4 +1,4 @@
-//! Points of a structure and the lines between them, and shapes of its modes on them.
+//! Points of a structure, the lines between them, and mode shapes at these points.
 
 use std::path::Path;
 
@@ -10,9 +10,9 @@ use crate::{IoError, standard, uff};
 /// Points of a structure, and lines between them for drawing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Geometry {
-    /// The points, each with a name of its own.
+    /// Points, each with a unique name.
     pub points: Vec<GeometryPoint>,
-    /// Pairs of points, by their index, that a line joins.
+    /// Pairs of indices of points that a line joins.
     pub lines: Vec<[usize; 2]>,
 }
 
@@ -52,8 +52,8 @@ pub struct PointShape {
 pub struct NodalModes {
     /// Name of the file for messages.
     pub file: String,
-    /// Points and directions of the entries of each shape, such as `12+Z`; a node alone of values
-    /// without directions.
+    /// Points and directions of the entries of each shape, such as `12+Z`; the node alone if the
+    /// values have no direction.
     pub points: Vec<String>,
     /// The modes, in the order of the file.
     pub modes: Vec<NodalMode>,
@@ -71,15 +71,16 @@ pub struct NodalMode {
 }
 
 impl NodalModes {
-    /// Reads the modes of a universal file: datasets 55 of normal modes (analysis type 2) and complex
-    /// ones (3 and 7). Directions in which no node moves in any mode are left out.
+    /// Reads the modes of a universal file: datasets 55 of normal modes (analysis type 2) and
+    /// complex modes (types 3 and 7). Directions without motion in all modes are omitted.
     ///
     /// # Errors
-    /// [`IoError::Read`], [`IoError::Malformed`] with the line that is wrong, [`IoError::Empty`] without
-    /// a mode.
+    /// [`IoError::Read`], [`IoError::Malformed`] with the wrong line, [`IoError::Empty`] without a
+    /// mode.
     ///
     /// # Source
-    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, dataset 55.
+    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, dataset
+    /// 55.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let file = standard::input_name(path.as_ref());
         match standard::read_text(path.as_ref()) {
@@ -98,7 +99,8 @@ impl NodalModes {
 }
 
 impl<'a> Direction<'a> {
-    /// Splits a name such as `12+Z` or `bracket-X`; `None` without sign and axis at its end.
+    /// Splits a name such as `12+Z` or `bracket-X`; `None` if it does not end with a sign and an
+    /// axis.
     pub fn parse(name: &'a str) -> Option<Self> {
         let at = name.rfind(['+', '-'])?;
         let axis =
@@ -110,13 +112,13 @@ impl<'a> Direction<'a> {
 }
 
 impl Geometry {
-    /// Reads the geometry in a universal file (datasets 15 or 2411, and 82), or in a table: a row `name, x, y, z` for
-    /// each point, in m, and a row `line, name, name, …` for each chain of lines.
+    /// Reads the geometry in a universal file (datasets 15 or 2411, and 82), or in a table: a row
+    /// `name, x, y, z` for each point, in m, and a row `line, name, name, …` for each polyline.
     ///
     /// Coordinates of a universal file are converted to m by its dataset 164, if it has one.
     ///
     /// # Errors
-    /// [`IoError::Read`], and [`IoError::Malformed`] with the line that is wrong.
+    /// [`IoError::Read`], and [`IoError::Malformed`] with the wrong line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let file = standard::input_name(path.as_ref());
         match standard::read_text(path.as_ref()) {
@@ -128,7 +130,7 @@ impl Geometry {
     /// Reads the text of such a file; `file` is its name in messages.
     ///
     /// # Errors
-    /// [`IoError::Malformed`] with the line that is wrong.
+    /// [`IoError::Malformed`] with the wrong line.
     pub fn parse(file: &str, text: &str) -> Result<Self, IoError> {
         let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
         if first.trim_end() == "    -1" {
@@ -165,7 +167,7 @@ impl Geometry {
             Some(&[x, y, z]) if [x, y, z].iter().all(|value: &f64| value.is_finite()) => {
                 self.add(cells[0], [x, y, z])
             }
-            // The header of a table.
+            // A first row without numbers is the header of the table.
             None if self.points.is_empty() && cells.len() == 4 => Ok(()),
             _ => Err("a point is a name and three coordinates in m".into()),
         }
@@ -179,7 +181,7 @@ impl Geometry {
         Ok(())
     }
 
-    /// Adds lines through points in order.
+    /// Adds lines through the points in the given order.
     fn join(&mut self, names: &[&str]) -> Result<(), String> {
         let index =
             |name: &&str| self.index(name).ok_or_else(|| format!("there is no point {name}"));
@@ -196,9 +198,9 @@ impl Geometry {
         self.points.iter().position(|point| point.name == name)
     }
 
-    /// Makes a geometry of names alone: points in a row, 1 m apart along x, in the order of their names, joined by a line.
-    /// Names `row.column`, such as `2.3+Z`, make a grid in the plane of x and y. A name without sign and
-    /// axis is a point by itself.
+    /// Creates a geometry from names alone: points in a row, 1 m apart along x, in the order of
+    /// their names, joined by a line. Names `row.column`, such as `2.3+Z`, create a grid in the
+    /// plane of x and y. A name without sign and axis is a separate point.
     pub fn from_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let mut geometry = Self::default();
         for name in names {
@@ -222,9 +224,9 @@ impl Geometry {
                 }
                 for (at, [row, column]) in cells.iter().enumerate() {
                     let next = [[*row, column.saturating_add(1)], [row.saturating_add(1), *column]];
-                    let found =
+                    let neighbours =
                         next.iter().filter_map(|next| cells.iter().position(|cell| cell == next));
-                    geometry.lines.extend(found.map(|other| [at, other]));
+                    geometry.lines.extend(neighbours.map(|other| [at, other]));
                 }
             }
             _ => geometry.lines = (1..geometry.points.len()).map(|k| [k - 1, k]).collect(),
@@ -252,10 +254,10 @@ impl Geometry {
         Some(moved)
     }
 
-    /// Writes a universal file of the geometry and the shapes on it: units (164: SI), points (15), lines (82), and a
-    /// dataset 55 for each shape, complex, at 3 degrees of freedom of each point.
+    /// Returns a universal file of the geometry and the shapes on it: units (164: SI), points (15),
+    /// lines (82), and a complex dataset 55 for each shape, with 3 degrees of freedom per point.
     ///
-    /// Points whose names are no numbers are numbered from 1.
+    /// Points whose names are not numbers are numbered from 1.
     pub fn universal_file(&self, shapes: &[PointShape]) -> String {
         uff::write_shapes(self, shapes)
     }

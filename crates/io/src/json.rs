@@ -10,7 +10,8 @@ use serde::de::{DeserializeOwned, Deserializer, Error, Visitor};
 
 use crate::{IoError, standard};
 
-/// Reads a value from a JSON file, or from standard input as `-`: the saved settings of an analysis.
+/// Reads a value from a JSON file, or from standard input as `-`: the saved settings of an
+/// analysis.
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], and [`IoError::Json`] with the field that is wrong.
@@ -18,23 +19,22 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoErr
     Ok(read(path.as_ref())?.1)
 }
 
-/// Reads a value from a JSON file, or from standard input as `-`; returns its name in messages, too.
+/// Reads a value from a JSON file, or from standard input as `-`; returns its name in messages,
+/// too.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoError> {
     let file = standard::input_name(path);
     match standard::read_text(path) {
         Ok(text) => parse(&file, &text).map(|value| (file, value)),
-        // No UTF-8: a binary file.
+        // A file that is not UTF-8 is a binary file.
         Err(e) if e.kind() == io::ErrorKind::InvalidData => Err(IoError::NotJson { file }),
         Err(source) => Err(IoError::Read { file, source }),
     }
 }
 
-/// Returns the folder that the paths in a JSON file begin at; of standard input, the current one.
+/// Returns the folder to which the paths in a JSON file are relative; the current one for standard
+/// input.
 pub(crate) fn folder(path: &Path) -> &Path {
-    match standard::is_input(path) {
-        true => Path::new(""),
-        false => path.parent().unwrap_or(Path::new("")),
-    }
+    if standard::is_input(path) { Path::new("") } else { path.parent().unwrap_or(Path::new("")) }
 }
 
 /// Reads a value from a JSON text; `file` is its name in messages.
@@ -50,7 +50,7 @@ pub(crate) fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Io
     Ok(value)
 }
 
-/// Reads a value from a text or from JSON that was parsed before; `file` is its name in messages.
+/// Converts a text or parsed JSON to a value; `file` is its name in messages.
 pub(crate) fn deserialized<'de, T: Deserialize<'de>>(
     file: &str,
     from: impl Deserializer<'de, Error = serde_json::Error>,
@@ -64,10 +64,11 @@ pub(crate) fn deserialized<'de, T: Deserialize<'de>>(
     })
 }
 
-/// Largest number of bytes of a message of the parser, which repeats the value that it found.
+/// Largest length of an error message of the parser, in bytes; longer ones, which repeat the value
+/// in the file, are shortened.
 const MAX_MESSAGE: usize = 1000;
 
-/// Leaves the middle of a long message out.
+/// Removes the middle of a long message.
 fn shortened(error: serde_json::Error) -> serde_json::Error {
     let text = error.to_string();
     if text.len() <= MAX_MESSAGE {
@@ -79,8 +80,8 @@ fn shortened(error: serde_json::Error) -> serde_json::Error {
     serde_json::Error::custom(format!("{beginning} … {end}"))
 }
 
-/// Reads a word, one of the variants of an enum. Without this a value of another shape is refused
-/// with the words of the serialisation library, such as "expected unit".
+/// Reads a word: one of the variants of an enum. The derived reader would refuse other values with
+/// terms of the serialisation library, such as "expected unit".
 pub(crate) fn word<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<T, D::Error> {

@@ -1,17 +1,17 @@
-//! Texts of a struct that name the unit and the channel of the numbers beside them.
+//! Text fields of a struct that state the unit and the channel of its numeric fields.
 
 use std::collections::HashMap;
 
 use crate::contents::Contents;
 use crate::table::is_time;
 
-/// Names of a field with a unit, in lower case.
+/// Names, in lower case, of a field that states a unit.
 const UNITS: [&str; 5] = ["unit", "units", "yunit", "y_unit", "eu"];
 
-/// Names of a field with the name of a channel, in lower case.
+/// Names, in lower case, of a field that states the name of a channel.
 const NAMES: [&str; 5] = ["name", "label", "channel", "channelname", "description"];
 
-/// Gives the columns of a struct the unit and the name that texts in the same struct state.
+/// Assigns to the columns of a struct the unit and the name that its text fields state.
 pub(crate) fn with_labels(mut contents: Contents) -> Contents {
     let mut labels: HashMap<&str, [&str; 2]> = HashMap::new();
     for (path, text) in &contents.texts {

@@ -1,8 +1,8 @@
-//! Measured records and system descriptions, in and out of files.
+//! Files of measured records and system descriptions: reading and writing.
 //!
 //! A [`Table`] reads delimited text in many dialects (quoted headers, trailing delimiters, columns
-//! that are empty below their first row, decimal commas), MATLAB and universal files and, with the feature
-//! `parquet`, Apache Parquet. Its errors name file, line and column.
+//! that are empty below their first row, decimal commas), MATLAB and universal files and, with the
+//! feature `parquet`, Apache Parquet. Its errors name file, line and column.
 //!
 //! ```
 //! use mechid_io::{Table, TimeAxis};

@@ -1,11 +1,11 @@
-//! Limits on what a file may ask of memory.
+//! Limits on the memory that reading a file may use.
 
 use std::fmt;
 
-/// Bytes that a number takes while a file is read: itself, and a copy while its column grows.
+/// Memory per number while a file is read, in bytes: the number, and a copy while its column grows.
 pub(crate) const NUMBER_BYTES: usize = 16;
 
-/// Number of bytes that every text in gzip may have, however small its file.
+/// Size, in bytes, that the text in any gzip file may have, however small the file is.
 const TEXT_BYTES: usize = 64 << 20;
 
 /// Options for reading a record file.
@@ -30,33 +30,33 @@ pub struct ReadOptions {
 
 /// Limits that damaged and forged files exceed, and measured records do not.
 ///
-/// A few hundred bytes can stand for gigabytes, in a compressed variable or behind a quote that is
+/// A few hundred bytes can expand to gigabytes, in a compressed variable or after a quote that is
 /// never closed. Reading stops with [`IoError::TooLarge`](crate::IoError::TooLarge) before the
-/// memory is taken.
+/// memory is allocated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a row of text, quoted line breaks included; 4 MiB by default.
+    /// Bytes of a row of text, including quoted line breaks; 4 MiB by default.
     pub row_bytes: usize,
-    /// Columns, in whatever format; 65,536 by default.
+    /// Number of columns, in any format; 65,536 by default.
     pub columns: usize,
-    /// Bytes of a compressed MATLAB variable, or of a MATLAB or universal file in gzip, when
-    /// unpacked; 1 GiB by default.
+    /// Unpacked bytes of a compressed MATLAB variable, or of a MATLAB or universal file in gzip; 1
+    /// GiB by default.
     pub unpacked_bytes: usize,
-    /// Numbers held in memory at a time, of all columns together; 2²⁸ (2 GiB) by default. A long
-    /// text that is read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
+    /// Numbers in memory at one time, over all columns; 2²⁸ (2 GiB) by default. A long text that is
+    /// read in chunks ([`RecordFile`](crate::RecordFile)) may have any number of rows.
     pub numbers: usize,
-    /// Bytes of a text in gzip for each byte of the file, beyond the first 64 MiB; 100 by default. Printed
-    /// numbers of a measured record take a quarter of their text.
+    /// Unpacked bytes of a text in gzip per byte of the file, in addition to the first 64 MiB; 100
+    /// by default. Gzip reduces the printed numbers of a measured record to about a quarter.
     pub text_per_byte: usize,
-    /// Bytes of a name: of a column, a unit, a record; 4 KiB by default.
+    /// Bytes of the name of a column, a unit or a record; 4 KiB by default.
     pub name_bytes: usize,
-    /// Memory that a file of any size may take, in bytes; 256 MiB by default.
+    /// Memory that a file of any size may use, in bytes; 256 MiB by default.
     pub memory_bytes: usize,
-    /// Further memory for each byte of the file, in bytes; 512 by default. A number of a measured record
-    /// takes a byte of its file or more; where it takes less, the file promises numbers that nobody
-    /// measured.
+    /// Further memory per byte of the file, in bytes; 512 by default. A number of a measured record
+    /// needs at least one byte of its file; a file with more numbers than bytes is not measured
+    /// data.
     pub memory_per_byte: usize,
-    /// Memory that the largest file may take, in bytes; 8 GiB by default.
+    /// Largest memory that any file may use, in bytes; 8 GiB by default.
     pub most_memory_bytes: usize,
 }
 
@@ -74,7 +74,7 @@ impl Limits {
         most_memory_bytes: 8 << 30,
     };
 
-    /// Returns these limits, each `factor` times as large.
+    /// Returns these limits multiplied by `factor`.
     #[must_use]
     pub fn times(self, factor: usize) -> Self {
         let times = |limit: usize| limit.saturating_mul(factor);
@@ -91,8 +91,8 @@ impl Limits {
         }
     }
 
-    /// Returns these limits with so many bytes of memory for a file of any size, and room for the
-    /// numbers and the unpacked bytes that fit.
+    /// Returns these limits with this memory, in bytes, for a file of any size, and with the number
+    /// of numbers and unpacked bytes that fit into it.
     #[must_use]
     pub fn with_memory(self, bytes: usize) -> Self {
         Self {
@@ -104,12 +104,12 @@ impl Limits {
         }
     }
 
-    /// Returns the number of bytes that a text in gzip of `file_bytes` bytes may have.
+    /// Returns the largest unpacked size of a text in gzip whose file has `file_bytes` bytes.
     pub(crate) fn text_bytes(&self, file_bytes: usize) -> usize {
         TEXT_BYTES.saturating_add(self.text_per_byte.saturating_mul(file_bytes))
     }
 
-    /// Returns the memory, in bytes, that a file of `file_bytes` bytes may take.
+    /// Returns the memory, in bytes, that a file of `file_bytes` bytes may use.
     ///
     /// ```
     /// use mechid_io::Limits;
@@ -181,28 +181,28 @@ impl fmt::Display for Limit {
     }
 }
 
-/// Remainder of the [`Limits`] while a binary or universal file is read.
+/// Remaining [`Limits`] while a binary or universal file is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Budget {
     limits: Limits,
     columns: usize,
     numbers: usize,
-    /// Memory of the whole file, in bytes.
+    /// Memory limit for the whole file, in bytes.
     memory: usize,
-    /// The part of it that is not taken yet.
+    /// Remaining memory, in bytes.
     memory_left: usize,
 }
 
 impl Budget {
-    /// The limits for a file of so many bytes.
+    /// Creates the budget for a file of `file_bytes` bytes.
     pub fn new(limits: &Limits, file_bytes: usize) -> Self {
         let memory = limits.memory(file_bytes);
         let (columns, numbers) = (limits.columns, limits.numbers);
         Self { limits: *limits, columns, numbers, memory, memory_left: memory }
     }
 
-    /// Returns how many bytes may be unpacked at once, and the limit on them. A buffer of them takes twice
-    /// as much while it grows.
+    /// Returns how many bytes may be unpacked at once, and the limit that decides it. A growing
+    /// buffer needs twice its size.
     pub fn unpacked_bytes(&self) -> (usize, Limit) {
         let (unpacked, memory) = (self.limits.unpacked_bytes, self.memory_left / 2);
         if unpacked <= memory {
@@ -212,26 +212,26 @@ impl Budget {
         }
     }
 
-    /// Takes room for a column.
+    /// Subtracts a column from the budget.
     pub fn take_column(&mut self) -> Result<(), Limit> {
         self.columns = self.columns.checked_sub(1).ok_or(Limit::Columns(self.limits.columns))?;
         Ok(())
     }
 
-    /// Takes room for numbers.
+    /// Subtracts the memory of numbers from the budget.
     pub fn take_numbers(&mut self, count: usize) -> Result<(), Limit> {
         self.numbers =
             self.numbers.checked_sub(count).ok_or(Limit::Numbers(self.limits.numbers))?;
         self.take_bytes(count.saturating_mul(NUMBER_BYTES))
     }
 
-    /// Takes room for bytes.
+    /// Subtracts bytes from the budget.
     pub fn take_bytes(&mut self, count: usize) -> Result<(), Limit> {
         self.memory_left = self.memory_left.checked_sub(count).ok_or(Limit::Memory(self.memory))?;
         Ok(())
     }
 
-    /// Gives room back that [`Budget::take_bytes`] took.
+    /// Returns bytes to the budget that [`Budget::take_bytes`] subtracted.
     pub fn give_bytes(&mut self, count: usize) {
         self.memory_left += count;
     }

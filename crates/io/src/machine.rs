@@ -7,29 +7,29 @@ use serde_json::{Value, json};
 
 use crate::{IoError, Limits, Table, json, read_matrix_market};
 
-/// Fields of an element that may name a file with a matrix.
+/// Fields of an element that may name the file of a matrix.
 const MATRICES: [&str; 4] = ["mass", "damping", "stiffness", "gyroscopic"];
 
-/// Reads the description of a machine with its sensors and inputs in a JSON file (`-`: standard
+/// Reads the description of a machine with its sensors and inputs from a JSON file (`-`: standard
 /// input).
 ///
 /// A matrix of an element is a list of rows, a sparse matrix by its `size`, `rows`, `columns` and
-/// `values`, or the name of a file beside the description: Matrix Market (`.mtx`, `.mtx.gz`), or a
-/// text with one row of numbers per row of the matrix, without a header.
+/// `values`, or the name of a file in the folder of the description: Matrix Market (`.mtx`,
+/// `.mtx.gz`), or a text with one row of numbers per row of the matrix, without a header.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`] with what is wrong and the name of
-/// the element, [`IoError::Malformed`] for a matrix.
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`] with the cause and the name of the
+/// element, [`IoError::Malformed`] for a matrix.
 pub fn read_machine(path: impl AsRef<Path>) -> Result<InstrumentedMachine, IoError> {
     let (file, described) = json::read::<Value>(path.as_ref())?;
     machine(&file, described, json::folder(path.as_ref()))
 }
 
-/// Reads the description of a machine in a JSON text, as [`read_machine`] does; `file` is its name
-/// in messages, and the files of its matrices lie in `folder`.
+/// Reads the description of a machine from a JSON text, as [`read_machine`] does; `file` is its
+/// name in messages, and `folder` has the files of its matrices.
 ///
 /// # Errors
-/// Those of [`read_machine`].
+/// As [`read_machine`].
 pub fn parse_machine(
     file: &str,
     text: &str,
@@ -54,7 +54,7 @@ fn machine(
     json::deserialized(file, described)
 }
 
-/// The matrix in a file as JSON.
+/// Reads the matrix in a file as JSON.
 fn matrix(path: &Path) -> Result<Value, IoError> {
     let name = path.to_string_lossy().to_ascii_lowercase();
     if !name.ends_with(".mtx") && !name.ends_with(".mtx.gz") {

@@ -1,7 +1,8 @@
 //! Matrices in Matrix Market files, the text format of sparse matrices.
 //!
 //! # Source
-//! Boisvert, Pozo & Remington, *The Matrix Market Exchange Formats: Initial Design*, NISTIR 5935 (1996).
+//! Boisvert, Pozo & Remington, *The Matrix Market Exchange Formats: Initial Design*, NISTIR 5935
+//! (1996).
 
 use std::io::BufRead as _;
 use std::path::Path;
@@ -15,11 +16,11 @@ use crate::contents::Place;
 use crate::table::source::{Source, failed};
 use crate::{IoError, Limit, Limits};
 
-/// Numbers that [`Limits::numbers`] allows for each row of a matrix, which a row without entries needs
-/// memory for, too: 2²² rows by default.
+/// Memory per row, in numbers of [`Limits::numbers`]: a row without entries needs memory, too. By
+/// default a matrix has at most 2²² rows.
 pub(crate) const NUMBERS_PER_ROW: usize = 64;
 
-/// Entries of the other triangle of a matrix.
+/// Relation between the stored triangle of a matrix and the other one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Symmetry {
     General,
@@ -27,15 +28,15 @@ enum Symmetry {
     SkewSymmetric,
 }
 
-/// What the first line says.
+/// Contents of the first line.
 #[derive(Debug, Clone, Copy)]
 struct Header {
     is_coordinate: bool,
     symmetry: Symmetry,
 }
 
-/// Reads a square matrix in a file, which may be in gzip; its entries are in the unit of the file (kg,
-/// N·s/m or N/m), and those at one place are added up.
+/// Reads a square matrix from a file, which may be in gzip; its entries are in the unit of the file
+/// (kg, N·s/m or N/m), and entries with the same row and column are added.
 ///
 /// # Errors
 /// [`IoError::Read`] if it cannot be read, otherwise as [`parse_matrix_market`].
@@ -46,8 +47,8 @@ pub fn read_matrix_market(
     matrix(Source::open(path.as_ref())?, limits)
 }
 
-/// Reads a square matrix in the bytes of a file, in the unit of the file (kg, N·s/m or N/m); `file` is
-/// its name in messages.
+/// Reads a square matrix from the bytes of a file, in the unit of the file (kg, N·s/m or N/m);
+/// `file` is its name in messages.
 ///
 /// ```
 /// use mechid_io::{Limits, parse_matrix_market};
@@ -74,7 +75,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     if !lines.next(&mut source)? {
         return Err(lines.malformed("it is empty, a Matrix Market file begins with %%MatrixMarket"));
     }
-    let header = Header::of(&lines)?;
+    let header = Header::parse(&lines)?;
     if !lines.next_of_data(&mut source)? {
         return Err(lines.malformed("the line with the size of the matrix is missing"));
     }
@@ -93,9 +94,9 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     if size > limits.numbers / NUMBERS_PER_ROW || stored > limits.numbers {
         return Err(lines.too_large());
     }
-    // As many as there are, whatever number the file states.
+    // The vector grows with the entries that are read: the number in the header may be forged.
     let mut entries = Vec::new();
-    let mut place = match header.symmetry {
+    let mut next_entry = match header.symmetry {
         Symmetry::SkewSymmetric => Some((1, 0)),
         Symmetry::General | Symmetry::Symmetric => Some((0, 0)),
     };
@@ -104,13 +105,12 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
             let (count, stored) = (message::count(count, "entry"), message::count(stored, "entry"));
             return Err(lines.malformed(format!("the file ends after {count} of {stored}")));
         }
-        let (row, column, value) = match header.is_coordinate {
-            true => lines.entry(size)?,
-            false => {
-                let (row, column) = place.expect("a place is left for each entry");
-                place = header.symmetry.after(row, column, size);
-                (row, column, lines.value()?)
-            }
+        let (row, column, value) = if header.is_coordinate {
+            lines.entry(size)?
+        } else {
+            let (row, column) = next_entry.expect("a place is left for each entry");
+            next_entry = header.symmetry.after(row, column, size);
+            (row, column, lines.value()?)
         };
         if value == 0.0 {
             continue;
@@ -129,14 +129,15 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
             return Err(lines.too_large());
         }
     }
-    match lines.next_of_data(&mut source)? {
-        true => Err(lines.malformed(format!("there are more than the {stored} entries stated"))),
-        false => Ok(triplets(size, entries).expect("every entry was checked to be inside")),
+    if lines.next_of_data(&mut source)? {
+        Err(lines.malformed(format!("there are more than the {stored} entries stated")))
+    } else {
+        Ok(triplets(size, entries).expect("every entry was checked to be inside"))
     }
 }
 
 impl Header {
-    fn of(lines: &Lines) -> Result<Self, IoError> {
+    fn parse(lines: &Lines) -> Result<Self, IoError> {
         let words: Vec<String> =
             lines.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -169,7 +170,7 @@ impl Header {
 }
 
 impl Symmetry {
-    /// Number of entries in an array of so many rows and columns.
+    /// Returns the number of stored entries of a matrix with `size` rows.
     fn stored(self, size: usize) -> usize {
         match self {
             Self::General => size.saturating_mul(size),
@@ -178,7 +179,8 @@ impl Symmetry {
         }
     }
 
-    /// The place that follows in an array: down the columns, of a symmetric matrix from the diagonal on.
+    /// Returns the row and column of the next stored entry: down the columns, in a symmetric matrix
+    /// from the diagonal on.
     fn after(self, row: usize, column: usize, size: usize) -> Option<(usize, usize)> {
         let first = match self {
             Self::General => 0,
@@ -190,7 +192,7 @@ impl Symmetry {
     }
 }
 
-/// The lines of a file, one at a time.
+/// Reader of the lines of a file, one at a time.
 struct Lines {
     file: String,
     /// Number of the line, counted from 1.
@@ -217,7 +219,7 @@ impl Lines {
         }
     }
 
-    /// Reads the next line that is neither empty nor a comment.
+    /// Reads the next line that is neither empty nor a comment; `false` at the end of the file.
     fn next_of_data(&mut self, source: &mut Source<'_>) -> Result<bool, IoError> {
         while self.next(source)? {
             if !self.text.starts_with(b"%") && self.words().next().is_some() {
@@ -231,7 +233,7 @@ impl Lines {
         self.text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
     }
 
-    /// Row and column, counted from 0, and value.
+    /// Returns row and column, counted from 0, and value of the entry on this line.
     fn entry(&self, size: usize) -> Result<(usize, usize, f64), IoError> {
         let mut words = self.words();
         let (row, column, value) = (words.next(), words.next(), words.next());
@@ -248,7 +250,7 @@ impl Lines {
         Ok((row - 1, column - 1, self.number(value)?))
     }
 
-    /// The only number of the line.
+    /// Returns the only number of the line.
     fn value(&self) -> Result<f64, IoError> {
         let mut words = self.words();
         match (words.next(), words.next()) {
@@ -277,7 +279,7 @@ impl Lines {
     }
 }
 
-/// Returns a whole number.
+/// Reads a whole number.
 fn whole(word: &[u8]) -> Option<usize> {
     str::from_utf8(word).ok()?.parse().ok()
 }

@@ -1,9 +1,9 @@
-//! Numbers as text, as fast as text is read.
+//! Fast formatting of numbers as text.
 
 use std::fmt::Write as _;
 
-/// Appends a number with the fewest digits that identify it, in the form of `{:?}`; of two such numbers that
-/// are equally near, the one with an even last digit, which `{:?}` rounds up.
+/// Appends a number with the fewest digits that identify it, in the form of `{:?}`; of two equally
+/// near texts, this takes the one with an even last digit, and `{:?}` the larger one.
 pub(crate) fn push_number(text: &mut String, value: f64) {
     if !value.is_finite() {
         let _ = write!(text, "{value:?}");
@@ -21,7 +21,7 @@ pub(crate) fn push_number(text: &mut String, value: f64) {
     }
 }
 
-/// Appends a number below 1e-4 that is printed as 0.0000… by its power of ten.
+/// Appends a number below 1e-4, printed as 0.0000…, in exponent notation.
 fn push_small(text: &mut String, printed: &str) {
     let (sign, size) = printed.strip_prefix('-').map_or(("", printed), |size| ("-", size));
     let places = size.trim_start_matches("0.");

@@ -1,4 +1,4 @@
-//! Files that appear complete or not at all.
+//! Output files that are written completely or not at all.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, Permissions};
@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::IoError;
 use crate::standard::{input_name, is_input, is_standard_output, output_name};
 
-/// A file to be written.
+/// A complete file to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutputFile {
     /// Destination.
@@ -18,15 +18,15 @@ pub struct OutputFile {
     pub content: Vec<u8>,
 }
 
-/// A file that is written piece by piece beside its destination, and takes its name in
-/// [`write_all`]; dropped before that, it is removed again.
+/// File that is written in parts under a temporary name in the folder of its destination, and gets
+/// its name in [`write_all`]; if it is dropped before that, it is removed.
 ///
-/// On Linux the file has no name until then, so that nothing is left of it however the program
-/// ends. Elsewhere, and on file systems without such files, it has a hidden name beside the
-/// destination; [`remove_unfinished_files`] removes it when a signal ends the program, and what a killed
-/// program leaves of it is removed when the same destination is next written to.
+/// On Linux the file has no name until then, so that it disappears however the program ends. On
+/// other systems, and on file systems without such files, it has a hidden name in the folder of the
+/// destination; [`remove_unfinished_files`] removes it when a signal ends the program. If the
+/// program is killed, the file is removed when the same destination is next written to.
 ///
-/// A file that is replaced keeps its permissions; one without permission to write is not replaced.
+/// A file that is replaced keeps its permissions; a read-only file is not replaced.
 ///
 /// ```
 /// use mechid_io::{BegunFile, write_all};
@@ -44,51 +44,52 @@ pub struct OutputFile {
 #[derive(Debug)]
 pub struct BegunFile {
     path: PathBuf,
-    // Fields are dropped in this order: closed, then removed.
+    // Fields are dropped in this order: the file must be closed before it is removed.
     stream: BufWriter<File>,
     stage: Stage,
 }
 
-/// Place of the content until it is complete.
+/// Storage of the content until it is complete.
 #[derive(Debug)]
 enum Stage {
     /// File without a name, on the file system of the destination.
     #[cfg(target_os = "linux")]
     Unnamed { destination: PathBuf },
-    /// File under another name beside the destination.
+    /// File with a temporary name in the folder of the destination.
     Beside { temporary: Temporary, destination: PathBuf },
-    /// Temporary file elsewhere: the destination is no regular file and is written into.
+    /// Temporary file in another folder: the destination is not a regular file and is written into.
     Elsewhere { destination: PathBuf },
-    /// Temporary file elsewhere: it goes to standard output.
+    /// Temporary file in another folder: the content goes to standard output.
     StandardOutput,
 }
 
-/// A file that is removed when it is no longer used, unless it was renamed.
+/// File that is removed when it is dropped, unless it was renamed.
 #[derive(Debug)]
 struct Temporary(PathBuf);
 
 /// Paths of all [`Temporary`] files of this process.
 static TEMPORARIES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Writes all files, or none: each is written beside its destination first, and they take their
-/// names only once all are complete, those that were begun before first.
+/// Writes all files, or none: each is written under a temporary name first, and the files get their
+/// names only when all are complete, those of `begun` first.
 ///
-/// A destination that is no regular file (a pipe, `/dev/null`) is written into; so is standard
-/// output, called `-` or by a name of the system such as `/dev/stdout`, whatever it is redirected to. It comes
-/// last: a reader that has closed it takes no other file away.
+/// A destination that is not a regular file (a pipe, `/dev/null`) is written into; so is standard
+/// output, given as `-` or by a name of the system such as `/dev/stdout`, even if it is redirected
+/// to a file. It is written last, so that a reader that has closed it does not prevent the other
+/// files.
 ///
 /// # Errors
-/// [`IoError::Write`] naming the file, also for two files with one destination; whatever stood at
-/// the destinations still stands there, unless standard output alone was closed.
+/// [`IoError::Write`] naming the file, also for two files with one destination; the files at the
+/// destinations are then unchanged, unless standard output alone was closed.
 pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoError> {
-    let mut all = begun;
+    let mut staged_files = begun;
     for file in files {
         let mut staged = BegunFile::begin(&file.path)?;
         staged.append(&file.content)?;
-        all.push(staged);
+        staged_files.push(staged);
     }
     let mut destinations = BTreeSet::new();
-    for file in &mut all {
+    for file in &mut staged_files {
         let is_new =
             file.stage.destination().is_none_or(|path| destinations.insert(path.to_owned()));
         if !is_new {
@@ -98,12 +99,12 @@ pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoEr
         file.complete()?;
     }
     let (last, first): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(BegunFile::is_for_standard_output);
+        staged_files.into_iter().partition(BegunFile::is_for_standard_output);
     first.into_iter().chain(last).try_for_each(BegunFile::commit)
 }
 
-/// Refuses outputs that would replace an input: the same file by whatever path or link, standard
-/// input redirected from it included. Pipes and devices may be both.
+/// Refuses outputs that would replace an input: the same file by any path or link, including
+/// redirected standard input. Pipes and devices may be both.
 ///
 /// # Errors
 /// [`IoError::OutputIsInput`].
@@ -114,9 +115,10 @@ pub fn refuse_replaced_inputs(
     for output in outputs.iter().map(AsRef::as_ref) {
         let Some(replaced) = replaced_file(output) else { continue };
         for input in inputs.iter().map(AsRef::as_ref) {
-            let handle = match is_input(input) {
-                true => same_file::Handle::stdin(),
-                false => same_file::Handle::from_path(input),
+            let handle = if is_input(input) {
+                same_file::Handle::stdin()
+            } else {
+                same_file::Handle::from_path(input)
             };
             if handle.is_ok_and(|input| input == replaced) {
                 return Err(IoError::OutputIsInput {
@@ -129,7 +131,7 @@ pub fn refuse_replaced_inputs(
     Ok(())
 }
 
-/// The regular file that an output would replace.
+/// Returns the regular file that an output would replace.
 fn replaced_file(output: &Path) -> Option<same_file::Handle> {
     if is_standard_output(output) || !fs::metadata(output).is_ok_and(|metadata| metadata.is_file())
     {
@@ -139,10 +141,10 @@ fn replaced_file(output: &Path) -> Option<same_file::Handle> {
 }
 
 impl BegunFile {
-    /// Begins a file that is to stand at `path`.
+    /// Begins a file with destination `path`.
     ///
     /// # Errors
-    /// [`IoError::Write`], also for a file that must not be written to.
+    /// [`IoError::Write`], also for a file without write permission.
     pub fn begin(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref().to_owned();
         match Self::open(&path) {
@@ -151,7 +153,7 @@ impl BegunFile {
         }
     }
 
-    /// Returns whether it goes to standard output.
+    /// Returns whether the content goes to standard output.
     pub fn is_for_standard_output(&self) -> bool {
         matches!(self.stage, Stage::StandardOutput)
     }
@@ -160,7 +162,7 @@ impl BegunFile {
         if is_standard_output(path) {
             return Ok((tempfile::tempfile()?, Stage::StandardOutput));
         }
-        // Through a symbolic link, so that the link stays one.
+        // The target of a symbolic link is replaced, so that the link stays a link.
         let destination = resolved(path)?;
         let permissions = match fs::metadata(&destination) {
             Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
@@ -168,7 +170,7 @@ impl BegunFile {
                 return Ok((tempfile::tempfile()?, Stage::Elsewhere { destination }));
             }
             Ok(metadata) => {
-                // Renaming would not ask for this permission.
+                // Renaming does not need write permission on the file, so it is checked here.
                 if metadata.permissions().readonly() {
                     let why = "the file that stands there is read-only";
                     return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
@@ -185,7 +187,7 @@ impl BegunFile {
         Ok((file, stage))
     }
 
-    /// Writes more of it.
+    /// Appends content.
     ///
     /// # Errors
     /// [`IoError::Write`].
@@ -193,7 +195,7 @@ impl BegunFile {
         self.stream.write_all(content.as_ref()).map_err(|source| failed(&self.path, source))
     }
 
-    /// Brings all of it to the disk.
+    /// Writes all buffered content to the disk.
     fn complete(&mut self) -> Result<(), IoError> {
         let written = self.stream.flush().and_then(|()| self.stream.get_ref().sync_all());
         written.map_err(|source| failed(&self.path, source))
@@ -204,7 +206,7 @@ impl BegunFile {
         let done = match stage {
             #[cfg(target_os = "linux")]
             Stage::Unnamed { destination } => unnamed::link(stream.get_ref(), &destination),
-            // It stays open, and so locked, until it has its name.
+            // The file stays open, and therefore locked, until it has its name.
             Stage::Beside { temporary, destination } => fs::rename(&temporary.0, destination),
             Stage::Elsewhere { destination } => {
                 let into = File::options().write(true).open(destination);
@@ -217,7 +219,7 @@ impl BegunFile {
 }
 
 impl Stage {
-    /// The name it will take; `None` for what is written into.
+    /// Returns the name that the file will get; `None` for a destination that is written into.
     fn destination(&self) -> Option<&Path> {
         match self {
             #[cfg(target_os = "linux")]
@@ -228,10 +230,10 @@ impl Stage {
     }
 }
 
-/// Number of links to links that are followed, as the system does.
+/// Maximum number of symbolic links that are followed, as in the operating system.
 const MOST_LINKS: usize = 40;
 
-/// A path without symbolic links, whether a file stands there or not; links in a ring are an error.
+/// Resolves symbolic links in a path, which need not exist; a cycle of links is an error.
 fn resolved(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -242,7 +244,8 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // A link to a file that is not there yet; that to a pipe has no path, and is opened as it is.
+        // The target of this link does not exist yet. A link to a pipe has no path and is opened
+        // unchanged.
         if fs::metadata(&path).is_err()
             && let Ok(target) = fs::read_link(&path)
         {
@@ -257,7 +260,7 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("it is a symbolic link in a ring of links"))
 }
 
-/// Creates the file that is to become `destination`.
+/// Creates the temporary file for `destination`.
 fn stage(destination: PathBuf) -> io::Result<(File, Stage)> {
     beside::remove_abandoned(&destination);
     #[cfg(target_os = "linux")]
@@ -268,8 +271,8 @@ fn stage(destination: PathBuf) -> io::Result<(File, Stage)> {
     Ok((file, Stage::Beside { temporary, destination }))
 }
 
-/// Gives a new file the permissions of the one that it replaces. That it belongs to somebody else, or
-/// that the file system knows none, is no reason not to write it.
+/// Gives a new file the permissions of the file that it replaces. Failure is ignored: the owner may
+/// differ, and some file systems have no permissions.
 fn keep(file: &File, permissions: Permissions) -> io::Result<()> {
     match file.set_permissions(permissions) {
         Err(e) if e.kind() == io::ErrorKind::Unsupported => Ok(()),
@@ -277,20 +280,20 @@ fn keep(file: &File, permissions: Permissions) -> io::Result<()> {
     }
 }
 
-/// Temporary files with a hidden name beside their destination.
+/// Temporary files with a hidden name in the folder of their destination.
 mod beside {
     use super::{File, OpenOptions, Path, PathBuf, Temporary, fs, io};
 
-    /// Number of bytes of the name of a destination in that of its temporary file: with what stands
-    /// around it no more than the 255 that file systems allow.
+    /// Maximum length, in bytes, of the name of a destination in that of its temporary file: with
+    /// prefix and suffix it stays below the 255 bytes that file systems allow.
     const NAME_BYTES: usize = 200;
 
-    /// Number of names tried.
+    /// Maximum number of names that are tried.
     const ATTEMPTS: u32 = 100;
 
     const ENDING: &str = ".tmp";
 
-    /// Beginning of the names of all temporary files of a destination.
+    /// Returns the prefix of the names of all temporary files of a destination.
     fn beginning(destination: &Path) -> io::Result<String> {
         let name = destination.file_name().ok_or(io::ErrorKind::InvalidInput)?;
         let name = name.to_string_lossy();
@@ -298,7 +301,7 @@ mod beside {
         Ok(format!(".{}.", &name[..end.unwrap_or(0)]))
     }
 
-    /// Makes a file under the first name that is free.
+    /// Creates a file under the first free name.
     pub fn named<T>(
         destination: &Path,
         make: impl Fn(&Path) -> io::Result<T>,
@@ -315,11 +318,11 @@ mod beside {
         Err(io::ErrorKind::AlreadyExists.into())
     }
 
-    /// Creates a temporary file, and locks it as long as it is open.
+    /// Creates a temporary file, locked as long as it is open.
     pub fn create(destination: &Path) -> io::Result<(File, Temporary)> {
         let open = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
         let (file, path) = named(destination, open)?;
-        // Where files cannot be locked, abandoned ones stay.
+        // Abandoned files stay on systems without file locks.
         let _ = file.try_lock();
         Ok((file, Temporary::new(path)))
     }
@@ -341,7 +344,7 @@ mod beside {
             if !is_ours || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
                 continue;
             }
-            // It stays locked until it is gone.
+            // The file stays locked until it is removed.
             let file = File::open(entry.path());
             if file.as_ref().is_ok_and(|file| file.try_lock().is_ok()) {
                 let _ = fs::remove_file(entry.path());
@@ -359,8 +362,8 @@ mod unnamed {
 
     use super::{File, Path, beside, fs, io};
 
-    /// Creates a file without a name in the folder of the destination; `None` where the file system
-    /// has none, or the folder of open files by which it gets its name is missing.
+    /// Creates a file without a name in the folder of the destination; `None` if the file system
+    /// has no such files, or if `/proc`, which is needed to name the file, is not available.
     pub fn create(destination: &Path) -> Option<File> {
         let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
         let mode = Mode::from_raw_mode(0o666);
@@ -382,14 +385,14 @@ mod unnamed {
             Err(rustix::io::Errno::EXIST) => {}
             other => return Ok(other?),
         }
-        // Only renaming replaces; for that moment it needs another name, and is not abandoned.
+        // Only renaming replaces a file; a lock marks the intermediate name as in use.
         let _ = file.try_lock();
         let ((), path) = beside::named(destination, |path| Ok(link(path)?))?;
         fs::rename(&path, destination).inspect_err(|_| drop(fs::remove_file(&path)))
     }
 }
 
-/// Writes what a file holds into something else.
+/// Copies the contents of a file into a stream.
 fn copied(mut from: &File, mut into: impl io::Write) -> io::Result<()> {
     io::Seek::rewind(&mut from)?;
     io::copy(&mut from, &mut into)?;
@@ -415,14 +418,14 @@ impl Drop for Temporary {
 }
 
 fn temporaries() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // A set of paths is whole whenever a thread panics.
+    // A panic in another thread cannot leave the set of paths in a wrong state.
     TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes the temporary files of every [`BegunFile`] of this process that is not complete.
 ///
-/// A program calls it when a signal ends it: then nothing is dropped. The files cannot be completed
-/// afterwards.
+/// A program calls it when a signal ends it, since destructors do not run then. The files cannot be
+/// completed afterwards.
 pub fn remove_unfinished_files() {
     for path in &*temporaries() {
         let _ = fs::remove_file(path);

@@ -1,4 +1,5 @@
-//! Frequency responses in arrays of complex numbers: points × references, along one dimension the frequencies.
+//! Frequency responses in arrays of complex numbers: points × references, with the frequencies
+//! along one dimension.
 
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
@@ -8,18 +9,18 @@ use crate::response_columns::points_of;
 use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use crate::{IoError, Table, escaped};
 
-/// Words of the names of an array of coherences, in lower case.
+/// Words, in lower case, that identify an array of coherences by its name.
 const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
 
-/// Adds the responses of the complex arrays of a file that run over its frequencies.
+/// Adds the responses in those complex arrays of a file that have one value per frequency.
 ///
-/// The frequencies run along the dimension of their number, the first one if several have it; the dimensions that are left are
-/// points of the response and points of the force. A matrix of frequencies and one dimension more has the responses to
-/// one force.
+/// The dimension of the frequencies is the first one whose length is the number of frequencies; the
+/// other dimensions are points of the response and points of the force. An array with one other
+/// dimension has the responses to one force.
 ///
 /// # Errors
-/// [`IoError::Description`] for arrays none of which has a dimension of as many entries, for one with too many
-/// dimensions, one that is not finite, and for two of the same response.
+/// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for one
+/// with too many dimensions, one that is not finite, and for two of the same response.
 pub(crate) fn add_functions(
     table: &Table,
     arrays: &[ComplexArray],
@@ -64,7 +65,7 @@ fn add_array(
     let leaf = array.name.rsplit_once(['.', '/']).map_or(array.name.as_str(), |(_, leaf)| leaf);
     let words: Vec<String> =
         leaf.split('_').filter(|word| !word.is_empty()).map(String::from).collect();
-    // `H_2_1` and `H21`; `H` and `H1` name an estimator.
+    // `H_2_1` and `H21` name points; `H` and `H1` name an estimator.
     let has_points =
         words.len() > 2 || leaf.len() > 2 && leaf.ends_with(|c: char| c.is_ascii_digit());
     let named = points_of(words).filter(|_| has_points && points * references == 1);
@@ -97,30 +98,31 @@ fn add_array(
     Ok(())
 }
 
-/// A dimension of an array.
+/// Length and stride of a dimension of an array.
 #[derive(Debug, Clone, Copy)]
 struct Dimension {
     len: usize,
     stride: usize,
 }
 
-/// Dimensions of an array of responses.
+/// Dimensions of an array of responses: frequencies and points.
 #[derive(Debug)]
 struct Shape {
     frequency: Dimension,
-    /// Points of the response, and of the force.
+    /// Points of the response, then of the force.
     points: [Dimension; 2],
 }
 
 impl Shape {
     fn new(array: &ComplexArray, frequencies: usize) -> Result<Self, String> {
-        let all = array.lengths.iter().zip(&array.strides);
-        let mut others: Vec<Dimension> =
-            all.map(|(len, stride)| Dimension { len: *len, stride: *stride }).collect();
-        let at = others.iter().position(|dimension| dimension.len == frequencies).unwrap_or(0);
-        let frequency = others.remove(at);
+        let dimensions = array.lengths.iter().zip(&array.strides);
+        let mut point_dimensions: Vec<Dimension> =
+            dimensions.map(|(len, stride)| Dimension { len: *len, stride: *stride }).collect();
+        let at =
+            point_dimensions.iter().position(|dimension| dimension.len == frequencies).unwrap_or(0);
+        let frequency = point_dimensions.remove(at);
         let one = Dimension { len: 1, stride: 0 };
-        let points = match others[..] {
+        let points = match point_dimensions[..] {
             [] => [one, one],
             // A vector is a matrix of one row or one column.
             [points] => [points, one],
@@ -141,13 +143,13 @@ impl Shape {
     }
 }
 
-/// Name and size of an array.
+/// Returns the name and the size of an array, for messages.
 fn sizes(array: &ComplexArray) -> String {
     let sizes: Vec<String> = array.lengths.iter().map(usize::to_string).collect();
     format!("{} ({})", escaped(&array.name), sizes.join(" × "))
 }
 
-/// Words that say what a response is, in lower case.
+/// Words, in lower case, that identify the measured quantity.
 const QUANTITIES: [(&str, ResponseQuantity); 5] = [
     ("accelerance", ResponseQuantity::Acceleration),
     ("inertance", ResponseQuantity::Acceleration),
@@ -156,7 +158,7 @@ const QUANTITIES: [(&str, ResponseQuantity); 5] = [
     ("compliance", ResponseQuantity::Displacement),
 ];
 
-/// Quantity that the name of an array states.
+/// Returns the quantity that the name of an array states.
 fn quantity_of_name(name: &str) -> Option<ResponseQuantity> {
     let lower = name.to_lowercase();
     QUANTITIES.iter().find(|(word, _)| lower.contains(word)).map(|(_, quantity)| *quantity)

@@ -1,4 +1,4 @@
-//! Columns of a table of frequency responses, by their names and units.
+//! Columns of a table of frequency responses, identified by their names and units.
 
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
@@ -8,23 +8,25 @@ use crate::responses::{FrequencyResponses, ResponseFunction};
 use crate::units::{ResponseUnit, label_notes, name_without_brackets, number_and_rest};
 use crate::{Evidence, IoError, Quantity, StatedUnit, Table};
 
-/// Names of a column of frequencies, in lower case; those before [`IN_RADIANS`] are in Hz unless a unit says otherwise.
+/// Names, in lower case, of a column of frequencies; those before [`IN_RADIANS`] are in Hz unless a
+/// unit states otherwise.
 const FREQUENCY: [&str; 10] =
     ["frequency_hz", "frequency", "freq", "f", "frequenz", "hz", "khz", "rpm", "omega", "w"];
 
-/// Names of a column of angular frequencies.
+/// Names of a column of angular frequencies, in rad/s.
 const IN_RADIANS: [&str; 4] = ["omega", "w", "ω", "radians"];
 
 /// Names of a column of multiples of the speed of rotation.
 const ORDERS: [&str; 2] = ["order", "orders"];
 
-/// Point of a table with a single response.
+/// Name of the point in a table with a single response.
 const ALONE: &str = "1";
 
-/// Largest phase, in radians, that a column without a unit of angle may have to be taken as radians.
+/// Maximum absolute phase, in rad, of a column without a unit that is read as radians; larger
+/// phases are degrees.
 const MAX_RADIANS: f64 = 6.5;
 
-/// Part of a frequency response that a column holds.
+/// Part of a frequency response: what the numbers of a column are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
     Real,
@@ -32,12 +34,12 @@ enum Part {
     Magnitude,
     /// Magnitude, in dB.
     Level,
-    /// Phase, with radians per unit where it is stated.
+    /// Phase, with the size of its unit in radians if it is stated.
     Phase(Option<f64>),
     StandardError,
 }
 
-/// What the header of a column says about a frequency response.
+/// Information about a frequency response in the header of a column.
 #[derive(Debug, Clone, PartialEq)]
 struct Heading {
     column: usize,
@@ -45,16 +47,16 @@ struct Heading {
     /// Points of response and force.
     points: [String; 2],
     quantity: Option<ResponseQuantity>,
-    /// Whether it is a force per response.
+    /// `true` for a force per response: the inverse of a receptance, mobility or accelerance.
     is_inverse: bool,
-    /// SI units per unit of the column.
+    /// Factor from the unit of the column to SI units.
     in_si: f64,
-    /// Text that is not understood.
+    /// Text that may be a unit but is not understood.
     doubt: Option<StatedUnit>,
 }
 
 impl Heading {
-    fn of(table: &Table, column: usize) -> Option<Self> {
+    fn new(table: &Table, column: usize) -> Option<Self> {
         let name = table.names()[column].trim();
         let lower = name_without_brackets(name).to_lowercase();
         let mut heading = Self {
@@ -107,7 +109,7 @@ impl Heading {
         (self.quantity, self.is_inverse) = (Some(quantity), true);
     }
 
-    /// Takes what stands in brackets, and in the line of units.
+    /// Reads the texts in brackets and in the line of units.
     fn take_notes(&mut self, table: &Table, column: usize, name: &str) {
         let notes = label_notes(name);
         let row = label_notes(&format!("[{}]", table.unit_text(column)));
@@ -136,7 +138,7 @@ impl Heading {
     }
 }
 
-/// The unit of an angle, in rad.
+/// Returns the size of a unit of angle, in rad.
 fn angle(text: &str) -> Option<f64> {
     match text.trim() {
         "rad" | "radian" | "radians" => Some(1.0),
@@ -145,13 +147,14 @@ fn angle(text: &str) -> Option<f64> {
     }
 }
 
-/// A word of a name as it is written.
+/// Returns a word of a name in its original case.
 fn original(name: &str, lower: &str) -> String {
     let at = name.to_lowercase().find(lower);
     at.and_then(|at| name.get(at..at + lower.len())).unwrap_or(lower).to_owned()
 }
 
-/// Points of response and force: `h_2_1`, `H21`, `frf_12+Z_1+Z`, or none.
+/// Returns the points of response and force in a name, such as `h_2_1`, `H21` or `frf_12+Z_1+Z`;
+/// `None` if it has none.
 pub(crate) fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
     if let [word] = &words[..] {
         let digits: Vec<char> = word.trim_start_matches(['h', 'H']).chars().collect();
@@ -171,7 +174,7 @@ pub(crate) fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
     words.next().is_none().then_some(points)
 }
 
-/// Column of the frequencies, by its name or by that of a field of a struct.
+/// Returns the column of frequencies, by its name or its field in a struct.
 fn frequency_column(table: &Table) -> Option<usize> {
     let names = || FREQUENCY.iter().chain(&IN_RADIANS);
     let of_struct = |at: &usize| {
@@ -181,7 +184,7 @@ fn frequency_column(table: &Table) -> Option<usize> {
     names().find_map(|name| table.find(name).ok()).or_else(|| (0..table.width()).find(of_struct))
 }
 
-/// Returns the frequencies of a table, in Hz; what is not sure about their unit is added to `doubts`.
+/// Returns the frequencies of a table, in Hz; a text that may be their unit is added to `doubts`.
 pub(crate) fn frequencies(
     table: &Table,
     doubts: &mut Vec<(String, StatedUnit, Quantity)>,
@@ -238,21 +241,21 @@ pub(crate) fn frequencies(
     Ok(values.iter().map(|value| value * factor).collect())
 }
 
-/// Adds the responses that the columns of a table hold.
+/// Adds the responses in the columns of a table.
 pub(crate) fn add_functions(
     table: &Table,
     responses: &mut FrequencyResponses,
 ) -> Result<(), IoError> {
     let headings: Vec<Heading> =
-        (0..table.width()).filter_map(|column| Heading::of(table, column)).collect();
+        (0..table.width()).filter_map(|column| Heading::new(table, column)).collect();
     for first in &headings {
         if !matches!(first.part, Part::Real | Part::Magnitude | Part::Level) {
             continue;
         }
-        let other = |part: &dyn Fn(Part) -> bool| {
+        let same_response = |part: &dyn Fn(Part) -> bool| {
             headings.iter().find(|heading| heading.points == first.points && part(heading.part))
         };
-        let function = function(table, first, &other)?;
+        let function = function(table, first, &same_response)?;
         if responses.functions.iter().any(|known| {
             (&known.response, &known.reference) == (&function.response, &function.reference)
         }) {
@@ -263,7 +266,7 @@ pub(crate) fn add_functions(
             return Err(IoError::Description { file: table.file().into(), what });
         }
         responses.functions.push(function);
-        let doubts = [Some(first), other(&|part| part == Part::Imaginary)];
+        let doubts = [Some(first), same_response(&|part| part == Part::Imaginary)];
         for heading in doubts.into_iter().flatten() {
             if let Some(doubt) = &heading.doubt {
                 let quantity = heading.quantity.unwrap_or(ResponseQuantity::Displacement);
@@ -275,7 +278,7 @@ pub(crate) fn add_functions(
     Ok(())
 }
 
-/// Finds the column of the same response whose part passes a test.
+/// Function that returns the column of the same response whose part passes a test.
 type OtherPart<'a> = dyn Fn(&dyn Fn(Part) -> bool) -> Option<&'a Heading> + 'a;
 
 /// Reads one response.
@@ -349,7 +352,8 @@ fn function<'a>(
     Ok(ResponseFunction { response, reference, quantity: first.quantity, values, standard_error })
 }
 
-/// Brings frequencies into rising order, leaves out the mirrored half of a spectrum, and says so.
+/// Sorts the frequencies in rising order and removes the mirrored half of a two-sided spectrum,
+/// with a remark.
 pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     let hz = &responses.frequency_hz;
     if let Some(short) = responses.functions.iter().find(|one| one.values.len() != hz.len()) {
@@ -393,9 +397,11 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     Ok(())
 }
 
-/// Number of the last values, in rising order, that mirror the first ones: those above half the sampling rate.
+/// Returns how many of the last values, in rising order, mirror the first ones: the lines above
+/// half the sampling rate.
 fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
-    /// Relative difference of a value and its mirror image, of which printing makes as much.
+    /// Maximum relative difference between a value and its mirror image, from the rounding of
+    /// printed numbers.
     const SAME: f64 = 1e-6;
     let len = order.len();
     if len < 4 || responses.frequency_hz[order[0]] != 0.0 {

@@ -1,4 +1,4 @@
-//! Frequency responses that were measured elsewhere, in and out of files.
+//! Files of frequency responses: reading and writing.
 
 use std::path::Path;
 
@@ -12,33 +12,41 @@ use crate::{
     IoError, Quantity, StatedUnit, Table, escaped, response_arrays, response_columns, uff,
 };
 
-/// Frequency responses of a file, at common frequencies and in SI units.
+/// Frequency responses in a file, at common frequencies and in SI units.
 ///
-/// A text has one row per frequency and a column `frequency_hz` (or `frequency`, `freq`, `f`, or `omega`, `w` in
-/// rad/s; otherwise the first column), with its unit (`[kHz]`, `rad/s`, `rpm`) in its name or in a line of units. The response of point i to a force at point j is `h_i_j_real` with
-/// `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`; beside it may
-/// stand `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to all forces) or
-/// `coherence_i_j`. A text with one response may leave `h_i_j_` and `_i` out. This is what
-/// `mechid frf --output` writes. Magnitudes may be in dB, units may stand in brackets (`real [g/N]`), and a name or a unit
-/// of an apparent mass, an impedance or a dynamic stiffness makes the response its inverse. Further columns have one number in all rows: `time_derivative` says what was
-/// measured (0 displacement, 1 velocity, 2 acceleration), `added_decay` what an exponential window adds to the decay
-/// of every mode, in 1/s, and `segment_samples`, `segment_hop`, `segments`, `segment_window` (0 whole periods,
-/// 1 Hann, 2 Hamming, 3 Blackman, 4 rectangular) and `sample_rate_hz` what the responses are averages over.
+/// A text has one row per frequency and a column `frequency_hz` (or `frequency`, `freq`, `f`, or
+/// `omega`, `w` in rad/s; otherwise the first column), with its unit (`[kHz]`, `rad/s`, `rpm`) in
+/// its name or in a line of units. The response of point i to a force at point j is `h_i_j_real`
+/// with `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`;
+/// optional columns are `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to
+/// all forces) or `coherence_i_j`. A text with one response may omit `h_i_j_` and `_i`. `mechid frf
+/// --output` writes this form.
 ///
-/// A MATLAB or HDF5 file has a vector of frequencies by one of these names, and arrays of complex numbers over them, points of
-/// the response by points of the force, in any order with the frequencies.
+/// Magnitudes may be in dB, and units may be in brackets (`real [g/N]`). If a name or a unit is
+/// that of an apparent mass, an impedance or a dynamic stiffness, the response is its inverse.
+///
+/// Further columns have the same number in all rows: `time_derivative` gives the measured quantity
+/// (0 displacement, 1 velocity, 2 acceleration), `added_decay` the decay that an exponential window
+/// adds to every mode, in 1/s, and `segment_samples`, `segment_hop`, `segments`, `segment_window`
+/// (0 whole periods, 1 Hann, 2 Hamming, 3 Blackman, 4 rectangular) and `sample_rate_hz` the
+/// segments over which the responses were averaged.
+///
+/// A MATLAB or HDF5 file has a vector of frequencies with one of these names, and arrays of complex
+/// numbers whose dimensions are points of the response, points of the force and frequencies, in any
+/// order.
 ///
 /// A universal file has a dataset 58 or 58b per response (function type 4) and coherence (6); its
-/// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 become SI units.
+/// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 are converted to
+/// SI units.
 ///
 /// ```
 /// use mechid_io::FrequencyResponses;
 ///
 /// let text = "frequency_hz,magnitude,phase_deg,coherence\n1,2e-3,-90,0.99\n2,1e-3,-120,0.98\n";
-/// let found = FrequencyResponses::parse("a.csv", text.as_bytes())?;
-/// assert_eq!(found.frequency_hz, [1.0, 2.0]);
-/// assert!((found.functions[0].values[0].im + 2e-3).abs() < 1e-18);
-/// assert_eq!(found.coherence[0].values, [0.99, 0.98]);
+/// let responses = FrequencyResponses::parse("a.csv", text.as_bytes())?;
+/// assert_eq!(responses.frequency_hz, [1.0, 2.0]);
+/// assert!((responses.functions[0].values[0].im + 2e-3).abs() < 1e-18);
+/// assert_eq!(responses.coherence[0].values, [0.99, 0.98]);
 /// # Ok::<(), mechid_io::IoError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,38 +59,41 @@ pub struct FrequencyResponses {
     pub functions: Vec<ResponseFunction>,
     /// Coherences, in the order of the file.
     pub coherence: Vec<CoherenceFunction>,
-    /// Rate, in 1/s, that an exponential window on force and response adds to the decay of every mode; `None`
-    /// without one, or if the file does not state it.
+    /// Decay, in 1/s, that an exponential window on force and response adds to every mode; `None`
+    /// if there was no window, or if the file does not state it.
     pub added_decay: Option<f64>,
-    /// Segments of a record that the responses are averages over; `None` if the file does not state them.
+    /// Segments of a record over which the responses were averaged; `None` if the file does not
+    /// state them.
     pub segments: Option<AveragedSegments>,
-    /// Remarks on what was left out or converted.
+    /// Remarks on parts of the file that were left out or converted.
     pub remarks: Vec<String>,
-    /// Columns whose headers hold a text that may be a unit: number and name, the text, and the quantity needed.
+    /// Columns whose headers have a text that may be a unit: number and name of the column, the
+    /// text, and the quantity needed.
     pub doubts: Vec<(String, StatedUnit, Quantity)>,
 }
 
-/// Segments of a record that frequency responses are averages over.
+/// Segments of a record over which frequency responses were averaged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AveragedSegments {
     /// Number of samples in a segment.
     pub samples: usize,
-    /// Number of samples from the start of one to that of the next.
+    /// Number of samples from the start of one segment to the start of the next.
     pub hop: usize,
     /// Number of segments.
     pub count: usize,
-    /// Window that weights their samples; `None` for whole periods.
+    /// Window that weights the samples; `None` for whole periods.
     pub window: Option<Window>,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
 }
 
 impl AveragedSegments {
-    /// Names of the columns that state them, in the order of [`AveragedSegments::numbers`].
+    /// Names of the columns with these numbers, in the order of [`AveragedSegments::numbers`].
     pub const COLUMNS: [&str; 5] =
         ["segment_samples", "segment_hop", "segments", "segment_window", "sample_rate_hz"];
 
-    /// Numbers as the columns have them: samples, hop, number, code of the window, and rate in Hz.
+    /// Returns the numbers for the columns: samples, hop, count, code of the window, and rate in
+    /// Hz.
     pub fn numbers(&self) -> [f64; 5] {
         let code = self.window.and_then(|window| Window::ALL.iter().position(|one| *one == window));
         let code = code.map_or(0, |at| at + 1);
@@ -91,9 +102,9 @@ impl AveragedSegments {
         [samples, hop, count, window, self.sample_rate_hz]
     }
 
-    /// Returns the segments that such numbers state, pure numbers and a rate in Hz as of [`AveragedSegments::numbers`];
-    /// `None` if they state none that are possible.
-    pub fn of_numbers(numbers: [f64; 5]) -> Option<Self> {
+    /// Creates the description from the numbers of [`AveragedSegments::numbers`] (pure numbers and
+    /// a rate in Hz); `None` if they are impossible.
+    pub fn from_numbers(numbers: [f64; 5]) -> Option<Self> {
         let [samples, hop, count, window, sample_rate_hz] = numbers;
         let whole = |value: f64, least: f64| {
             let is_whole = value.fract() == 0.0 && (least..=MOST_SAMPLES).contains(&value);
@@ -109,7 +120,7 @@ impl AveragedSegments {
     }
 }
 
-/// Largest number of samples that a file is believed to state.
+/// Maximum number of samples; a larger number in a file is an error.
 const MOST_SAMPLES: f64 = (1_u64 << 26) as f64;
 
 /// Response at one point per unit force at another, frequency by frequency.
@@ -123,19 +134,19 @@ pub struct ResponseFunction {
     pub quantity: Option<ResponseQuantity>,
     /// Values, one per frequency, in m/N, m/(s·N) or m/(s²·N).
     pub values: Vec<Complex<f64>>,
-    /// Standard error of the real and of the imaginary part alike, one per frequency, in the unit of
+    /// Standard error of the real part and of the imaginary part, one per frequency, in the unit of
     /// the values; `None` if the file has none.
     pub standard_error: Option<Vec<f64>>,
 }
 
-/// Fraction of the power of a response that is linear in the force.
+/// Fraction of the power of a response that depends linearly on the force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoherenceFunction {
     /// Point and direction of the response.
     pub response: String,
     /// Point and direction of the force; `None` for the multiple coherence with all forces.
     pub reference: Option<String>,
-    /// Values, one per frequency, a ratio from 0 to 1 each.
+    /// Values, one per frequency, each a ratio from 0 to 1.
     pub values: Vec<f64>,
 }
 
@@ -145,20 +156,20 @@ impl FrequencyResponses {
     /// # Errors
     /// As [`FrequencyResponses::parse`], and [`IoError::Read`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::of_source(Source::open(path.as_ref())?)
+        Self::from_source(Source::open(path.as_ref())?)
     }
 
     /// Reads the frequency responses in the bytes of a file; `file` is its name in messages.
     ///
     /// # Errors
-    /// [`IoError::Responses`] if the columns of a text are none of frequency responses,
-    /// [`IoError::Empty`] for a universal file without any, and those of [`Table::parse`] and
+    /// [`IoError::Responses`] if the columns of a text are not those of frequency responses,
+    /// [`IoError::Empty`] for a universal file without any, and the errors of [`Table::parse`] and
     /// [`Table::column`].
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
-        Self::of_source(Source::new(file.into(), bytes)?)
+        Self::from_source(Source::new(file.into(), bytes)?)
     }
 
-    fn of_source(mut source: Source<'_>) -> Result<Self, IoError> {
+    fn from_source(mut source: Source<'_>) -> Result<Self, IoError> {
         let options = ReadOptions::default();
         let file = source.file.clone();
         let mut responses = match source.kind() {
@@ -166,9 +177,9 @@ impl FrequencyResponses {
                 let bytes = source.bytes(&options.limits)?;
                 uff::read_responses(&file, &bytes, source.budget(&options.limits))?
             }
-            _ => Self::of_table(&Table::of_source(source, &options)?)?,
+            _ => Self::from_table(&Table::from_source(source, &options)?)?,
         };
-        // Names of points are shown in results and messages.
+        // Names of points are shown in results and messages, so unprintable characters are escaped.
         let shown = |point: &mut String| *point = escaped(point).into_owned();
         for function in &mut responses.functions {
             [&mut function.response, &mut function.reference].into_iter().for_each(shown);
@@ -180,7 +191,7 @@ impl FrequencyResponses {
         Ok(responses)
     }
 
-    fn of_table(table: &Table) -> Result<Self, IoError> {
+    fn from_table(table: &Table) -> Result<Self, IoError> {
         let mut responses = Self { file: table.file().into(), ..Self::default() };
         responses.frequency_hz = response_columns::frequencies(table, &mut responses.doubts)?;
         match table.complex() {
@@ -214,7 +225,7 @@ impl FrequencyResponses {
         for (number, name) in numbers.iter_mut().zip(AveragedSegments::COLUMNS) {
             *number = constant(table, name)?.unwrap_or(f64::NAN);
         }
-        responses.segments = AveragedSegments::of_numbers(numbers);
+        responses.segments = AveragedSegments::from_numbers(numbers);
         let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
         if any && responses.segments.is_none() {
             responses.remarks.push(format!(
@@ -226,16 +237,16 @@ impl FrequencyResponses {
         Ok(responses)
     }
 
-    /// Returns the text of a universal file: datasets 151 and 164, and a dataset 58 for each response
-    /// and coherence. Points need a node and a direction (`12+Z`), or a node alone.
+    /// Returns the text of a universal file: datasets 151 and 164, and a dataset 58 for each
+    /// response and coherence. A point is a node with a direction (`12+Z`), or a node alone.
     ///
     /// # Errors
-    /// [`IoError::Point`] for a point that is not written so, [`IoError::Responses`] if there are no
+    /// [`IoError::Point`] for a point of another form, [`IoError::Responses`] if there are no
     /// frequencies.
     ///
     /// # Source
-    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets
-    /// 58, 151 and 164.
+    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*,
+    /// datasets 58, 151 and 164.
     pub fn to_universal_file(&self) -> Result<String, IoError> {
         if self.frequency_hz.is_empty() {
             let file = self.file.clone();
@@ -245,13 +256,14 @@ impl FrequencyResponses {
     }
 }
 
-/// Name of the column that says what was measured, as the order of a time derivative of the displacement.
+/// Name of the column that gives the measured quantity, as the order of the time derivative of the
+/// displacement.
 pub const DERIVATIVE: &str = "time_derivative";
 
-/// Name of the column with the rate that an exponential window adds to the decay of every mode, in 1/s.
+/// Name of the column with the decay that an exponential window adds to every mode, in 1/s.
 pub const ADDED_DECAY: &str = "added_decay";
 
-/// Order of the time derivative of the displacement that a quantity is, a pure number from 0 to 2.
+/// Returns the order of the time derivative of the displacement, a pure number from 0 to 2.
 pub fn derivative(quantity: ResponseQuantity) -> f64 {
     match quantity {
         ResponseQuantity::Displacement => 0.0,
@@ -260,7 +272,8 @@ pub fn derivative(quantity: ResponseQuantity) -> f64 {
     }
 }
 
-/// Returns the number that all rows of a column have; `None` if there is no such column, or they differ.
+/// Returns the number that is the same in all rows of a column; `None` if there is no such column,
+/// or if the numbers differ.
 fn constant(table: &Table, name: &str) -> Result<Option<f64>, IoError> {
     if table.find(name).is_err() {
         return Ok(None);
@@ -269,5 +282,5 @@ fn constant(table: &Table, name: &str) -> Result<Option<f64>, IoError> {
     Ok(values.first().copied().filter(|first| values.iter().all(|value| value == first)))
 }
 
-/// Point of a table with a single response.
+/// Name of the point in a table with a single response.
 const ALONE: &str = "1";

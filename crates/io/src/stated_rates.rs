@@ -1,4 +1,4 @@
-//! Sample rates that a file states in a number beside its vectors, such as `Fs` or `dt`.
+//! Sample rates that a file states by a named number, such as `Fs` or `dt`.
 
 use crate::contents::{Axis, Contents};
 use crate::table::is_time;
@@ -21,7 +21,7 @@ const RATES: [&str; 14] = [
     "samplefreq",
 ];
 
-/// Names of a time step in s, likewise.
+/// Names of a time step in s, in lower case and without `_`.
 const STEPS: [&str; 13] = [
     "dt",
     "dts",
@@ -38,10 +38,11 @@ const STEPS: [&str; 13] = [
     "deltax",
 ];
 
-/// Steps are the same if they differ by this part at most.
+/// Maximum relative difference between two steps that count as equal.
 const SAME_STEP: f64 = 1e-5;
 
-/// Gives every column the rate that is stated beside it, or beside the struct that holds it.
+/// Assigns to every column the rate that is stated in its struct or group, or in one that contains
+/// it.
 pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     let stated: Vec<(usize, &str, f64)> = (0..)
         .zip(&contents.scalars)
@@ -52,12 +53,14 @@ pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
         while let Some(place) = within {
             let mut here = stated.iter().filter(|(_, at, _)| *at == place);
             if let Some((scalar, _, step)) = here.next() {
-                let other = here.find(|(_, _, other)| (other - step).abs() > SAME_STEP * step);
-                column.axis = match other {
+                let contradiction =
+                    here.find(|(_, _, second_step)| (second_step - step).abs() > SAME_STEP * step);
+                column.axis = match contradiction {
                     None => Axis::Stated { step: *step, scalar: *scalar },
-                    Some((second, _, other)) => {
-                        Axis::Contradiction { scalars: [*scalar, *second], steps: [*step, *other] }
-                    }
+                    Some((second, _, second_step)) => Axis::Contradiction {
+                        scalars: [*scalar, *second],
+                        steps: [*step, *second_step],
+                    },
                 };
                 break;
             }
@@ -67,27 +70,27 @@ pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     contents
 }
 
-/// Gives the columns of a struct or a group, and those beside all of them, the instants of the column of time that stands
-/// among them, if there is such a struct.
+/// Assigns to each column the instants of the time column in the same struct or group, or at the
+/// same top level; only for files in which a struct or a group has a time column.
 pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
-    let place = |at: usize| enclosing(&contents.columns[at].name);
+    let group = |at: usize| enclosing(&contents.columns[at].name);
     let times: Vec<usize> = (0..contents.columns.len())
         .filter(|at| {
             let name = &contents.columns[*at].name;
             is_time(name.rsplit_once(['.', '/']).map_or(name.as_str(), |(_, name)| name))
         })
         .collect();
-    if times.iter().all(|at| place(*at).is_empty()) {
+    if times.iter().all(|at| group(*at).is_empty()) {
         return contents;
     }
     let len = |at: usize| contents.columns[at].values.as_ref().map_or(0, Vec::len);
-    let own = (0..contents.columns.len()).map(|at| {
-        let is_own = |time: &&usize| place(**time) == place(at) && len(**time) == len(at);
+    let time_of_column = (0..contents.columns.len()).map(|at| {
+        let is_own = |time: &&usize| group(**time) == group(at) && len(**time) == len(at);
         times.iter().find(is_own).copied()
     });
-    let own: Vec<Option<usize>> = own.collect();
-    for (column, time) in contents.columns.iter_mut().zip(own) {
-        // What a number beside the struct states counts less.
+    let time_of_column: Vec<Option<usize>> = time_of_column.collect();
+    for (column, time) in contents.columns.iter_mut().zip(time_of_column) {
+        // A time column has priority over a rate that a number states.
         if let (Axis::Unknown | Axis::Stated { .. } | Axis::Contradiction { .. }, Some(time)) =
             (column.axis, time)
         {
@@ -97,7 +100,7 @@ pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
     contents
 }
 
-/// Name of the struct that holds a variable, empty for one that stands alone.
+/// Returns the name of the struct that contains a variable; empty at the top level.
 fn enclosing(name: &str) -> &str {
     name.rsplit_once(['.', '/']).map_or("", |(place, _)| place)
 }

@@ -1,4 +1,4 @@
-//! The system of an experiment: matrices, or modal parameters of one degree of freedom.
+//! The system in a description: matrices, or modal parameters of one degree of freedom.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -14,15 +14,15 @@ use serde::{Deserialize, Serialize, de};
 use crate::matrix_market::NUMBERS_PER_ROW;
 use crate::{IoError, Limits, json, read_matrix_market};
 
-/// Most rows of a sparse matrix.
+/// Maximum number of rows of a sparse matrix.
 const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
 
-/// Number of degrees of freedom up to which a machine described by sparse matrices is taken as one described by
-/// lists of rows.
+/// Maximum number of degrees of freedom of a machine in sparse matrices that is converted to full
+/// matrices.
 const DENSE_DOF: usize = 64;
 
-/// Number of degrees of freedom up to which all entries of such a machine are held where they are needed: of more
-/// all modes or the response at every line take minutes.
+/// Maximum number of degrees of freedom of such a machine for computations that need full matrices:
+/// above it, all modes or the response at every line would take minutes.
 const ALL_ENTRIES_DOF: usize = 300;
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
@@ -31,9 +31,9 @@ const ALL_ENTRIES_DOF: usize = 300;
 pub struct SystemMatrices {
     /// M, n rows of n entries, in kg.
     pub mass: Vec<Vec<f64>>,
-    /// C, likewise n × n, in N·s/m.
+    /// C, n rows of n entries, in N·s/m.
     pub damping: Vec<Vec<f64>>,
-    /// K, likewise n × n, in N/m.
+    /// K, n rows of n entries, in N/m.
     pub stiffness: Vec<Vec<f64>>,
 }
 
@@ -52,7 +52,8 @@ impl From<&SecondOrderSystem> for SystemMatrices {
 /// [`Experiment`](crate::Experiment), or of the report that `mechid identify --json` prints.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Description`], [`IoError::Model`].
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Description`],
+/// [`IoError::Model`].
 pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError> {
     let (file, mut described) = json::read::<Described>(path.as_ref())?;
     match described.system.load(&file, json::folder(path.as_ref()))? {
@@ -68,21 +69,22 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
 /// Reads the system in a JSON file, as [`read_system`] does, in sparse form and of any size.
 ///
 /// # Errors
-/// Those of [`read_system`].
+/// As [`read_system`].
 pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoError> {
     let (file, described) = json::read::<Described>(path.as_ref())?;
     described.sparse(&file, json::folder(path.as_ref()))
 }
 
-/// Reads the system in the text of such a file, as [`read_sparse_system`] does; `file` is its name in messages.
+/// Reads the system in the text of such a file, as [`read_sparse_system`] does; `file` is its name
+/// in messages.
 ///
 /// # Errors
-/// Those of [`read_system`].
+/// As [`read_system`].
 pub fn parse_sparse_system(file: &str, text: &str) -> Result<SparseSystem, IoError> {
     json::parse::<Described>(file, text)?.sparse(file, Path::new(""))
 }
 
-/// A file with a system in it.
+/// Part of a JSON file that describes a system.
 #[derive(Deserialize)]
 struct Described {
     system: SystemDescription,
@@ -97,7 +99,7 @@ impl Described {
     }
 }
 
-/// Refusal of a sparse machine where all entries of its matrices are needed.
+/// Returns the error for a machine that is too large for full matrices.
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in sparse matrices, too many for what needs all entries \
@@ -107,13 +109,13 @@ pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     IoError::Description { file: file.into(), what }
 }
 
-/// Nonlinear terms beside a system: the `nonlinear` of the report that `mechid identify --json` prints,
+/// Nonlinear terms of a system: the `nonlinear` of the report that `mechid identify --json` prints,
 /// which [`read_nonlinear`] reads back.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct NonlinearDescription {
-    /// Terms as they are written, such as `k3: x1^3`.
+    /// Terms in the form of the description, such as `k3: x1^3`.
     pub terms: Terms,
-    /// Coefficients, one for each term, in its unit.
+    /// Coefficients, one per term, each in the unit of its term.
     pub coefficients: Vec<f64>,
     #[serde(default)]
     channels: ChannelDescription,
@@ -121,13 +123,13 @@ pub struct NonlinearDescription {
     parameters: Vec<RangeDescription>,
 }
 
-/// Range of the data of an identification that determined a parameter.
+/// Range of the data that determined a parameter in an identification.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct RangeDescription {
     largest: Option<[f64; 2]>,
 }
 
-/// Delay and phase that the channels add.
+/// Delay and phase that the measuring channels add.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default)]
 struct ChannelDescription {
@@ -137,18 +139,18 @@ struct ChannelDescription {
 }
 
 impl NonlinearDescription {
-    /// Returns the delay of the force channel, in s, and the cubic and quintic term of the phase that all
-    /// channels add, in rad; zero where the file has none.
+    /// Returns the delay of the force channel, in s, and the cubic and quintic term of the phase
+    /// that all channels add, in rad; zero if the file has none.
     pub fn channels(&self) -> [f64; 3] {
         let ChannelDescription { delay, cubic, quintic } = self.channels;
         [delay, cubic, quintic]
     }
 
-    /// Returns the largest displacement (m) that a term saw in the data of its identification, if the
-    /// file tells.
+    /// Returns the largest displacement (m) that acted on a term in the data of its identification,
+    /// if the file states it.
     pub fn largest_displacement(&self) -> Option<f64> {
-        let all = self.parameters.iter().filter_map(|parameter| parameter.largest);
-        all.map(|[displacement, _]| displacement).reduce(f64::max)
+        let ranges = self.parameters.iter().filter_map(|parameter| parameter.largest);
+        ranges.map(|[displacement, _]| displacement).reduce(f64::max)
     }
 }
 
@@ -173,13 +175,13 @@ pub(crate) struct SystemDescription {
     stiffness: Option<Entries>,
     natural_frequency_hz: Option<f64>,
     damping_ratio: Option<f64>,
-    /// Memory that factors of a large machine may take, in GB.
+    /// Memory that the factors of a large machine may use, in GB.
     factor_memory_gb: Option<f64>,
 }
 
 impl SystemDescription {
-    /// Reads the Matrix Market files that the description names, from `folder` on; returns the machine
-    /// if they make a large one.
+    /// Reads the Matrix Market files that the description names, relative to `folder`; returns the
+    /// machine if it is a large one.
     pub(crate) fn load(
         &mut self,
         file: &str,
@@ -252,7 +254,7 @@ impl SystemDescription {
 enum Entries {
     Number(f64),
     Rows(Vec<Vec<f64>>),
-    /// Not read yet.
+    /// Path of a file that is not read yet.
     File(PathBuf),
     Sparse(CsrMatrix<f64>),
 }
@@ -282,8 +284,8 @@ impl Entries {
     }
 }
 
-/// The entries of a sparse matrix that are not zero, each with its row and column, counted from 1; those at one
-/// place are added up.
+/// Entries of a sparse matrix that are not zero, each with its row and column, counted from 1;
+/// entries with the same row and column are added.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ListedEntries {

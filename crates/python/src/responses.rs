@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use crate::machine::Machine;
 use crate::{answer, arrays, failure, work};
 
-/// A table of frequency responses.
+/// Table of frequency responses.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct ResponseTable(pub FrequencyResponses);
 
@@ -37,7 +37,7 @@ impl ResponseTable {
     }
 
     /// Copies responses of frequencies × points × forces, their standard errors, and coherences of
-    /// frequencies × points; what they are of is JSON.
+    /// frequencies × points; the layout is JSON.
     #[staticmethod]
     #[pyo3(signature = (layout, frequency_hz, response, std_error, coherence))]
     fn from_arrays(
@@ -75,7 +75,7 @@ impl ResponseTable {
             coherence: points.iter().enumerate().filter_map(of_point).collect(),
             functions,
             added_decay: None,
-            segments: segments.and_then(AveragedSegments::of_numbers),
+            segments: segments.and_then(AveragedSegments::from_numbers),
             remarks: Vec::new(),
             doubts: Vec::new(),
         }))
@@ -86,7 +86,7 @@ impl ResponseTable {
         &self.0.file
     }
 
-    /// Quantity that all responses state; `None` without one.
+    /// Returns the quantity of all responses; `None` if they do not state one.
     #[getter]
     fn quantity(&self) -> Option<String> {
         let mut stated = self.0.functions.iter().map(|function| function.quantity);
@@ -100,11 +100,11 @@ impl ResponseTable {
     }
 }
 
-/// A machine identified from tables of frequency responses.
+/// Machine identified from tables of frequency responses.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct IdentifiedResponses(Arc<mechid::IdentifiedResponses>);
 
-/// Identifies the machine behind tables of frequency responses; settings are JSON.
+/// Identifies the machine from tables of frequency responses; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (tables, settings, threads))]
 pub fn identify_responses(
@@ -121,39 +121,39 @@ pub fn identify_responses(
 
 #[pymethods]
 impl IdentifiedResponses {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, &*self.0)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.to_string()
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
     }
 
-    /// Confidence interval of a parameter.
+    /// Returns the confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
         work::brief(py, || {
             Ok::<_, EstimateError>(self.0.estimate().parameter(name)?.interval(level)?)
         })
     }
 
-    /// Names of the parameters that were estimated, and their covariance.
+    /// Returns the names of the estimated parameters, and their covariance.
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<arrays::Covariance<'py>> {
         arrays::covariance(py, &self.0.covariance())
     }
 
-    /// The identified system with the covariance of its parameters.
+    /// Returns the identified system with the covariance of its parameters.
     fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
         work::brief(py, || self.0.machine()).map(Machine)
     }

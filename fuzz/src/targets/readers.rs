@@ -309,7 +309,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
         told(table.sampling(axis, &[] as &[&str]))?;
     }
     told(table.common_length(&good))?;
-    shown(&table.place(0).to_string())
+    shown(&table.position(0).to_string())
 }
 
 /// A text that is not held says what the one in memory says.

@@ -11,10 +11,10 @@ use serde_json::{Map, Value};
 
 use crate::{IoError, LineSpec, json};
 
-/// A force: an object with a `kind`, by default `multisine`.
+/// Force on a degree of freedom: an object with a `kind`, which is `multisine` by default.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Excitation {
-    /// Counted from 1.
+    /// Degree of freedom, counted from 1.
     pub dof: usize,
     kind: Kind,
 }
@@ -30,7 +30,7 @@ enum Kind {
     HalfSine(HalfSineForce),
 }
 
-/// The excitations of a description: a list, or a single one without brackets.
+/// Reads the excitations of a description: a list, or a single one without brackets.
 pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Excitation>, D::Error> {
     struct OneOrMore;
     impl<'de> Visitor<'de> for OneOrMore {
@@ -51,7 +51,7 @@ pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Exci
     from.deserialize_any(OneOrMore)
 }
 
-/// Names of the kinds, as they are written.
+/// Names of the kinds in a description.
 const KINDS: &str = "multisine, harmonic, sweep, prbs, random, impulse, half-sine";
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -120,9 +120,9 @@ struct PrbsForce {
 #[serde(deny_unknown_fields)]
 struct RandomForce {
     standard_deviation: f64,
-    /// Lower and upper end; white without.
+    /// Lower and upper end; without them the noise is white.
     band_hz: Option<[f64; 2]>,
-    /// Part of the period after which the force stays zero.
+    /// Fraction of the period after which the force is zero.
     burst: Option<f64>,
     #[serde(default)]
     seed: u64,
@@ -147,7 +147,7 @@ struct HalfSineForce {
 }
 
 impl<'de> Deserialize<'de> for Excitation {
-    /// Written by hand: serde has no default for the tag of an enum.
+    /// Implemented by hand because serde has no default for the tag of an enum.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         fn rest<T: DeserializeOwned, E: serde::de::Error>(
             fields: Map<String, Value>,
@@ -188,13 +188,13 @@ enum Between {
     Function(Box<dyn Fn(f64) -> f64>),
     /// The value of the earlier sample.
     Held,
-    /// Unknown; holds the name of the force, for people.
+    /// Unknown; with the name of the force for messages.
     Unknown(&'static str),
 }
 
 impl Excitation {
-    /// The force over one period, in N; by a part of the step later if `within_step` says so, where
-    /// it is known there.
+    /// Returns the force over one period, in N, shifted by a fraction `within_step` of the step if
+    /// it is given, provided that the force is known between samples.
     pub fn sampled(
         &self,
         sampling: Sampling,

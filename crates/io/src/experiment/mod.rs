@@ -25,7 +25,7 @@ pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
 use crate::system::{NonlinearDescription, SystemDescription, too_many};
 use crate::{IoError, escaped, json};
 
-/// A simulated experiment. An unknown field in the file is an error.
+/// Simulated experiment. An unknown field in the file is an error.
 ///
 /// ```
 /// use mechid_io::Experiment;
@@ -47,7 +47,7 @@ pub struct Experiment {
     #[serde(skip)]
     file: String,
     system: SystemDescription,
-    /// The machine, if it is a large one in Matrix Market files.
+    /// The machine, if Matrix Market files describe a large one.
     #[serde(skip)]
     sparse: Option<SparseSystem>,
     #[serde(default)]
@@ -58,7 +58,7 @@ pub struct Experiment {
     /// Scheme that computes the response.
     #[serde(default)]
     pub scheme: SchemeChoice,
-    /// Kind of the response: the periodic steady state, or from initial conditions.
+    /// Kind of the response: periodic steady state, or response from initial conditions.
     #[serde(default)]
     pub response: ResponseKind,
     /// `true` if unstable time steps are allowed.
@@ -74,7 +74,7 @@ pub struct Experiment {
     outputs: Option<Vec<usize>>,
 }
 
-/// Largest number of values in a force record: 800 MB.
+/// Maximum number of values in a force record: 800 MB.
 const LARGEST: usize = 100_000_000;
 
 fn one() -> usize {
@@ -93,26 +93,26 @@ impl Experiment {
     /// Reads the description of an experiment in a file, or on standard input as `-`.
     ///
     /// # Errors
-    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`]; the names of Matrix
-    /// Market files in it begin at its folder.
+    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`]; the names of
+    /// Matrix Market files in it are relative to its folder.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let (file, experiment) = json::read::<Self>(path.as_ref())?;
         experiment.loaded(file, json::folder(path.as_ref()))
     }
 
-    /// Reads the description of an experiment in a text; `file` is its name in messages. The names of
-    /// Matrix Market files in it begin at the current folder.
+    /// Reads the description of an experiment in a text; `file` is its name in messages. The names
+    /// of Matrix Market files in it are relative to the current folder.
     ///
     /// # Errors
-    /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and column
-    /// for a wrong description; [`IoError::Read`], [`IoError::Malformed`], [`IoError::TooLarge`] and
-    /// [`IoError::Model`] for a Matrix Market file.
+    /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and
+    /// column for a wrong description; [`IoError::Read`], [`IoError::Malformed`],
+    /// [`IoError::TooLarge`] and [`IoError::Model`] for a Matrix Market file.
     pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
         json::parse::<Self>(&file, text)?.loaded(file, Path::new(""))
     }
 
-    /// Takes its name, and reads the matrices that it names, from `folder` on.
+    /// Sets the name for messages, and reads the matrices in files relative to `folder`.
     fn loaded(mut self, file: String, folder: &Path) -> Result<Self, IoError> {
         self.sparse = self.system.load(&file, folder)?;
         Ok(Self { file, ..self })
@@ -123,8 +123,8 @@ impl Experiment {
         &self.file
     }
 
-    /// Returns the same experiment at another sampling rate, in Hz; the number of samples in a period
-    /// stays the same.
+    /// Returns the same experiment at another sampling rate, in Hz; the number of samples in a
+    /// period stays the same.
     pub fn with_rate_hz(mut self, rate_hz: f64) -> Self {
         self.sampling.rate_hz = rate_hz;
         self
@@ -135,11 +135,12 @@ impl Experiment {
         self.sampling.samples
     }
 
-    /// The system described.
+    /// Returns the system.
     ///
     /// # Errors
-    /// [`IoError::Description`] if parameters are missing or one too many, or the system is
-    /// [sparse](Experiment::sparse_system); [`IoError::Model`] if they make no system.
+    /// [`IoError::Description`] if a parameter is missing or redundant, or the system is
+    /// [sparse](Experiment::sparse_system); [`IoError::Model`] if the parameters do not form a
+    /// valid system.
     pub fn system(&self) -> Result<SecondOrderSystem, IoError> {
         match &self.sparse {
             None => self.system.system(&self.file),
@@ -147,7 +148,8 @@ impl Experiment {
         }
     }
 
-    /// The system described, if Matrix Market files describe one of more than 64 degrees of freedom.
+    /// Returns the system, if Matrix Market files describe one with more than 64 degrees of
+    /// freedom.
     pub fn sparse_system(&self) -> Option<&SparseSystem> {
         self.sparse.as_ref()
     }
@@ -155,7 +157,7 @@ impl Experiment {
     /// Number of degrees of freedom of the system.
     ///
     /// # Errors
-    /// Those of [`Experiment::system`].
+    /// As [`Experiment::system`].
     pub fn dof(&self) -> Result<usize, IoError> {
         match &self.sparse {
             None => Ok(self.system()?.dof()),
@@ -163,8 +165,8 @@ impl Experiment {
         }
     }
 
-    /// Degrees of freedom, counted from 0, that the channels of the force act on: all; of a sparse
-    /// system those with an excitation, by rising number.
+    /// Returns the degrees of freedom, counted from 0, of the force channels: all; for a sparse
+    /// system those with an excitation, in rising order.
     ///
     /// # Errors
     /// [`IoError::Description`] for a degree of freedom that the system does not have, and those of
@@ -184,16 +186,16 @@ impl Experiment {
         }
         let driven: BTreeSet<usize> =
             self.excitation.iter().map(|excitation| excitation.dof - 1).collect();
-        // A force of zero where none is described, so that there is a time axis.
+        // A zero force gives the record a time axis if no force is described.
         Ok(if driven.is_empty() { vec![0] } else { driven.into_iter().collect() })
     }
 
-    /// Degrees of freedom, counted from 0, whose response is recorded: those described as `outputs`;
-    /// without, all, and of a sparse system those that a force acts on.
+    /// Returns the degrees of freedom, counted from 0, whose response is recorded: those described
+    /// as `outputs`; by default all, for a sparse system those with a force.
     ///
     /// # Errors
-    /// [`IoError::Description`] for none at all, one that the system does not have or one named twice,
-    /// and those of [`Experiment::forced`].
+    /// [`IoError::Description`] for an empty list, for a degree of freedom that the system does not
+    /// have or that is named twice, and the errors of [`Experiment::forced`].
     pub fn outputs(&self) -> Result<Vec<usize>, IoError> {
         let Some(outputs) = &self.outputs else { return self.forced() };
         let dof = self.dof()?;
@@ -213,10 +215,10 @@ impl Experiment {
         Ok(outputs.iter().map(|output| output - 1).collect())
     }
 
-    /// The nonlinear terms beside the system, if it has any, with their coefficients.
+    /// Returns the nonlinear terms of the system with their coefficients, if it has any.
     ///
     /// # Errors
-    /// Those of [`Experiment::dof`], and [`IoError::Model`] if the terms do not belong to the system.
+    /// As [`Experiment::dof`], and [`IoError::Model`] if a term does not fit the system.
     pub fn nonlinear(&self) -> Result<Option<&NonlinearDescription>, IoError> {
         let Some(described) = &self.nonlinear else { return Ok(None) };
         let NonlinearDescription { terms, coefficients, .. } = described;
@@ -226,17 +228,18 @@ impl Experiment {
         Ok(Some(described))
     }
 
-    /// One period of the force: samples × [forced](Experiment::forced) degrees of freedom, in N.
+    /// Returns one period of the force: samples × [forced](Experiment::forced) degrees of freedom,
+    /// in N.
     ///
     /// # Errors
     /// [`IoError::Description`] for a degree of freedom that the system does not have,
-    /// [`IoError::LineOutside`], [`IoError::Signal`], and those of [`Experiment::system`].
+    /// [`IoError::LineOutside`], [`IoError::Signal`], and the errors of [`Experiment::system`].
     pub fn force(&self) -> Result<Record, IoError> {
         self.sampled(None)
     }
 
-    /// One period of the force at instants within the steps, in N: sample k is at
-    /// t = (k + `part`) Δt, `part` being a pure number.
+    /// Returns one period of the force at instants within the steps, in N: sample k is at t = (k +
+    /// `part`) Δt, where `part` is a pure number.
     ///
     /// # Errors
     /// As [`Experiment::force`], and [`IoError::Description`] for a force that is unknown there.
@@ -244,11 +247,12 @@ impl Experiment {
         self.sampled(Some(part))
     }
 
-    /// The initial state, of a response that is not periodic.
+    /// Returns the initial state of a response that is not periodic.
     ///
     /// # Errors
-    /// [`IoError::Description`] if it has not one number per degree of freedom, [`IoError::Model`]
-    /// for numbers that are not finite, and those of [`Experiment::system`].
+    /// [`IoError::Description`] if the number of values differs from that of the degrees of
+    /// freedom, [`IoError::Model`] for values that are not finite, and those of
+    /// [`Experiment::system`].
     pub fn initial_state(&self) -> Result<InitialState, IoError> {
         let dof = self.dof()?;
         let ResponseKind::From(InitialMotion { displacement, velocity }) = &self.response else {
@@ -262,11 +266,12 @@ impl Experiment {
         state.map_err(|source| IoError::Model { file: self.file.clone(), source })
     }
 
-    /// One number per degree of freedom of the system, in the unit given; `what` is their name in
-    /// messages.
+    /// Returns one number per degree of freedom of the system, in the unit given; `what` is their
+    /// name in messages.
     ///
     /// # Errors
-    /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].
+    /// [`IoError::Description`] if there are more or fewer, and the errors of
+    /// [`Experiment::system`].
     pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
         let dof = self.dof()?;
         let wrong = |got| {

@@ -15,14 +15,14 @@ pub enum ResponseKind {
     From(InitialMotion),
 }
 
-/// The motion at the first sample.
+/// Displacement and velocity at the first sample.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InitialMotion {
-    /// x(0), in m; zero where it is left out.
+    /// x(0), in m; zero by default.
     #[serde(skip_serializing_if = "PerDof::is_zero")]
     pub displacement: PerDof,
-    /// ẋ(0), in m/s; zero where it is left out.
+    /// ẋ(0), in m/s; zero by default.
     #[serde(skip_serializing_if = "PerDof::is_zero")]
     pub velocity: PerDof,
 }
@@ -46,7 +46,7 @@ impl PerDof {
         *self == Self::Zero
     }
 
-    /// The numbers for `dof` degrees of freedom, or the number of entries if it differs.
+    /// Returns the numbers for `dof` degrees of freedom, or as an error their number if it differs.
     pub(super) fn values(&self, dof: usize) -> Result<Vec<f64>, usize> {
         match self {
             Self::Zero => Ok(vec![0.0; dof]),

@@ -1,4 +1,4 @@
-//! The schemes an experiment can be simulated with.
+//! The schemes with which an experiment can be simulated.
 
 use serde::Deserialize;
 
@@ -24,13 +24,13 @@ pub enum SchemeChoice {
     },
     /// The central difference method.
     CentralDifference {
-        /// Source of the displacement before the first sample.
+        /// Method for the displacement before the first sample.
         #[serde(default, deserialize_with = "json::word")]
         start: FirstDisplacements,
     },
     /// Houbolt's method.
     Houbolt {
-        /// Source of the first two steps.
+        /// Method for the first two steps.
         #[serde(default)]
         start: FirstSteps,
     },
@@ -39,7 +39,7 @@ pub enum SchemeChoice {
         /// θ, a pure number, 1.4 by default.
         #[serde(default = "wilson")]
         theta: f64,
-        /// The force at t + θΔt.
+        /// Method for the force at t + θΔt.
         #[serde(default, deserialize_with = "json::word")]
         load: LoadBeyond,
     },
@@ -48,7 +48,7 @@ pub enum SchemeChoice {
         /// ρ∞, spectral radius at very large steps, a pure number between 0 and 1, 0.8 by default.
         #[serde(default = "high_frequency_radius")]
         rho_infinity: f64,
-        /// The acceleration returned.
+        /// Acceleration that is returned.
         #[serde(default, deserialize_with = "json::word")]
         acceleration: ReturnedAcceleration,
     },
@@ -57,7 +57,7 @@ pub enum SchemeChoice {
         /// ρ∞, a pure number between 1/2 and 1, 0.8 by default.
         #[serde(default = "high_frequency_radius")]
         rho_infinity: f64,
-        /// The acceleration returned.
+        /// Acceleration that is returned.
         #[serde(default, deserialize_with = "json::word")]
         acceleration: ReturnedAcceleration,
     },
@@ -66,7 +66,7 @@ pub enum SchemeChoice {
         /// ρ∞, a pure number between 0 and 1, 0.8 by default.
         #[serde(default = "high_frequency_radius")]
         rho_infinity: f64,
-        /// The acceleration returned.
+        /// Acceleration that is returned.
         #[serde(default, deserialize_with = "json::word")]
         acceleration: ReturnedAcceleration,
     },
@@ -123,7 +123,7 @@ pub enum ReturnedAcceleration {
     /// Acceleration of the equation of motion at each sample.
     #[default]
     EquationOfMotion,
-    /// The one carried from step to step, of first order.
+    /// Acceleration that the scheme carries from step to step, accurate to first order.
     Carried,
 }
 
@@ -134,7 +134,7 @@ pub enum SubStepLoad {
     /// Linear between both ends of the step.
     #[default]
     Linear,
-    /// The excitation evaluated there.
+    /// Value of the excitation itself at that instant.
     Exact,
 }
 

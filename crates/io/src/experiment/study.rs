@@ -1,4 +1,4 @@
-//! One described experiment, and what changes in it from run to run.
+//! An experiment with numbers that change from run to run.
 
 use std::path::{Path, PathBuf};
 
@@ -6,11 +6,11 @@ use serde_json::{Number, Value};
 
 use crate::{Experiment, IoError, Table, escaped, json};
 
-/// Runs of one experiment that differ in the numbers of some fields: a study of seeds, of parameters, or
-/// of both.
+/// Runs of one experiment that differ in the numbers of some fields: a study of seeds, of
+/// parameters, or of both.
 ///
-/// A field is named by its path in the description, list entries counted from 1: `noise.seed`,
-/// `system.damping`, `excitation.2.amplitude`, `system.stiffness.1.2`.
+/// A field is identified by its path in the description, with list entries counted from 1:
+/// `noise.seed`, `system.damping`, `excitation.2.amplitude`, `system.stiffness.1.2`.
 ///
 /// ```
 /// use mechid_io::{ExperimentStudy, StudyRuns, Table};
@@ -22,7 +22,8 @@ use crate::{Experiment, IoError, Table, escaped, json};
 ///     "noise": { "displacement": { "snr_db": 40 }, "seed": 1 }
 /// }"#;
 /// let table = Table::parse("runs.csv", b"system.mass,noise.seed\n10,1\n12.5,2\n")?;
-/// let study = ExperimentStudy::parse("machine.json", experiment, &StudyRuns::Table(Box::new(table)))?;
+/// let runs = StudyRuns::Table(Box::new(table));
+/// let study = ExperimentStudy::parse("machine.json", experiment, &runs)?;
 /// assert_eq!(study.runs(), 2);
 /// let second = study.experiment(2)?;
 /// assert_eq!(second.system()?.mass()[(0, 0)], 12.5);
@@ -32,7 +33,7 @@ use crate::{Experiment, IoError, Table, escaped, json};
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentStudy {
     file: String,
-    /// Folder at which the names of Matrix Market files begin.
+    /// Folder to which the names of Matrix Market files are relative.
     folder: PathBuf,
     description: Value,
     fields: Vec<StudyField>,
@@ -42,9 +43,10 @@ pub struct ExperimentStudy {
 /// Choice of the runs of a study.
 #[derive(Debug)]
 pub enum StudyRuns {
-    /// Number of runs that differ in their noise alone: its seed counts up from the one described.
+    /// Number of runs that differ in their noise alone: the seed increases by 1 from the described
+    /// one.
     Seeds(usize),
-    /// A row for each run, and a column for each field that changes.
+    /// Table with a row for each run, and a column for each field that changes.
     Table(Box<Table>),
 }
 
@@ -57,7 +59,7 @@ pub struct StudyField {
     pub values: Vec<f64>,
 }
 
-/// Largest whole number up to which every whole number is an `f64`.
+/// Whole numbers up to this one are exact as `f64`.
 const LARGEST_WHOLE: u64 = 1 << 53;
 
 impl ExperimentStudy {
@@ -73,9 +75,10 @@ impl ExperimentStudy {
     /// Reads the experiment in a text; `file` is its name in messages.
     ///
     /// # Errors
-    /// [`IoError::Description`] if a column names no field of the description, there is no run, or seeds
-    /// are to count up where no noise is described; [`IoError::NotJson`] and [`IoError::Json`] if the
-    /// description or its first run is no experiment; those of [`Table::values`].
+    /// [`IoError::Description`] if a column names no field of the description, if there is no run,
+    /// or if seeds should increase but no noise is described; [`IoError::NotJson`] and
+    /// [`IoError::Json`] if the description or its first run is not a valid experiment; those of
+    /// [`Table::values`].
     pub fn parse(file: impl Into<String>, text: &str, runs: &StudyRuns) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
         let description = json::parse(&file, text)?;
@@ -88,7 +91,7 @@ impl ExperimentStudy {
         description: Value,
         runs: &StudyRuns,
     ) -> Result<Self, IoError> {
-        // What is wrong with the description itself is told as such.
+        // Errors of the description itself are reported without a run.
         let experiment: Experiment = json::deserialized(&file, description.clone())?;
         let refused = |what: String| IoError::Description { file: file.clone(), what };
         let fields = match runs {
@@ -114,7 +117,7 @@ impl ExperimentStudy {
             return Err(refused("a study needs one run at least".into()));
         }
         let study = Self { file, folder: folder.into(), description, fields, runs };
-        // A wrong name is wrong in every run.
+        // A wrong name is wrong in every run, so the first run is read at once.
         study.experiment(1)?;
         Ok(study)
     }
@@ -132,15 +135,15 @@ impl ExperimentStudy {
     /// Returns the experiment of a run, counted from 1.
     ///
     /// # Errors
-    /// [`IoError::Json`] if its numbers make no experiment, and those of [`Experiment::parse`] for the
-    /// Matrix Market files that it names.
+    /// [`IoError::Json`] if its numbers do not form a valid experiment, and those of
+    /// [`Experiment::parse`] for the Matrix Market files that it names.
     ///
     /// # Panics
     /// If there is no such run.
     pub fn experiment(&self, run: usize) -> Result<Experiment, IoError> {
         let mut description = self.description.clone();
         for StudyField { name, values } in &self.fields {
-            let Some(place) = place(&mut description, name) else {
+            let Some(place) = field_value(&mut description, name) else {
                 let what = format!(
                     "the study changes \"{}\", which the description does not have: name a field by its \
                      path, such as system.damping or excitation.1.amplitude",
@@ -167,9 +170,9 @@ fn fields(table: &Table) -> Result<Vec<StudyField>, IoError> {
     columns.iter().map(field).collect()
 }
 
-/// Returns the place of a field by its path. The last part may be missing in a description: whether it
-/// has such a field is known when it is read.
-fn place<'a>(description: &'a mut Value, path: &str) -> Option<&'a mut Value> {
+/// Returns the value of a field, by its path. The last part may be missing in the description:
+/// whether the field exists is checked when the experiment is read.
+fn field_value<'a>(description: &'a mut Value, path: &str) -> Option<&'a mut Value> {
     let (parents, last) = path.rsplit_once('.').map_or((None, path), |(p, l)| (Some(p), l));
     let mut parent = description;
     for part in parents.iter().flat_map(|parents| parents.split('.')) {
@@ -190,12 +193,13 @@ fn entry<'a>(of: &'a mut Value, name: &str) -> Option<&'a mut Value> {
     }
 }
 
-/// Returns a number as JSON has it; whole numbers stay whole, as seeds and counts must be.
+/// Returns a JSON number; whole numbers stay whole, as seeds and counts must be.
 fn number(value: f64) -> Value {
     let is_whole = value.fract() == 0.0 && (0.0..=LARGEST_WHOLE as f64).contains(&value);
-    match is_whole {
-        true => Value::from(value as u64),
-        false => Number::from_f64(value).map_or(Value::Null, Value::Number),
+    if is_whole {
+        Value::from(value as u64)
+    } else {
+        Number::from_f64(value).map_or(Value::Null, Value::Number)
     }
 }
 

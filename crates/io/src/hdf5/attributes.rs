@@ -2,20 +2,21 @@
 
 use hdf5_pure::{AttrValue, Dataset, Group};
 
-/// Names of an attribute with a unit, in lower case: NeXus, SEP 5, netCDF and programs of analysers.
+/// Names, in lower case, of an attribute with a unit: in NeXus, SEP 5, netCDF and analyser
+/// programs.
 const UNITS: [&str; 9] =
     ["units", "unit", "unit_str", "unit_string", "y_unit", "yunit", "unit_y", "y_unit_label", "eu"];
 
-/// Names of an attribute that describes a channel.
+/// Names, in lower case, of an attribute that describes a channel.
 const ABOUT: [&str; 6] = ["long_name", "name", "label", "description", "channel_name", "title"];
 
-/// Names of an attribute with the first instant, in s.
+/// Names, in lower case, of an attribute with the first instant, in s.
 const START: [&str; 4] = ["t0", "x0", "start_time", "wf_start_offset"];
 
-/// Largest number of attributes of an object that are looked at.
+/// Maximum number of attributes of an object that are read.
 const MAX_ATTRIBUTES: usize = 1024;
 
-/// Largest number of bytes of a text.
+/// Maximum length of a text attribute, in bytes.
 const MAX_BYTES: usize = 256;
 
 /// Attributes of an object, in the order of their names.
@@ -30,12 +31,12 @@ enum Value {
 
 impl Attributes {
     /// Reads the attributes of a group; none if they are damaged.
-    pub fn of_group(group: &Group) -> Self {
+    pub fn from_group(group: &Group) -> Self {
         group.attrs().map(Self::new).unwrap_or_default()
     }
 
     /// Reads the attributes of a data set; none if they are damaged.
-    pub fn of_dataset(dataset: &Dataset) -> Self {
+    pub fn from_dataset(dataset: &Dataset) -> Self {
         dataset.attrs().map(Self::new).unwrap_or_default()
     }
 
@@ -46,7 +47,7 @@ impl Attributes {
         Self(values)
     }
 
-    /// Numbers, with their names; those of MATLAB itself are left out.
+    /// Returns the numbers with their names, without the attributes of MATLAB itself.
     pub fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().filter_map(|(name, value)| match value {
             Value::Number(number) if !name.starts_with("MATLAB") => Some((name.as_str(), *number)),
@@ -54,12 +55,12 @@ impl Attributes {
         })
     }
 
-    /// Whether there is an attribute of this name.
+    /// Returns whether there is an attribute of this name.
     pub fn has(&self, wanted: &str) -> bool {
         self.0.iter().any(|(name, _)| name == wanted)
     }
 
-    /// First text of an attribute, by its name.
+    /// Returns the first text of an attribute, by its name.
     pub fn text(&self, wanted: &str) -> Option<&str> {
         let named = self.0.iter().find(|(name, _)| name.eq_ignore_ascii_case(wanted))?;
         match &named.1 {
@@ -68,7 +69,7 @@ impl Attributes {
         }
     }
 
-    /// Unit of a channel, counted from 0.
+    /// Returns the unit of a channel, counted from 0.
     pub fn unit(&self, channel: usize) -> Option<String> {
         let texts = self.0.iter().find_map(|(name, value)| match value {
             Value::Texts(texts) if UNITS.contains(&name.to_lowercase().as_str()) => Some(texts),
@@ -77,12 +78,12 @@ impl Attributes {
         texts.get(channel).or(texts.first().filter(|_| texts.len() == 1)).cloned()
     }
 
-    /// Description of a channel; empty if there is none.
+    /// Returns the description of a channel; empty if there is none.
     pub fn about(&self) -> String {
         ABOUT.iter().find_map(|name| self.text(name)).unwrap_or_default().to_owned()
     }
 
-    /// First instant, in s.
+    /// Returns the first instant, in s.
     pub fn start(&self) -> f64 {
         let start = |name: &str| START.contains(&name.to_lowercase().as_str());
         self.numbers().find(|(name, _)| start(name)).map_or(0.0, |(_, value)| value)

@@ -1,8 +1,8 @@
 //! HDF5 files, and MATLAB files of version 7.3, which are HDF5.
 //!
 //! # Source
-//! The HDF Group, *HDF5 File Format Specification*, version 3, read by the crate `hdf5-pure`; The MathWorks,
-//! *MAT-File Versions*, for the attributes and the order of dimensions of version 7.3.
+//! The HDF Group, *HDF5 File Format Specification*, version 3, read by the crate `hdf5-pure`; The
+//! MathWorks, *MAT-File Versions*, for the attributes and the order of dimensions of version 7.3.
 
 mod attributes;
 mod values;
@@ -20,23 +20,23 @@ use crate::limits::{Budget, Limits};
 use crate::mat::COMPLEX_NUMBERS;
 use crate::stated_rates::{step, with_own_times, with_stated_rates};
 
-/// Largest depth of groups in groups; deeper ones are refused as forged, as cycles of links are.
+/// Maximum depth of nested groups; cycles of links are deeper and are refused.
 const MAX_DEPTH: usize = 16;
 
-/// Largest number of groups; a cycle of links makes more.
+/// Maximum number of groups; a cycle of links has more.
 const MAX_GROUPS: usize = 4096;
 
-/// Largest number of bytes that a byte of the file may stand for: deflate packs 1032 into one.
+/// Maximum ratio of unpacked to stored bytes: deflate reaches 1032.
 const MAX_EXPANSION: u64 = 1100;
 
-/// Length below which a file may declare as many bytes as one of this length.
+/// Length, in bytes, that the file is assumed to have at least when its expansion is checked.
 const MIN_BYTES: u64 = 4096;
 
 /// Reads the data sets of a file as columns.
 pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
     let is_matlab = bytes.starts_with(b"MATLAB");
     let budget = Budget::new(limits, bytes.len());
-    // The crate is young: a panic in it is a file that it does not read.
+    // The decoder crate is young: a panic in it is reported as a damaged file.
     let read = catch_unwind(AssertUnwindSafe(|| Reader::read(bytes, is_matlab, budget)));
     let read = read.unwrap_or_else(|_| Err(Fault::new(0, "its structure is damaged")));
     let contents = read.map_err(|fault| fault.error(file, Place::Byte(1)))?;
@@ -47,14 +47,14 @@ pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Conten
     Ok(contents.with_usual_length())
 }
 
-/// A file on its way into columns.
+/// Reader of the data sets of a file into columns.
 struct Reader {
     contents: Contents,
     budget: Budget,
     is_matlab: bool,
     /// Length of the file, in bytes.
     len: u64,
-    /// Groups so far.
+    /// Number of groups so far.
     groups: usize,
 }
 
@@ -69,7 +69,7 @@ impl Reader {
         Ok(reader.contents)
     }
 
-    /// Sign between the names of a group and its members.
+    /// Returns the sign between the names of a group and its members.
     fn separator(&self) -> char {
         if self.is_matlab { '.' } else { '/' }
     }
@@ -90,7 +90,7 @@ impl Reader {
             );
             return Err(Fault::new(0, what));
         }
-        let attributes = Attributes::of_group(group);
+        let attributes = Attributes::from_group(group);
         for (name, value) in attributes.numbers() {
             let name = self.path(path, name);
             self.contents.scalars.push((name, value));
@@ -131,7 +131,7 @@ impl Reader {
         of_group: &Attributes,
         depth: usize,
     ) -> Result<(), Fault> {
-        let attributes = Attributes::of_dataset(dataset);
+        let attributes = Attributes::from_dataset(dataset);
         match values::read(dataset, &attributes, self.len, &mut self.budget) {
             Ok(Content::Numbers(array)) => self.add_numbers(array, path, &attributes, of_group)?,
             Ok(Content::Complex { lengths, values }) => {
@@ -160,7 +160,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Adds the elements of a cell array (`name{2}`), or a field of an array of structs (`name(2).field`).
+    /// Adds the elements of a cell array (`name{2}`), or the fields of an array of structs
+    /// (`name(2).field`).
     fn add_elements(
         &mut self,
         objects: Vec<Object>,
@@ -218,14 +219,14 @@ impl Reader {
                 unit: attributes.unit(number - 1).or(of_group.unit(number - 1)).unwrap_or_default(),
                 about: attributes.about(),
                 axis: axis.unwrap_or(Axis::Unknown),
-                ..Column::of_numbers(name, values)
+                ..Column::from_numbers(name, values)
             });
         }
         Ok(())
     }
 }
 
-/// Sorts names with numbers at their ends by these.
+/// Returns a sort key that orders names with numbers at their ends by these numbers.
 fn natural(name: &str) -> (String, u64, String) {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let number = name[stem.len()..].parse().unwrap_or(0);
@@ -236,7 +237,8 @@ fn damaged(error: hdf5_pure::Error) -> Fault {
     Fault::new(0, format!("its structure is damaged, or of a kind that is not read here ({error})"))
 }
 
-/// Takes room for numbers of some bytes each, of which a file of `len` bytes may hold so many.
+/// Subtracts the memory of numbers from the budget; a file of `len` bytes can have only a limited
+/// number of them.
 fn take_numbers(count: u64, bytes_each: u64, len: u64, budget: &mut Budget) -> Result<(), Fault> {
     let bytes = count.saturating_mul(bytes_each.max(1));
     if bytes > len.max(MIN_BYTES).saturating_mul(MAX_EXPANSION) {

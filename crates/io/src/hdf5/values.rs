@@ -1,4 +1,4 @@
-//! Numbers of a data set.
+//! Numbers in a data set.
 
 use hdf5_pure::{CompoundField, CompoundType, DType, Dataset, Datatype, FormatError, Object};
 use mechid_signal::message;
@@ -10,10 +10,10 @@ use crate::contents::Fault;
 use crate::limits::Budget;
 use crate::mat::COMPLEX_NUMBERS;
 
-/// Number of channels above which an array is refused as transposed.
+/// Maximum number of channels of an array; one with more is refused as transposed.
 const MAX_CHANNELS: usize = 4096;
 
-/// What a data set holds.
+/// Contents of a data set.
 pub(super) enum Content {
     Numbers(Array),
     /// Complex numbers, the last index fastest, with the lengths of the dimensions.
@@ -21,14 +21,14 @@ pub(super) enum Content {
         lengths: Vec<usize>,
         values: Vec<Complex<f64>>,
     },
-    /// Other data sets and groups, as a cell array of MATLAB refers to.
+    /// Other data sets and groups, to which a MATLAB cell array refers.
     References(Vec<Object>),
 }
 
-/// Largest number of characters of a text of MATLAB that is read.
+/// Maximum length of a MATLAB text, in characters.
 const MAX_TEXT: u64 = 256;
 
-/// Returns a line of text of MATLAB, which has a number for each character.
+/// Returns a MATLAB text of one line, which is stored as one number per character.
 pub(super) fn characters(dataset: &Dataset) -> Option<String> {
     let count = dataset.shape().ok()?.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
     if count? > MAX_TEXT || dataset.dtype().ok()? != DType::U16 {
@@ -37,21 +37,21 @@ pub(super) fn characters(dataset: &Dataset) -> Option<String> {
     String::from_utf16(&dataset.read_u16().ok()?).ok()
 }
 
-/// Numbers whose memory an open object takes, estimated.
+/// Estimated memory of an open object, in numbers.
 const OBJECT_NUMBERS: u64 = 64;
 
 /// Numbers of a data set, in the order of the file.
 pub(super) struct Array {
     pub values: Vec<f64>,
-    /// Dimensions that are not 1.
+    /// Lengths of the dimensions that are longer than 1.
     shape: Vec<usize>,
 }
 
-/// Reason why a data set is no array of numbers.
+/// Reason why a data set cannot be read as an array of numbers.
 pub(super) enum Trouble {
-    /// The data set cannot be used; others can.
+    /// Only this data set cannot be used.
     Unusable(String),
-    /// The file is refused.
+    /// The whole file is refused.
     Fault(Fault),
 }
 
@@ -94,17 +94,18 @@ pub(super) fn read(
     }
     let dimensions = dataset.shape().map_err(failed)?;
     let count = dimensions.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
-    let each = dataset.element_size().map_err(failed)?;
+    let element_bytes = dataset.element_size().map_err(failed)?;
     let Some(count) = count else { return unusable("more numbers than can be counted") };
     if count == 0 {
         return unusable("an empty array");
     }
-    // A number is held as one of eight bytes, and a chunk whole.
-    take_numbers(count, each, len, budget).map_err(Trouble::Fault)?;
+    // Each number uses eight bytes in memory, and a chunk is unpacked as a whole.
+    take_numbers(count, element_bytes, len, budget).map_err(Trouble::Fault)?;
     if let Some(chunk) = dataset.chunk_shape().map_err(failed)? {
         let numbers = chunk.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
         let mut room = *budget;
-        take_numbers(numbers.unwrap_or(u64::MAX), each, len, &mut room).map_err(Trouble::Fault)?;
+        take_numbers(numbers.unwrap_or(u64::MAX), element_bytes, len, &mut room)
+            .map_err(Trouble::Fault)?;
     }
     let values = dataset.read_f64().map_err(failed)?;
     let shape: Vec<usize> = dimensions
@@ -130,7 +131,8 @@ pub(super) fn read(
     Ok(Content::Numbers(Array { values, shape }))
 }
 
-/// Lengths of the dimensions of a data set of elements that are held as `numbers` numbers each; room is taken for them.
+/// Returns the lengths of the dimensions of a data set whose elements need `numbers` numbers each,
+/// and subtracts their memory from the budget.
 fn lengths(
     dataset: &Dataset,
     numbers: u64,
@@ -140,22 +142,23 @@ fn lengths(
     let failed =
         |error: hdf5_pure::Error| Trouble::Unusable(format!("data that cannot be read ({error})"));
     let shape = dataset.shape().map_err(failed)?;
-    let each = dataset.element_size().map_err(failed)?;
+    let element_bytes = dataset.element_size().map_err(failed)?;
     let count = shape.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
     let Some(count) = count.filter(|count| *count > 0) else {
         return Err(Trouble::Unusable("an empty array".into()));
     };
-    take_numbers(count.saturating_mul(numbers), each.div_ceil(numbers), len, budget)
+    take_numbers(count.saturating_mul(numbers), element_bytes.div_ceil(numbers), len, budget)
         .map_err(Trouble::Fault)?;
     if let Some(chunk) = dataset.chunk_shape().map_err(failed)? {
         let count = chunk.iter().try_fold(1_u64, |count, len| count.checked_mul(*len));
         let mut room = *budget;
-        take_numbers(count.unwrap_or(u64::MAX), each, len, &mut room).map_err(Trouble::Fault)?;
+        take_numbers(count.unwrap_or(u64::MAX), element_bytes, len, &mut room)
+            .map_err(Trouble::Fault)?;
     }
     Ok(shape.iter().map(|len| usize::try_from(*len).unwrap_or(usize::MAX)).collect())
 }
 
-/// Real and imaginary part of an element, by the names of its two fields.
+/// Real and imaginary part of an element, from its two fields.
 struct Pair(Complex<f64>);
 
 impl CompoundType for Pair {
@@ -186,7 +189,7 @@ impl CompoundType for Pair {
 
 /// Reads complex numbers.
 fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
-    // The bytes are there beside the numbers while they are decoded.
+    // While they are decoded, the stored bytes need memory in addition to the numbers.
     let lengths = lengths(dataset, 4, len, budget)?;
     let pairs = dataset.read_compound::<Pair>();
     let pairs = pairs.map_err(|error| {
@@ -199,9 +202,9 @@ fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, 
     Ok(Content::Complex { lengths, values })
 }
 
-/// Finds what a data set of references refers to.
+/// Returns the objects to which a data set of references refers.
 fn references(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
-    // An open object takes far more memory than a number.
+    // An open object needs far more memory than a number.
     let lengths = lengths(dataset, OBJECT_NUMBERS, len, budget)?;
     for _ in 0..lengths.iter().product() {
         budget.take_column().map_err(|limit| Trouble::Fault(Fault::too_large(0, limit)))?;
@@ -218,8 +221,8 @@ fn is_complex(fields: &[(String, DType)]) -> bool {
 }
 
 impl Array {
-    /// Returns the channels: columns of a matrix of MATLAB, which stand one after the other, and otherwise the lines of
-    /// numbers along the longer side.
+    /// Returns the channels: columns of a MATLAB matrix, which are stored one after the other;
+    /// otherwise the rows or columns along the longer side.
     pub fn into_channels(self, is_matlab: bool) -> Vec<Vec<f64>> {
         let [slow, fast] = self.shape[..] else { return vec![self.values] };
         if is_matlab || fast > slow {

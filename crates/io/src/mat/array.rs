@@ -17,34 +17,34 @@ pub(crate) struct Array {
 /// The value of a variable.
 #[derive(Debug)]
 pub(crate) enum Value {
-    /// Real numbers, column by column.
+    /// Real numbers, in columns.
     Real { rows: usize, columns: usize, values: Vec<f64> },
     /// Complex numbers, the first index fastest.
     Complex { lengths: Vec<usize>, values: Vec<Complex<f64>> },
-    /// A line of text.
+    /// A text of one line.
     Text(String),
-    /// Its fields.
+    /// The fields of a struct.
     Struct(Vec<Array>),
     /// Elements of a cell array or of an array of structs, each with its index as a name.
     Elements { kind: &'static str, elements: Vec<Array> },
-    /// No channel; its name, for people.
+    /// A value that cannot be a channel, with its name for messages.
     Other(&'static str),
 }
 
-/// Depth to which arrays in arrays are read; deeper ones are refused as forged.
+/// Maximum depth of nested arrays; deeper files are refused as forged.
 const MOST_NESTED: usize = 32;
 
-/// Largest number of characters of a text that is read: longer ones are no names and no units.
+/// Maximum length of a text, in characters: a longer one is neither a name nor a unit.
 const MAX_TEXT: usize = 256;
 
-/// Number of dimensions beyond which a size is refused as damaged.
+/// Maximum number of dimensions; an array with more is refused as damaged.
 const MOST_DIMENSIONS: usize = 64;
 
-/// Flag of complex numbers, in the word that holds the class.
+/// Flag for complex numbers, in the word with the class.
 const COMPLEX: u32 = 0x0800;
 
 impl Array {
-    /// Returns whether it holds numbers at any depth.
+    /// Returns whether it contains numbers at any depth.
     pub fn has_numbers(&self) -> bool {
         match &self.value {
             Value::Real { .. } | Value::Complex { .. } => true,
@@ -55,7 +55,7 @@ impl Array {
         }
     }
 
-    /// Reads the variable in the data of an element, which begin at byte `at` of the file.
+    /// Reads the variable in the data of an element that begins at byte `at` of the file.
     pub fn read(
         data: &[u8],
         at: usize,
@@ -75,7 +75,7 @@ impl Array {
         };
         let class = flags & 0xff;
         if class > 15 {
-            // Objects have no size here, but their name comes next.
+            // Objects have no size in this format: their name comes next.
             let name = text(elements.required("name")?.data);
             return Ok(Self { name, value: Value::Other(object(&mut elements)) });
         }
@@ -95,7 +95,7 @@ impl Array {
     }
 }
 
-/// Lengths of the dimensions of a variable, two or more.
+/// Returns the lengths of the dimensions of a variable, two or more.
 fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     let lengths = match size.count() {
         Some(2..=MOST_DIMENSIONS) => size.numbers(endian),
@@ -103,7 +103,7 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     };
     let lengths = lengths.ok_or_else(|| Fault::new(size.at, "a variable has no size"))?;
     let length = |value: &f64| {
-        // Every u32 is a number exactly; no file has room for a longer dimension.
+        // An f64 represents every u32 exactly, and no file can have a longer dimension.
         let whole = (0.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
         whole.then_some(*value as usize).ok_or_else(|| {
             Fault::new(size.at, format!("a dimension of {} is no length", message::number(*value)))
@@ -112,7 +112,7 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     lengths.iter().map(length).collect()
 }
 
-/// What an object is; of those that hold records it says how they are saved.
+/// Returns the kind of an object; if it contains records, with advice on how to save them.
 fn object(elements: &mut Elements<'_>) -> &'static str {
     // The kind of the object comes next, then its class.
     let mut words = [(); 2].map(|()| elements.next().ok().flatten().map(|word| text(word.data)));
@@ -128,7 +128,7 @@ fn object(elements: &mut Elements<'_>) -> &'static str {
     }
 }
 
-/// Number of numbers of a full matrix; the place of its data is for messages.
+/// Returns the number of elements of a full matrix; messages name the position of its data.
 fn count_of(part: &Element<'_>, lengths: &[usize]) -> Result<usize, Fault> {
     let Some(count) = part.count() else {
         let what = format!("a variable holds data of type {}, no numbers", part.kind);
@@ -143,7 +143,7 @@ fn count_of(part: &Element<'_>, lengths: &[usize]) -> Result<usize, Fault> {
     Ok(count)
 }
 
-/// The real numbers of a full matrix.
+/// Returns the real numbers of a full matrix.
 fn real(
     elements: &mut Elements<'_>,
     endian: Endian,
@@ -163,7 +163,7 @@ fn real(
     }
 }
 
-/// The complex numbers of a full matrix of any number of dimensions.
+/// Returns the complex numbers of a full array with any number of dimensions.
 fn complex(
     elements: &mut Elements<'_>,
     endian: Endian,
@@ -177,7 +177,7 @@ fn complex(
     if count == 0 {
         return Ok(Value::Other("nothing"));
     }
-    // The parts are copied once more on their way into pairs.
+    // The parts are copied once more when they are combined into complex numbers.
     let room = budget.take_numbers(count.saturating_mul(2));
     room.map_err(|limit| Fault::too_large(real.at, limit))?;
     let [re, im] = [real, imaginary].map(|part| part.numbers(endian).unwrap_or_default());
@@ -185,14 +185,14 @@ fn complex(
     Ok(Value::Complex { lengths, values })
 }
 
-/// A text of one line.
+/// Returns a text of one line.
 fn characters(elements: &mut Elements<'_>, endian: Endian) -> Value {
     let Ok(part) = elements.required("characters") else { return Value::Other("text") };
     if part.data.len() > 2 * MAX_TEXT {
         return Value::Other("text");
     }
     let text = match part.kind {
-        // MATLAB stores characters as 16-bit integers, or as UTF-8 or UTF-16.
+        // MATLAB stores characters as 16-bit integers, as UTF-8 or as UTF-16.
         4 | 17 => {
             let words = part.data.as_chunks::<2>().0.iter().map(|word| endian.u16(*word));
             String::from_utf16_lossy(&words.collect::<Vec<u16>>())
@@ -202,7 +202,7 @@ fn characters(elements: &mut Elements<'_>, endian: Endian) -> Value {
     Value::Text(text.trim_matches(['\0', ' ']).to_owned())
 }
 
-/// Reads an array within another one.
+/// Reads an array inside another array.
 fn inner(
     elements: &mut Elements<'_>,
     endian: Endian,
@@ -220,7 +220,7 @@ fn inner(
     Array::read(element.data, element.at, endian, depth + 1, budget)
 }
 
-/// The elements of a cell array.
+/// Returns the elements of a cell array.
 fn cells(
     elements: &mut Elements<'_>,
     endian: Endian,
@@ -235,7 +235,7 @@ fn cells(
     Ok(Value::Elements { kind: "a cell array", elements: cells })
 }
 
-/// The fields of a struct, or of each struct of an array.
+/// Returns the fields of a struct, or of each struct in an array.
 fn structs(
     elements: &mut Elements<'_>,
     lengths: &[usize],
@@ -264,7 +264,7 @@ fn structs(
     let count = lengths.iter().try_fold(1_usize, |product, len| product.checked_mul(*len));
     match count {
         Some(1) => fields(budget),
-        // Structs without fields hold nothing, however many there are.
+        // Structs without fields have no contents, so their number needs no memory.
         _ if names.is_empty() => Ok(Value::Other("nothing")),
         Some(count) => {
             let mut structs = Vec::new();
@@ -277,7 +277,7 @@ fn structs(
     }
 }
 
-/// A name, which ends at the first zero.
+/// Returns a name, which ends at the first zero byte.
 fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).into_owned()

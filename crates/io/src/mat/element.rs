@@ -1,4 +1,4 @@
-//! The elements of which a MATLAB file is made: a type, a number of bytes, the bytes.
+//! The elements of a MATLAB file: each has a type, a number of bytes, and the bytes.
 
 use crate::contents::Fault;
 
@@ -38,7 +38,7 @@ impl Endian {
     }
 }
 
-/// One element.
+/// One element of the file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Element<'a> {
     pub kind: u32,
@@ -47,7 +47,7 @@ pub(crate) struct Element<'a> {
     pub at: usize,
 }
 
-/// Elements one after the other.
+/// Iterator over consecutive elements.
 #[derive(Debug)]
 pub(crate) struct Elements<'a> {
     bytes: &'a [u8],
@@ -73,39 +73,40 @@ impl<'a> Elements<'a> {
         self.next >= self.bytes.len()
     }
 
-    /// Reads the next element of the file itself, where compressed ones are not padded.
+    /// Reads the next element at the top level of the file, where compressed elements are not
+    /// padded.
     pub fn next_at_top(&mut self) -> Result<Option<Element<'a>>, Fault> {
         self.padded(|kind| kind != COMPRESSED)
     }
 
-    /// Reads the next element, an error at the end.
+    /// Reads the next element; the end is an error.
     pub fn required(&mut self, what: &str) -> Result<Element<'a>, Fault> {
         let at = self.base + self.next;
         self.next()?.ok_or_else(|| Fault::new(at, format!("a variable ends before its {what}")))
     }
 
     fn padded(&mut self, is_padded: impl Fn(u32) -> bool) -> Result<Option<Element<'a>>, Fault> {
-        let rest = self.bytes.get(self.next..).unwrap_or_default();
-        if rest.is_empty() {
+        let remaining = self.bytes.get(self.next..).unwrap_or_default();
+        if remaining.is_empty() {
             return Ok(None);
         }
         let at = self.base + self.next;
         let short = || Fault::new(at, "the file is cut short");
-        let (tag, rest) = rest.split_first_chunk::<4>().ok_or_else(short)?;
+        let (tag, remaining) = remaining.split_first_chunk::<4>().ok_or_else(short)?;
         let (kind, small) = split(self.endian.u32(*tag));
         if let Some(len) = small {
-            // Up to four bytes stand in the tag itself.
-            let data = rest.get(..4).ok_or_else(short)?.get(..len);
+            // Up to four bytes of data are stored in the tag itself.
+            let data = remaining.get(..4).ok_or_else(short)?.get(..len);
             let data = data.ok_or_else(|| Fault::new(at, "an element has an impossible length"))?;
             self.next += 8;
             return Ok(Some(Element { kind, data, at: at + 4 }));
         }
-        let (tag, rest) = rest.split_first_chunk::<4>().ok_or_else(short)?;
+        let (tag, remaining) = remaining.split_first_chunk::<4>().ok_or_else(short)?;
         let len = self.endian.u32(*tag) as usize;
-        let data = rest.get(..len).ok_or_else(|| {
+        let data = remaining.get(..len).ok_or_else(|| {
             Fault::new(
                 at,
-                format!("an element of {len} bytes has {}: the file is cut short", rest.len()),
+                format!("an element of {len} bytes has {}: the file is cut short", remaining.len()),
             )
         })?;
         self.next += 8 + if is_padded(kind) { len.next_multiple_of(8) } else { len };
@@ -113,7 +114,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Type of an element and, if it fits in its tag, its length.
+/// Splits a tag into the type of its element and, if the data are in the tag, their length.
 fn split(tag: u32) -> (u32, Option<usize>) {
     match tag >> 16 {
         0 => (tag, None),
@@ -122,7 +123,7 @@ fn split(tag: u32) -> (u32, Option<usize>) {
 }
 
 impl Element<'_> {
-    /// Number of the numbers in an element, `None` if it holds none.
+    /// Returns how many numbers the element has; `None` if its type is not numeric.
     pub fn count(&self) -> Option<usize> {
         let bytes = match self.kind {
             1 | 2 => 1,
@@ -134,7 +135,7 @@ impl Element<'_> {
         self.data.len().is_multiple_of(bytes).then_some(self.data.len() / bytes)
     }
 
-    /// The numbers of an element, whatever their type; `None` if it holds none.
+    /// Returns the numbers of an element of any numeric type; `None` for other types.
     pub fn numbers(&self, endian: Endian) -> Option<Vec<f64>> {
         fn all<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
             data.as_chunks::<N>().0.iter().map(|chunk| number(*chunk)).collect()

@@ -1,8 +1,8 @@
 //! MATLAB files of level 5, which versions 5 to 7.2 write, compressed or not.
 //!
-//! Read by hand: of the two crates that read them one takes nothing but MATLAB's own header (not
-//! SciPy's) and leaves out what a cut-short file lacks without a word, the other prints, and knows
-//! no structs and no doubles stored as bytes.
+//! This reader replaces two existing crates: one accepts only the header of MATLAB itself (not that
+//! of SciPy) and silently omits what a truncated file lacks; the other prints to the terminal, and
+//! reads neither structs nor doubles that are stored as bytes.
 //!
 //! # Source
 //! The MathWorks, *MAT-File Format*.
@@ -26,11 +26,11 @@ use crate::stated_rates::{with_own_times, with_stated_rates};
 /// Number of bytes before the first variable.
 const HEADER: usize = 128;
 
-/// Number of columns above which a matrix with more columns than rows is refused: it is probably
-/// transposed.
+/// Maximum number of columns of a matrix with fewer rows than columns; a wider one is refused,
+/// because it is probably transposed.
 const WIDEST: usize = 256;
 
-/// What complex numbers are in a message about a channel.
+/// Term for complex numbers in a message about a channel.
 pub(crate) const COMPLEX_NUMBERS: &str = "complex numbers (`frf_table` reads frequency responses)";
 
 /// Reads the variables of a file as columns.
@@ -61,7 +61,7 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
             COMPRESSED => {
                 let inflated = inflated(element.data, at, budget.unpacked_bytes())?;
                 budget.take_bytes(inflated.len()).map_err(|limit| Fault::too_large(at, limit))?;
-                // Places inside are reported as the place of the compressed variable.
+                // Errors inside are reported at the position of the compressed variable.
                 let inside = |fault: Fault| Fault { at, ..fault };
                 let mut elements = Elements::new(&inflated, at, endian);
                 let inner = elements.next().map_err(inside)?;
@@ -72,7 +72,7 @@ fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
                 budget.give_bytes(inflated.len());
                 variable.map_err(inside)?
             }
-            // Other elements are allowed and hold no variables.
+            // Other elements are allowed but contain no variables.
             _ => continue,
         };
         add(&mut contents, variable, at, &mut budget)?;
@@ -90,7 +90,7 @@ fn inflated(data: &[u8], at: usize, (most, limit): (usize, Limit)) -> Result<Vec
     }
 }
 
-/// Adds a variable that stands at byte `at`: its vectors as columns, a single number as such.
+/// Adds the variable at byte `at`: vectors as columns, a single number as a scalar.
 fn add(
     contents: &mut Contents,
     Array { name, value }: Array,
@@ -133,7 +133,7 @@ fn add(
     Ok(())
 }
 
-/// Adds a matrix of so many rows and columns: a vector as one column, otherwise each column.
+/// Adds a matrix: a vector as one column, otherwise each of its columns.
 fn add_matrix(
     contents: &mut Contents,
     name: String,
@@ -143,7 +143,7 @@ fn add_matrix(
     budget: &mut Budget,
 ) -> Result<(), Fault> {
     if rows == 1 || columns == 1 {
-        contents.columns.push(Column::of_numbers(name, values));
+        contents.columns.push(Column::from_numbers(name, values));
         return Ok(());
     }
     if columns > WIDEST && columns > rows {
@@ -156,7 +156,7 @@ fn add_matrix(
     }
     for (number, column) in (1..).zip(values.chunks_exact(rows)) {
         budget.take_column().map_err(|limit| Fault::too_large(at, limit))?;
-        contents.columns.push(Column::of_numbers(format!("{name}[{number}]"), column.to_vec()));
+        contents.columns.push(Column::from_numbers(format!("{name}[{number}]"), column.to_vec()));
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
-//! The footer of a file, looked at before the decoder takes memory for what it states.
+//! The footer of a file, which is checked before the decoder allocates the memory that it states.
 //!
-//! The decoder reserves a place for every child that an element of the schema claims, and descends
-//! into nested elements without a limit: two kilobytes can ask for gigabytes, or for the whole stack.
+//! The decoder reserves memory for every child that an element of the schema claims, and recurses
+//! into nested elements without a limit: two kilobytes can claim gigabytes, or exhaust the stack.
 //!
 //! # Source
 //! Apache Parquet format, `FileMetaData` and `SchemaElement`.
@@ -10,11 +10,11 @@ use ::parquet::file::reader::ChunkReader;
 
 use super::thrift::Bytes;
 
-/// Maximum depth of groups in groups of a schema; deeper ones are refused as forged. Columns of
+/// Maximum depth of nested groups in a schema; deeper ones are refused as forged. Columns of
 /// numbers and lists of them have two levels.
 const GROUP_DEPTH: usize = 64;
 
-/// Number of bytes at the end of a file: length of the footer and magic word.
+/// Number of bytes at the end of a file: length of the footer, and magic word.
 const TAIL: u64 = 8;
 
 /// Fields of `FileMetaData` and `SchemaElement`.
@@ -25,7 +25,7 @@ const CHILDREN: i64 = 5;
 const LIST: u8 = 9;
 const STRUCT: u8 = 12;
 
-/// Returns whether the footer of a file can be what it states; `true` for a file too short to have one,
+/// Returns whether the footer of a file is plausible; `true` for a file too short to have one,
 /// which the decoder refuses.
 pub fn is_possible(source: &impl ChunkReader) -> bool {
     let Some(start) = source.len().checked_sub(TAIL) else { return true };
@@ -37,12 +37,12 @@ pub fn is_possible(source: &impl ChunkReader) -> bool {
     source.get_bytes(start, len as usize).is_ok_and(|footer| is_possible_schema(&footer))
 }
 
-/// Walks through a footer; `false` if a list is longer than its bytes or the schema is no tree.
+/// Parses a footer; `false` if a list has more elements than bytes or the schema is not a tree.
 fn is_possible_schema(footer: &[u8]) -> bool {
     let walked = Bytes(footer).fields(|bytes, field, kind| match (field, kind) {
         (SCHEMA, LIST) => {
             let (kind, count) = bytes.list()?;
-            // Every element takes a byte at least.
+            // Every element needs at least one byte.
             if kind != STRUCT || count > bytes.0.len() as u64 {
                 return None;
             }
@@ -54,11 +54,11 @@ fn is_possible_schema(footer: &[u8]) -> bool {
     walked.is_some()
 }
 
-/// A tree, of which the number of children of each element comes in the order of depth first.
+/// Check of a tree whose elements, in depth-first order, state the number of their children.
 struct Tree {
-    /// Number of elements to come.
+    /// Number of elements still to come.
     rest: u64,
-    /// Number of children to come of each group that is open, the innermost last.
+    /// Number of children still to come of each open group, the innermost last.
     open: Vec<u64>,
 }
 

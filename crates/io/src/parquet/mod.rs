@@ -1,7 +1,7 @@
-//! Apache Parquet: records read as tables, tables of results written.
+//! Apache Parquet: records are read as tables, and tables of results are written.
 //!
-//! The columns are read and written one by one, without Arrow: its crates would double what the
-//! feature costs to compile, and a record is nothing but columns of numbers.
+//! The columns are read and written one by one, without Arrow: its crates would double the compile
+//! time of this feature, and a record has only columns of numbers.
 
 mod footer;
 mod pages;

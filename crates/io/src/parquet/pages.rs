@@ -1,4 +1,4 @@
-//! Sizes that the pages of a column state, looked at before anything is allocated for them.
+//! Page sizes that a column states, which are checked before memory is allocated for them.
 //!
 //! # Source
 //! Apache Parquet format, `PageHeader`.
@@ -9,10 +9,11 @@ use ::parquet::file::metadata::ColumnChunkMetaData;
 
 use super::thrift::Bytes;
 
-/// Encodings by the indices of a dictionary: `PLAIN_DICTIONARY` and `RLE_DICTIONARY`.
+/// Encodings that use the indices of a dictionary: `PLAIN_DICTIONARY` and `RLE_DICTIONARY`.
 const OF_DICTIONARY: [i64; 2] = [2, 8];
 
-/// Returns the bytes of a column in a row group; `None` if they are not in a file of `len` bytes.
+/// Returns the byte range of a column in a row group; `None` if it is not inside a file of `len`
+/// bytes.
 pub fn bytes_of(column: &ColumnChunkMetaData, len: usize) -> Option<Range<usize>> {
     let start = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
     let start = usize::try_from(start).ok()?;
@@ -20,8 +21,9 @@ pub fn bytes_of(column: &ColumnChunkMetaData, len: usize) -> Option<Range<usize>
     (end <= len).then_some(start..end)
 }
 
-/// Returns the size of the largest page of a column once it is unpacked, in bytes; `None` if the headers of
-/// the pages are damaged, a dictionary has more values than bytes, or one is used before it stands.
+/// Returns the unpacked size of the largest page of a column, in bytes; `None` if the headers of
+/// the pages are damaged, a dictionary has more values than bytes, or one is used before it is
+/// defined.
 pub fn largest_page(column: &[u8]) -> Option<usize> {
     let (mut rest, mut largest, mut dictionary) = (Bytes(column), 0, false);
     while !rest.0.is_empty() {
@@ -45,13 +47,13 @@ pub fn largest_page(column: &[u8]) -> Option<usize> {
 /// Numbers in the header of a page.
 #[derive(Debug, Default)]
 struct PageHeader {
-    /// Size once it is unpacked, in bytes.
+    /// Unpacked size, in bytes.
     unpacked: Option<i64>,
-    /// Size as it stands, in bytes.
+    /// Stored size, in bytes.
     packed: Option<i64>,
-    /// Number of values, of a dictionary.
+    /// Number of values, for a dictionary.
     dictionary_values: Option<i64>,
-    /// Encoding of the values, of a page of data.
+    /// Encoding of the values, for a page of data.
     encoding: Option<i64>,
 }
 
@@ -62,7 +64,8 @@ impl Bytes<'_> {
         self.fields(|bytes, field, kind| match (field, kind) {
             (2, 5) => bytes.signed().map(|size| header.unpacked = Some(size)),
             (3, 5) => bytes.signed().map(|size| header.packed = Some(size)),
-            // Headers of a page of data, of a dictionary, and of a page of data of version 2.
+            // The structs 5, 7 and 8 are the headers of a page of data, of a dictionary, and of a
+            // page of data of version 2.
             (5, 12) => bytes.number_of(2).map(|encoding| header.encoding = encoding),
             (7, 12) => bytes.number_of(1).map(|count| header.dictionary_values = count),
             (8, 12) => bytes.number_of(4).map(|encoding| header.encoding = encoding),

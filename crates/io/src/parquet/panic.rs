@@ -1,4 +1,4 @@
-//! Panics of the decoder, which damaged files can cause, as errors and without their text.
+//! Panics of the decoder on damaged files, converted to errors.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};
@@ -9,8 +9,9 @@ thread_local! {
     static GUARDS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Calls `work`; `None` if it panics. Nothing is printed of a panic in it: its text holds paths of the
-/// machine that compiled the decoder, and the caller tells what is wrong with the file.
+/// Returns the result of `work`; `None` if it panics. The message of the panic is not printed: it
+/// has paths of the machine that compiled the decoder, and the caller reports what is wrong with
+/// the file.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

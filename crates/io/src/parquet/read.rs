@@ -29,7 +29,7 @@ use crate::stated_rates::with_stated_rates;
 /// Number of rows decoded at a time.
 pub(super) const CHUNK_ROWS: usize = 1 << 16;
 
-/// Key of the units of the columns, a JSON object such as `{"x": "mm"}`.
+/// Key of the units of the columns: a JSON object such as `{"x": "mm"}`.
 const UNITS: &str = "units";
 
 /// Key under which pandas writes the attributes of a table, as JSON.
@@ -47,7 +47,7 @@ pub(crate) fn read(file: &str, bytes: Vec<u8>, budget: Budget) -> Result<Content
     contents.map_err(|trouble| trouble.error(file)).and_then(|contents| usable(file, contents))
 }
 
-/// Returns contents with the rate that a file states, unless it has no column.
+/// Adds the rate that a file states to its contents; an error if there is no column.
 pub(super) fn usable(file: &str, contents: Contents) -> Result<Contents, IoError> {
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no column" });
@@ -55,10 +55,11 @@ pub(super) fn usable(file: &str, contents: Contents) -> Result<Contents, IoError
     Ok(with_stated_rates(contents).with_usual_length())
 }
 
-/// Reads the keys and values that stand in a Parquet file beside its columns, without the columns.
+/// Reads the keys and values in the metadata of a Parquet file, without its columns.
 ///
 /// # Errors
-/// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or none.
+/// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or of another
+/// format.
 pub fn read_parquet_metadata(path: impl AsRef<Path>) -> Result<Vec<(String, String)>, IoError> {
     let file = input_name(path.as_ref());
     let opened = File::open(path).map_err(|source| IoError::Read { file: file.clone(), source })?;
@@ -84,7 +85,7 @@ impl From<ParquetError> for Trouble {
 }
 
 impl Trouble {
-    /// Returns it as it is met after so many rows.
+    /// Returns the reason with the number of rows that were read before it.
     fn after(self, rows: usize) -> Self {
         match self {
             Self::TooLarge(_, limit) => Self::TooLarge(rows, limit),
@@ -92,7 +93,7 @@ impl Trouble {
         }
     }
 
-    /// Returns it as an error of the file.
+    /// Returns the reason as an error of the file.
     pub fn error(self, file: &str) -> IoError {
         let file = file.to_owned();
         match self {
@@ -104,7 +105,7 @@ impl Trouble {
     }
 }
 
-/// Reads something of a file; a panic of the decoder, which damaged files can cause, is an error.
+/// Reads a part of a file; a panic of the decoder, which damaged files can cause, becomes an error.
 pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Trouble>) -> Result<T, Trouble> {
     caught(read)
         .unwrap_or_else(|| Err(Trouble::Damaged("its contents contradict each other".into())))
@@ -130,7 +131,7 @@ impl<R: ChunkReader + 'static> fmt::Debug for Columns<R> {
 }
 
 impl<R: ChunkReader + 'static> Columns<R> {
-    /// Reads what a file says of its columns; `source` and `same` are the same file.
+    /// Reads the description of the columns; `source` and `same` are the same file.
     pub fn new(source: R, same: R) -> Result<Self, Trouble> {
         Ok(Self { source, reader: reader(same)? })
     }
@@ -141,13 +142,13 @@ impl<R: ChunkReader + 'static> Columns<R> {
         rows.ok_or_else(|| Trouble::Damaged("its row groups have an impossible size".into()))
     }
 
-    /// Returns the readers of the row groups, none of which is made yet.
+    /// Returns the readers of the row groups, each created when it is first used.
     pub fn groups(&self) -> Groups<'_> {
         let count = self.reader.metadata().num_row_groups();
         Groups { reader: &self.reader, known: (0..count).map(|_| OnceCell::new()).collect() }
     }
 
-    /// Numbers of rows of the row groups; `None` for a negative one.
+    /// Returns the numbers of rows of the row groups; `None` for a negative one.
     fn group_rows(&self) -> impl Iterator<Item = Option<usize>> {
         self.reader
             .metadata()
@@ -156,8 +157,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
             .map(|group| usize::try_from(group.num_rows()).ok())
     }
 
-    /// Reads spans of rows, which follow one another, each as the contents of a file of its own; of
-    /// columns that are not `wanted`, by their indices, the name alone.
+    /// Reads consecutive spans of rows, each as the contents of a separate file; columns whose
+    /// indices are not in `wanted` get a name but no numbers.
     pub fn contents(
         &self,
         wanted: Option<&[usize]>,
@@ -165,7 +166,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
         mut budget: Budget,
     ) -> Result<Vec<Contents>, Trouble> {
         let metadata = self.reader.metadata().file_metadata();
-        let stated = Stated::of(metadata);
+        let stated = Stated::from_metadata(metadata);
         let empty = || Contents {
             format: "Parquet".into(),
             scalars: stated.numbers.clone(),
@@ -177,10 +178,10 @@ impl<R: ChunkReader + 'static> Columns<R> {
             budget.take_column().map_err(|limit| Trouble::TooLarge(0, limit))?;
             let name = description.path().parts().join(".");
             let about = stated.units.get(&name).cloned().unwrap_or_default();
-            let columns: Vec<Column> = match Kind::of(description) {
+            let columns: Vec<Column> = match Kind::from_column(description) {
                 Err(what) => {
                     let root = description.path().parts().first().cloned().unwrap_or_default();
-                    // The leaves of a list are called after it.
+                    // All columns inside a list have the name of the list.
                     let name = if description.max_rep_level() > 0 { root } else { name };
                     spans.iter().map(|_| Column::unusable(name.clone(), what)).collect()
                 }
@@ -190,7 +191,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
                     .collect(),
                 Ok(kind) => {
                     let values = self.numbers(&groups, at, kind, spans, &mut budget)?.into_iter();
-                    values.map(|values| Column::of_numbers(name.clone(), values)).collect()
+                    values.map(|values| Column::from_numbers(name.clone(), values)).collect()
                 }
             };
             for (contents, column) in contents.iter_mut().zip(columns) {
@@ -224,8 +225,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
         Ok(values)
     }
 
-    /// Passes a column to `take` at the beginning of every stretch of rows that belongs to a span and a
-    /// row group, with the index of the span and the number of rows, which `take` has to read.
+    /// Passes a column to `take` for every range of rows within one span and one row group, with
+    /// the index of the span and the number of rows, which `take` must read.
     pub fn visit(
         &self,
         groups: &Groups<'_>,
@@ -258,7 +259,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
         Ok(())
     }
 
-    /// Refuses a column whose pages are not in the file, or larger than what may be unpacked.
+    /// Refuses a column whose pages are outside the file, or larger than the memory limit.
     fn check_pages(&self, column: &ColumnChunkMetaData, budget: &Budget) -> Result<(), Trouble> {
         let damaged = || Trouble::Damaged("the pages of a column contradict its size".into());
         let len = usize::try_from(self.source.len()).unwrap_or(usize::MAX);
@@ -271,7 +272,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
         Ok(())
     }
 
-    /// Refuses a file of which any column has pages that are not there, or too large.
+    /// Refuses a file if any column has pages outside the file, or pages larger than the memory
+    /// limit.
     pub fn check_all_pages(&self, budget: &mut Budget) -> Result<(), Trouble> {
         for group in self.reader.metadata().row_groups() {
             for column in group.columns() {
@@ -294,7 +296,7 @@ impl<R: ChunkReader + 'static> Columns<R> {
     }
 }
 
-/// The readers of the row groups, each made once: making one takes time for each of its columns.
+/// Readers of the row groups, created once because creating one takes time for each of its columns.
 pub(super) struct Groups<'a> {
     reader: &'a dyn FileReader,
     known: Vec<OnceCell<Box<dyn RowGroupReader + 'a>>>,
@@ -332,18 +334,20 @@ fn short() -> Trouble {
 /// Meaning of the numbers of a column.
 #[derive(Clone, Copy)]
 enum Kind {
-    /// Numbers as they stand.
+    /// Numbers without conversion.
     Plain,
-    /// Integers without a sign.
+    /// Unsigned integers.
     Unsigned,
-    /// Instants in integer units, so many in a second; read as seconds from the first one on, because
-    /// the seconds since 1970 leave a float too few digits for a sampling step.
+    /// Instants in integer units, with the number of units per second. They are read as seconds
+    /// from the first one, because the seconds since 1970 would leave an f64 too few digits for a
+    /// sampling step.
     Instants(f64),
 }
 
 impl Kind {
-    /// The kind of a column, or what it holds instead of real numbers.
-    fn of(column: &ColumnDescriptor) -> Result<Self, &'static str> {
+    /// Returns the kind of a column, or as an error a description of its contents if they are not
+    /// real numbers.
+    fn from_column(column: &ColumnDescriptor) -> Result<Self, &'static str> {
         if column.max_rep_level() > 0 {
             return Err("lists");
         }
@@ -420,7 +424,7 @@ fn per_second(unit: &TimeUnit) -> f64 {
     }
 }
 
-/// Appends so many rows as numbers, NaN where there is none.
+/// Appends rows as numbers, with NaN for missing values.
 fn append<T: DataType>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
@@ -428,11 +432,11 @@ fn append<T: DataType>(
     into: &mut Vec<f64>,
 ) -> Result<(), Trouble> {
     let (mut levels, mut values) = (Vec::new(), Vec::new());
-    let mut left = rows;
-    while left > 0 {
+    let mut remaining = rows;
+    while remaining > 0 {
         levels.clear();
         values.clear();
-        let at_once = left.min(CHUNK_ROWS);
+        let at_once = remaining.min(CHUNK_ROWS);
         let (read, ..) = column.read_records(at_once, Some(&mut levels), None, &mut values)?;
         if read == 0 {
             return Err(short());
@@ -442,17 +446,16 @@ fn append<T: DataType>(
         } else {
             let full = levels.iter().copied().max().unwrap_or_default();
             let mut present = values.iter();
-            into.extend(levels.iter().map(|level| match *level == full {
-                true => present.next().map_or(f64::NAN, &mut number),
-                false => f64::NAN,
+            into.extend(levels.iter().map(|level| {
+                if *level == full { present.next().map_or(f64::NAN, &mut number) } else { f64::NAN }
             }));
         }
-        left -= read.min(left);
+        remaining -= read.min(remaining);
     }
     Ok(())
 }
 
-/// Statements of a file beside its columns.
+/// Key-value metadata of a file.
 struct Stated {
     numbers: Vec<(String, f64)>,
     /// Columns and their units.
@@ -460,7 +463,7 @@ struct Stated {
 }
 
 impl Stated {
-    fn of(metadata: &FileMetaData) -> Self {
+    fn from_metadata(metadata: &FileMetaData) -> Self {
         let mut stated = Self { numbers: Vec::new(), units: BTreeMap::new() };
         for (key, value) in pairs(metadata) {
             let json = serde_json::from_str(&value);
@@ -491,8 +494,8 @@ impl Stated {
     }
 }
 
-/// Keys and values of a file.
+/// Returns the keys and values of a file.
 fn pairs(metadata: &FileMetaData) -> Vec<(String, String)> {
-    let all = metadata.key_value_metadata().into_iter().flatten();
-    all.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect()
+    let key_values = metadata.key_value_metadata().into_iter().flatten();
+    key_values.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect()
 }

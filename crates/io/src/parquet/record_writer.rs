@@ -1,4 +1,4 @@
-//! Many records into one Parquet file.
+//! Writer of many records into one Parquet file.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -15,14 +15,14 @@ use mechid_signal::Sampling;
 use crate::standard::output_name;
 use crate::{BegunFile, IoError};
 
-/// Number of samples from which on the records so far become a row group.
+/// Number of samples after which the records so far become a row group.
 const ROW_GROUP_ROWS: usize = 1 << 17;
 
 /// Name of the column of instants, in s.
 const TIME: &str = "time";
 
-/// Writes records, one after the other, into one Parquet file: a column that names the record of each
-/// row, one of the instants, and one for each channel. [`ParquetFile`](crate::ParquetFile) reads them.
+/// Writer of consecutive records into one Parquet file: a column that names the record of each row,
+/// one of the instants, and one for each channel. [`ParquetFile`](crate::ParquetFile) reads them.
 ///
 /// ```
 /// use mechid_io::{Limits, ParquetFile, ParquetRecordWriter, write_all};
@@ -51,7 +51,7 @@ pub struct ParquetRecordWriter {
     columns: Vec<Vec<f64>>,
 }
 
-/// The file as the encoder sees it.
+/// Stream through which the encoder writes into the file.
 struct Stream(BegunFile);
 
 impl Write for Stream {
@@ -66,8 +66,8 @@ impl Write for Stream {
 }
 
 impl ParquetRecordWriter {
-    /// Begins the file with destination `path`; `record_column` is the name of the column that tells the
-    /// records apart, `channels` those of the channels.
+    /// Begins the file with destination `path`; `record_column` is the name of the column that
+    /// identifies the record of each row, `channels` are the names of the channels.
     ///
     /// # Errors
     /// As [`BegunFile::begin`], and [`IoError::Write`] if two columns have one name.
@@ -100,7 +100,8 @@ impl ParquetRecordWriter {
     /// [`IoError::Write`].
     ///
     /// # Panics
-    /// If there are not as many channels as names, or one is not as long as the sampling.
+    /// If the number of channels differs from that of the names, or a channel is not as long as the
+    /// sampling.
     pub fn append(
         &mut self,
         record: &str,
@@ -159,7 +160,7 @@ fn append_column<T: DataType>(
     column.close()
 }
 
-/// Returns the columns: one of text, then numbers; none of them null.
+/// Returns the schema: a column of text, then columns of numbers; none of them nullable.
 fn schema(text: &str, numbers: &[&str]) -> Result<TypePtr, ParquetError> {
     let column = |name: &str, physical, logical| {
         let column = Type::primitive_type_builder(name, physical)

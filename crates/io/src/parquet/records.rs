@@ -1,4 +1,4 @@
-//! Many records in one file, told apart by a column.
+//! Many records in one file, identified by a column.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -16,10 +16,10 @@ use crate::limits::{Budget, Limit, Limits};
 use crate::standard::input_name;
 use crate::{IoError, Table, escaped};
 
-/// A Parquet file of which rows are read as they are asked for.
+/// Parquet file whose rows are read on request.
 ///
-/// Only the row groups and columns that hold them are read, so that the memory needed does not grow
-/// with the file.
+/// Only the row groups and columns with the requested rows are read, so that the memory needed does
+/// not grow with the file.
 #[derive(Debug)]
 pub struct ParquetFile {
     head: Table,
@@ -31,18 +31,18 @@ pub struct ParquetFile {
 /// Rows of a file that belong to one record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordRows {
-    /// Value that the identifier column has in these rows.
+    /// Value of the identifier column in these rows.
     pub id: String,
     /// The rows, counted from 0.
     pub rows: Range<usize>,
 }
 
 impl ParquetFile {
-    /// Opens a file and reads what it says of its columns.
+    /// Opens a file and reads the description of its columns.
     ///
     /// # Errors
-    /// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or none,
-    /// [`IoError::Empty`] without columns, [`IoError::TooLarge`].
+    /// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or of
+    /// another format, [`IoError::Empty`] without columns, [`IoError::TooLarge`].
     pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self, IoError> {
         let file = input_name(path.as_ref());
         let open =
@@ -58,7 +58,7 @@ impl ParquetFile {
         let (columns, head) = read.map_err(|trouble| trouble.error(&file))?;
         let head = usable(&file, head)?;
         head.check_names(&file, limits)?;
-        let head = Table::of_contents(file.clone(), head);
+        let head = Table::from_contents(file.clone(), head);
         Ok(Self { head, columns, limits: *limits, bytes })
     }
 
@@ -71,17 +71,18 @@ impl ParquetFile {
         Budget::new(&self.limits, self.bytes)
     }
 
-    /// Returns the memory, in bytes, that work on a record may take: [`Limits::memory`] of the size of
-    /// the file.
+    /// Returns the memory, in bytes, that processing a record may use: [`Limits::memory`] for the
+    /// size of the file.
     pub fn memory(&self) -> usize {
         self.limits.memory(self.bytes)
     }
 
-    /// Returns the records that a column of texts or whole numbers tells apart, in the order of their rows.
+    /// Returns the records that a column of texts or whole numbers identifies, in the order of
+    /// their rows.
     ///
     /// # Errors
-    /// [`IoError::MissingColumn`], [`IoError::RecordColumn`] if the column holds something else or
-    /// nothing in some row, [`IoError::RecordApart`] if the rows of a record do not follow one another,
+    /// [`IoError::MissingColumn`], [`IoError::RecordColumn`] if the column has another type or a
+    /// missing value, [`IoError::RecordApart`] if the rows of a record are not consecutive,
     /// [`IoError::Parquet`].
     pub fn records(&self, column: &str) -> Result<Vec<RecordRows>, IoError> {
         let at = self.head.find(column)?;
@@ -113,8 +114,8 @@ impl ParquetFile {
         }
     }
 
-    /// Reads records, which follow one another, each as a table of its own; columns whose indices, counted
-    /// from 0, are not in `wanted` have a name and no numbers (`None`: all are read).
+    /// Reads consecutive records, each as a separate table; columns whose indices, counted from 0,
+    /// are not in `wanted` have a name and no numbers (`None`: all are read).
     ///
     /// # Errors
     /// [`IoError::Parquet`] if the file is damaged, [`IoError::TooLarge`].
@@ -129,7 +130,7 @@ impl ParquetFile {
         let contents = contents.map_err(|trouble| trouble.error(file))?.into_iter();
         let named = contents.zip(records).map(|(contents, record)| {
             let name = format!("{file} (record {})", escaped(&record.id));
-            Ok(Table::of_contents(name, usable(file, contents)?))
+            Ok(Table::from_contents(name, usable(file, contents)?))
         });
         named.collect()
     }
@@ -146,27 +147,30 @@ struct Ids {
     name_bytes: usize,
 }
 
-/// Reason why rows cannot be divided into records; it stands in the row after those read.
+/// Reason why the rows cannot be divided into records; it concerns the row after those read.
 enum Refusal {
     NoId,
-    /// The record has rows before others.
+    /// The rows of this record are not consecutive.
     Apart(String),
 }
 
 impl Ids {
-    /// Reads rows of the column, which end early where they cannot be used.
+    /// Reads rows of the column; stops early at a row that cannot be used.
     fn read(&mut self, column: &mut ColumnReader, rows: usize) -> Result<(), Trouble> {
         match column {
-            ColumnReader::Int32ColumnReader(column) => self.of(column, rows, |id| id.to_string()),
-            ColumnReader::Int64ColumnReader(column) => self.of(column, rows, |id| id.to_string()),
-            ColumnReader::ByteArrayColumnReader(column) => {
-                self.of(column, rows, |id| String::from_utf8_lossy(id.as_bytes()).into_owned())
+            ColumnReader::Int32ColumnReader(column) => {
+                self.read_ids(column, rows, |id| id.to_string())
             }
+            ColumnReader::Int64ColumnReader(column) => {
+                self.read_ids(column, rows, |id| id.to_string())
+            }
+            ColumnReader::ByteArrayColumnReader(column) => self
+                .read_ids(column, rows, |id| String::from_utf8_lossy(id.as_bytes()).into_owned()),
             _ => self.refused(Refusal::NoId),
         }
     }
 
-    fn of<T: DataType>(
+    fn read_ids<T: DataType>(
         &mut self,
         column: &mut ColumnReaderImpl<T>,
         rows: usize,
@@ -183,9 +187,10 @@ impl Ids {
                 return Err(Trouble::Damaged("a column is shorter than its row group".into()));
             }
             let full = levels.iter().copied().max().unwrap_or_default();
-            let complete = match values.len() == read {
-                true => read,
-                false => levels.iter().position(|level| *level < full).unwrap_or_default(),
+            let complete = if values.len() == read {
+                read
+            } else {
+                levels.iter().position(|level| *level < full).unwrap_or_default()
             };
             for run in values[..complete.min(values.len())].chunk_by(|a, b| a == b) {
                 self.push(text(&run[0]), run.len())?;
@@ -213,7 +218,7 @@ impl Ids {
         Ok(())
     }
 
-    /// Ends the reading; [`ParquetFile::records`] tells the refusal.
+    /// Stops the reading; [`ParquetFile::records`] reports the reason.
     fn refused(&mut self, refusal: Refusal) -> Result<(), Trouble> {
         self.refusal = Some(refusal);
         Err(Trouble::Damaged("its records cannot be told apart".into()))

@@ -1,4 +1,4 @@
-//! Rows of a table of results, read back.
+//! Rows of a table of results, read from a file.
 
 use std::fs::File;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::IoError;
 use crate::limits::{Budget, Limits};
 use crate::standard::input_name;
 
-/// A cell of a table that [`write_parquet`](super::write_parquet) writes.
+/// Cell of a table that [`write_parquet`](super::write_parquet) writes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParquetCell {
     /// Null, or a value of another kind.
@@ -28,27 +28,27 @@ pub enum ParquetCell {
 }
 
 impl ParquetCell {
-    fn of(field: Field) -> Self {
+    fn from_field(field: Field) -> Self {
         match field {
             Field::Str(text) => Self::Text(text),
             Field::Long(count) => Self::Count(count),
             Field::Double(number) => Self::Number(number),
             Field::ListInternal(list) => {
-                Self::List(list.elements().iter().cloned().map(Self::of).collect())
+                Self::List(list.elements().iter().cloned().map(Self::from_field).collect())
             }
             _ => Self::Null,
         }
     }
 }
 
-/// The cells of a row, with the names of their columns.
+/// Cells of a row, with the names of their columns.
 type Cells = Vec<(String, ParquetCell)>;
 
-/// Reads all rows of a table of results, each as its cells with the names of their columns.
+/// Reads all rows of a table of results; each has its cells with the names of their columns.
 ///
 /// # Errors
-/// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or none,
-/// [`IoError::TooLarge`].
+/// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or of another
+/// format, [`IoError::TooLarge`].
 pub fn read_parquet_rows(
     path: impl AsRef<Path>,
     limits: &Limits,
@@ -62,7 +62,7 @@ pub fn read_parquet_rows(
 /// Reads the rows of a table of results in the bytes of a file; `file` is its name in messages.
 ///
 /// # Errors
-/// [`IoError::Parquet`] if it is damaged or none, [`IoError::TooLarge`].
+/// [`IoError::Parquet`] if it is damaged or of another format, [`IoError::TooLarge`].
 pub fn parse_parquet_rows(
     file: &str,
     bytes: Vec<u8>,
@@ -72,7 +72,7 @@ pub fn parse_parquet_rows(
     guarded(|| rows(bytes.clone(), bytes, limits)).map_err(|trouble| trouble.error(file))
 }
 
-/// Reads the rows of a file; `source` and `same` are the same one.
+/// Reads the rows of a file; `source` and `same` are the same file.
 fn rows<R: ChunkReader + 'static>(
     source: R,
     same: R,
@@ -83,7 +83,7 @@ fn rows<R: ChunkReader + 'static>(
     columns.check_all_pages(&mut Budget::new(limits, len))?;
     let rows = columns.row_cells()?.map(|row| {
         let cells = row?.into_columns().into_iter();
-        Ok(cells.map(|(name, field)| (name, ParquetCell::of(field))).collect())
+        Ok(cells.map(|(name, field)| (name, ParquetCell::from_field(field))).collect())
     });
     rows.collect()
 }

@@ -1,12 +1,13 @@
-//! Compact form of Thrift, read by hand: what a file states is looked at before memory is taken for it.
+//! Reader of the compact protocol of Thrift, with which a footer is checked before memory is
+//! allocated for what it states.
 //!
 //! # Source
 //! Apache Thrift, compact protocol.
 
-/// Maximum depth of structs in structs; those of a Parquet footer have nine levels.
+/// Maximum depth of nested structs; a Parquet footer has nine levels.
 const DEPTH: usize = 16;
 
-/// Bytes not read yet.
+/// Bytes that are not read yet.
 pub(super) struct Bytes<'a>(pub &'a [u8]);
 
 impl Bytes<'_> {
@@ -34,13 +35,13 @@ impl Bytes<'_> {
         None
     }
 
-    /// Reads a signed number, of which the lowest bit is the sign.
+    /// Reads a signed number, whose lowest bit is the sign.
     pub fn signed(&mut self) -> Option<i64> {
         let value = self.varint()?;
         Some((value >> 1).cast_signed() ^ -(value & 1).cast_signed())
     }
 
-    /// Reads a struct for the number in one of its fields, if it has that field.
+    /// Reads a struct and returns the number in one of its fields, if it has that field.
     pub fn number_of(&mut self, wanted: i64) -> Option<Option<i64>> {
         let mut number = None;
         self.fields(|bytes, field, kind| match kind {
@@ -50,7 +51,7 @@ impl Bytes<'_> {
         Some(number)
     }
 
-    /// Reads a struct, its fields by their numbers and kinds.
+    /// Reads a struct and passes each field, with its number and kind, to `read`.
     pub fn fields(&mut self, mut read: impl FnMut(&mut Self, i64, u8) -> Option<()>) -> Option<()> {
         let mut field = 0;
         loop {
@@ -63,7 +64,7 @@ impl Bytes<'_> {
         }
     }
 
-    /// Returns the number of a field, which follows the one before or stands by itself.
+    /// Returns the number of a field, which is stored relative to the previous one or in full.
     fn field(&mut self, head: u8, before: i64) -> Option<i64> {
         match head >> 4 {
             0 => self.signed(),
@@ -71,7 +72,7 @@ impl Bytes<'_> {
         }
     }
 
-    /// Reads the head of a list: the kind of its elements and how many there are.
+    /// Reads the head of a list: the kind and the number of its elements.
     pub fn list(&mut self) -> Option<(u8, u64)> {
         let head = self.byte()?;
         let count = match head >> 4 {
@@ -81,10 +82,10 @@ impl Bytes<'_> {
         Some((head & 0x0f, count))
     }
 
-    /// Passes over a value of some kind.
+    /// Skips a value of this kind.
     pub fn skip(&mut self, kind: u8, depth: usize) -> Option<()> {
         match kind {
-            // True and false are the kind itself.
+            // Booleans are stored in the kind itself.
             1 | 2 => {}
             3 => drop(self.byte()?),
             4..=6 => drop(self.varint()?),
@@ -112,7 +113,7 @@ impl Bytes<'_> {
         Some(())
     }
 
-    /// Passes over so many elements of a list or map; each takes a byte at least.
+    /// Skips elements of a list or map; each needs at least one byte.
     fn skip_all(&mut self, kinds: &[u8], count: u64, depth: usize) -> Option<()> {
         if count > self.0.len() as u64 || depth >= DEPTH {
             return None;

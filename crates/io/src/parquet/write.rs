@@ -24,7 +24,7 @@ pub struct ParquetColumn {
     pub values: ParquetValues,
 }
 
-/// Values of a [`ParquetColumn`], one per row, in the unit that the column says; `None` is null.
+/// Values of a [`ParquetColumn`], one per row, in the unit that its name states; `None` is null.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParquetValues {
     /// Text.
@@ -39,12 +39,12 @@ pub enum ParquetValues {
     Numbers(Vec<Vec<Option<f64>>>),
 }
 
-/// Writes a table of one row group with keys and values beside it, complete or not at all. The bytes
-/// depend on nothing but the arguments and the version of this crate.
+/// Writes a table of one row group with keys and values as metadata, completely or not at all. The
+/// bytes depend only on the arguments and the version of this crate.
 ///
 /// # Errors
-/// [`IoError::Write`] if the file cannot be written, [`IoError::Parquet`] if the columns have not
-/// equally many rows.
+/// [`IoError::Write`] if the file cannot be written, [`IoError::Parquet`] if the columns have
+/// different numbers of rows.
 pub fn write_parquet(
     path: impl AsRef<Path>,
     columns: &[ParquetColumn],
@@ -59,7 +59,7 @@ pub fn write_parquet(
 /// Returns a table of one row group, as [`write_parquet`] writes it.
 ///
 /// # Errors
-/// [`IoError::Parquet`] if the columns have not equally many rows.
+/// [`IoError::Parquet`] if the columns have different numbers of rows.
 pub fn parquet_bytes(columns: &[ParquetColumn]) -> Result<Vec<u8>, IoError> {
     encoded(columns, &[])
         .map_err(|error| IoError::Parquet { file: "the table".into(), what: error.to_string() })
@@ -159,7 +159,7 @@ fn lists<T: DataType>(
         let before = defined.len();
         for entry in row {
             repeated.push(i16::from(defined.len() > before));
-            // 1 stands for an entry that is null.
+            // The definition level of a null entry is 1.
             defined.push(if entry.is_some() { 1 + optional } else { 1 });
             values.extend(entry);
         }

@@ -9,33 +9,33 @@ use super::fields::{Fields, Layout, Row, RowIter};
 use super::instant::Instant;
 use crate::contents::{DecimalSign, Lines, Place, Unusable};
 
-/// Largest number of characters of a field that a message repeats.
+/// Maximum number of characters of a field that a message repeats.
 const SHOWN: usize = 40;
 
-/// Properties of a text known before its rows are read.
+/// Properties of a text that are known before its rows are read.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub layout: Layout,
     /// Number of fields of the first row.
     pub width: usize,
-    /// The same up to its last field that is not empty.
+    /// Number of fields of the first row up to the last one that is not empty.
     pub filled: usize,
-    /// Indices of the columns to read, rising.
+    /// Indices of the columns to read, in rising order.
     pub wanted: Vec<usize>,
-    /// Day from which the instants of a wanted column count, counted from 1970-01-01; `None` of numbers. Empty if no
-    /// column has instants.
+    /// Reference day of the instants of each wanted column, counted from 1970-01-01; `None` for
+    /// columns of numbers. Empty if no column has instants.
     pub origins: Vec<Option<i64>>,
-    /// Decimal sign of all numbers, as far as it is known.
+    /// Decimal sign of all numbers, if it is known.
     pub decimal: Option<DecimalSign>,
     pub row_bytes: usize,
 }
 
-/// A row that does not fit the first one.
+/// Row with a different number of fields or too many bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BadRow {
-    /// It has another number of fields.
+    /// A row with another number of fields.
     Ragged { line: u64, fields: usize },
-    /// It is too long.
+    /// A row that is too long.
     TooLong { line: u64 },
 }
 
@@ -44,14 +44,14 @@ pub(super) enum BadRow {
 pub(super) struct Batch {
     /// Number of samples.
     pub samples: usize,
-    /// Numbers of the wanted columns, fewer than `samples` in one that is not usable.
+    /// Numbers of the wanted columns; an unusable column has fewer than `samples`.
     pub columns: Vec<Vec<f64>>,
     /// Reason why a wanted column cannot be used.
     pub unusable: Vec<Option<Unusable>>,
     /// Lines of the samples.
     pub lines: Lines,
-    /// Line and number of fields of the rows of empty fields at the end, which are no samples unless
-    /// others follow.
+    /// Line and number of fields of the rows of empty fields at the end, which count as samples
+    /// only if other rows follow.
     pub empty: Vec<(u64, usize)>,
     /// The row at which reading stopped.
     pub bad_row: Option<BadRow>,
@@ -59,14 +59,14 @@ pub(super) struct Batch {
     pub decimal: Option<DecimalSign>,
     /// Fields of a row with quotes.
     fields: Fields,
-    /// A number with a point in place of its comma.
+    /// Buffer for a number whose comma is replaced by a point.
     with_point: String,
-    /// Faults of the fields of the row at hand, by the index of the wanted column.
+    /// Faults in the fields of the current row, by the index of the wanted column.
     faults: Vec<(usize, Unusable)>,
 }
 
 impl Batch {
-    /// Reads the rows of a block, from an offset on.
+    /// Reads the rows of a block, beginning at an offset.
     pub fn read(&mut self, plan: &Plan, block: &Block, offset: usize) {
         self.clear(plan);
         let (above, text) = block.text.split_at(offset);
@@ -124,8 +124,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Reads the fields between delimiters; returns their number, and that up to the last one that
-    /// is not empty.
+    /// Reads fields separated by a delimiter; returns their number, and the number up to the last
+    /// field that is not empty.
     fn delimited(&mut self, plan: &Plan, row: &Row<'_>, delimiter: u8) -> (usize, usize) {
         let mut wanted = plan.wanted.iter().copied().enumerate().peekable();
         let (mut rest, mut fields, mut filled) = (row.text, 0, 0);
@@ -165,7 +165,7 @@ impl Batch {
         }
     }
 
-    /// Reads the fields between blanks, none of which is empty.
+    /// Reads fields separated by blanks; such fields cannot be empty.
     fn words(&mut self, plan: &Plan, row: &Row<'_>) -> (usize, usize) {
         let mut wanted = plan.wanted.iter().copied().enumerate().peekable();
         let mut fields = 0;
@@ -180,7 +180,7 @@ impl Batch {
                 }
             }
         }
-        // What is missing of the row is for `Plan::check` to say.
+        // `Plan::check` reports fields that are missing.
         (fields, fields)
     }
 
@@ -195,7 +195,7 @@ impl Batch {
         counts
     }
 
-    /// Takes a number that needs no second look: finite, and of the decimal sign of the file.
+    /// Accepts a number that needs no further check: finite, and with the decimal sign of the file.
     fn accept(&mut self, column: usize, value: f64, text: &[u8]) -> bool {
         let has_usual_sign =
             self.decimal == Some(DecimalSign::Point) || memchr(b'.', text).is_none();
@@ -206,7 +206,7 @@ impl Batch {
         is_plain
     }
 
-    /// Takes any field of a wanted column.
+    /// Reads any field of a wanted column.
     fn field(&mut self, plan: &Plan, line: u64, column: usize, field: &[u8]) {
         if self.unusable[column].is_some() {
             return;
@@ -229,7 +229,7 @@ impl Batch {
             {
                 self.columns[column].push(value);
             }
-            // The sign of the file is the other one.
+            // The number has the other decimal sign than the file.
             Some(Number { sign, .. }) => {
                 let sign = match sign {
                     Some(DecimalSign::Comma) => DecimalSign::Point,
@@ -245,13 +245,14 @@ impl Batch {
 }
 
 impl Plan {
-    /// Returns the day from which the instants of a wanted column count; `None` of numbers.
+    /// Returns the reference day of the instants of a wanted column; `None` for a column of
+    /// numbers.
     fn origin(&self, column: usize) -> Option<i64> {
         self.origins.get(column).copied().flatten()
     }
 
-    /// Checks the number of fields of a row. Fields beyond either end are forgiven where they are
-    /// empty: rigs end some lines with a delimiter and others not.
+    /// Checks the number of fields of a row. A difference in empty fields at the end is accepted:
+    /// some programs end some lines with a delimiter and others not.
     pub fn check(&self, line: u64, fields: usize, filled: usize) -> Result<(), BadRow> {
         if fields < self.filled || filled > self.width {
             return Err(BadRow::Ragged { line, fields });
@@ -260,7 +261,7 @@ impl Plan {
     }
 }
 
-/// The number at the beginning of a text, and its length with the blanks around it.
+/// Returns the number at the beginning of a text, and its length including the blanks around it.
 fn plain_number(text: &[u8]) -> Option<(f64, usize)> {
     let blanks = text.iter().take_while(|b| **b == b' ').count();
     let (value, len) = fast_float2::parse_partial(&text[blanks..]).ok()?;

@@ -1,4 +1,4 @@
-//! A text in blocks of whole rows.
+//! Division of a text into blocks of whole rows.
 
 use std::io::{BufRead, Read};
 
@@ -16,10 +16,10 @@ use crate::limits::{Limit, ReadOptions};
 /// Number of bytes read at a time.
 const BLOCK_BYTES: usize = 1 << 16;
 
-/// Number of bytes, with lines of any length, in which the delimiter must show.
+/// Maximum number of bytes, with lines of any length, that are read to detect the delimiter.
 const SAMPLE_BYTES: usize = 1 << 24;
 
-/// Whole rows of a text.
+/// Block of whole rows of a text.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     pub text: Vec<u8>,
@@ -27,17 +27,17 @@ pub(super) struct Block {
     pub line: u64,
 }
 
-/// The end of a text.
+/// State of the end of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct TextEnd {
     /// Last line, if no line break ends it.
     pub open_line: Option<u64>,
-    /// Number of zero bytes behind the last line, which a preallocated file ends with.
+    /// Number of zero bytes after the last line, as in a preallocated file.
     pub padding: u64,
 }
 
 impl TextEnd {
-    /// Remark on the end of a text.
+    /// Returns the remark on the end of the text.
     pub fn remark(self) -> Option<String> {
         let bytes =
             message::count(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
@@ -45,32 +45,32 @@ impl TextEnd {
     }
 }
 
-/// The blocks of a text.
+/// Reader of the blocks of a text.
 pub(super) struct Blocks<'a> {
     file: String,
     gzip: bool,
     reader: Box<dyn BufRead + Send + 'a>,
     terminator: u8,
-    /// Number of the line that `rest` begins with.
+    /// Number of the line at which `rest` begins.
     line: u64,
     row_bytes: usize,
-    /// Bytes read behind the last block.
+    /// Bytes after the last block that are read already.
     rest: Vec<u8>,
     end: Option<TextEnd>,
-    /// Header of a LabVIEW measurement file, which is left out.
+    /// Header of a LabVIEW measurement file, which is removed from the text.
     lvm: Option<LvmHeader>,
 }
 
 impl<'a> Blocks<'a> {
-    /// Skips the lines above the table and reads as much as tells the dialect of the text.
+    /// Skips the lines above the table and reads enough to detect the dialect of the text.
     pub fn open(source: Source<'a>, options: &ReadOptions) -> Result<Self, IoError> {
         let terminator = source.terminator();
         let Source { file, gzip, mut reader, .. } = source.bounded(&options.limits);
         for _ in 0..options.skip_lines {
             match reader.skip_until(terminator) {
                 Ok(0) => {
-                    let found = "it has no more lines than are to be skipped";
-                    return Err(IoError::Empty { file, found });
+                    let finding = "it has no more lines than are to be skipped";
+                    return Err(IoError::Empty { file, found: finding });
                 }
                 Ok(_) => {}
                 Err(source) => return Err(failed(&file, gzip, source)),
@@ -102,7 +102,7 @@ impl<'a> Blocks<'a> {
         Ok(blocks)
     }
 
-    /// Leaves out the header of a LabVIEW measurement file.
+    /// Removes the header of a LabVIEW measurement file.
     fn leave_out_header(&mut self) -> Result<(), IoError> {
         while self.end.is_none()
             && !lvm::is_complete(&self.rest)
@@ -115,7 +115,7 @@ impl<'a> Blocks<'a> {
             self.line += header.lines;
             self.rest.drain(..header.bytes);
         }
-        // The dialect shows in the rows of the table.
+        // The dialect is detected from the rows of the table, so some of them are read.
         while self.end.is_none() && !is_sample(&self.rest, self.terminator) {
             self.fill(self.rest.len().max(BLOCK_BYTES))?;
             if self.rest.len() >= SAMPLE_BYTES {
@@ -125,17 +125,17 @@ impl<'a> Blocks<'a> {
         Ok(())
     }
 
-    /// Takes the header of a LabVIEW measurement file.
+    /// Returns the header of a LabVIEW measurement file and removes it from `self`.
     pub fn take_lvm(&mut self) -> Option<LvmHeader> {
         self.lvm.take()
     }
 
-    /// Number of the line of the file with which the text begins.
+    /// Returns the line number at which the text begins.
     pub fn first_line(&self) -> u64 {
         self.line
     }
 
-    /// Name of the file in messages.
+    /// Returns the name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
@@ -144,21 +144,21 @@ impl<'a> Blocks<'a> {
         self.terminator
     }
 
-    /// The bytes read before the first block.
+    /// Returns the bytes that were read before the first block.
     pub fn start(&self) -> &[u8] {
         &self.rest
     }
 
-    /// The end of the text, once all of it has been read.
+    /// Returns the end of the text, once all of it has been read.
     pub fn end(&self) -> Option<TextEnd> {
         self.end.filter(|_| self.rest.is_empty())
     }
 
-    /// Reads the next block into `block`; false at the end.
+    /// Reads the next block into `block`; `false` at the end.
     ///
     /// # Errors
     /// [`IoError::TooLarge`] for a row longer than the limit, [`IoError::Malformed`] for zero bytes
-    /// within the text, and those of reading.
+    /// within the text, and errors of reading.
     pub fn next(&mut self, layout: Layout, block: &mut Block) -> Result<bool, IoError> {
         let complete = loop {
             if self.rest.len() < BLOCK_BYTES && self.end.is_none() {
@@ -182,13 +182,13 @@ impl<'a> Blocks<'a> {
         Ok(complete > 0)
     }
 
-    /// The error for a row that is too long.
+    /// Returns the error for a row that is too long.
     pub fn too_long(&self, line: u64) -> IoError {
         let limit = Limit::RowBytes(self.row_bytes);
         IoError::TooLarge { file: self.file.clone(), at: Place::Line(line), limit }
     }
 
-    /// Reads about `count` bytes more.
+    /// Reads about `count` further bytes.
     fn fill(&mut self, count: usize) -> Result<(), IoError> {
         let before = self.rest.len();
         let read = self.reader.by_ref().take(count as u64).read_to_end(&mut self.rest);
@@ -201,7 +201,7 @@ impl<'a> Blocks<'a> {
         Ok(())
     }
 
-    /// Ends the text at a zero byte, behind which there must be no others.
+    /// Ends the text at a zero byte; only zero bytes may follow it.
     fn end_at_zero(&mut self, zero: usize) -> Result<(), IoError> {
         let mut is_zero = self.rest[zero..].iter().all(|b| *b == 0);
         let mut padding = (self.rest.len() - zero) as u64;
@@ -226,7 +226,7 @@ impl<'a> Blocks<'a> {
         })
     }
 
-    /// Number of the last line read, if no line break ends it.
+    /// Returns the number of the last line read, if no line break ends it.
     fn open_line(&self) -> Option<u64> {
         let ended = self.rest.last().is_none_or(|last| *last == self.terminator);
         let lines = memchr_iter(self.terminator, &self.rest).count() as u64;

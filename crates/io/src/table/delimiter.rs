@@ -10,7 +10,7 @@ pub(crate) enum Delimiter {
 }
 
 impl Delimiter {
-    /// Name of the format of such a text, for people.
+    /// Returns the name of the format of such a text, for messages.
     pub fn name(self) -> &'static str {
         match self {
             Delimiter::Byte(b';') => "text, fields between semicolons",
@@ -26,7 +26,7 @@ impl Delimiter {
     }
 }
 
-/// First bytes of comment lines; a semicolon only where it separates no fields.
+/// First bytes of comment lines; a semicolon only if it is not the delimiter.
 pub(crate) const COMMENTS: &[u8] = b"#%!;";
 
 /// Returns whether a line is a comment.
@@ -38,7 +38,7 @@ pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
     first.is_some_and(|first| COMMENTS.contains(first) && delimiter != Delimiter::Byte(*first))
 }
 
-/// The fields of a line that stand between blanks.
+/// Returns the fields of a line that are separated by blanks.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }

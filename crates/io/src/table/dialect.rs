@@ -1,4 +1,4 @@
-//! Dialect of a text: its delimiter and decimal sign, found from its first lines.
+//! Dialect of a text: delimiter and decimal sign, detected from its first lines.
 
 use memchr::memchr_iter;
 
@@ -7,27 +7,27 @@ use super::fields::Fields;
 use super::instant::Instant;
 use crate::contents::DecimalSign;
 
-/// Number of lines from which the delimiter and the decimal sign are found.
+/// Number of lines that are used to detect the delimiter and the decimal sign.
 const SAMPLE_LINES: usize = 8;
 
-/// Returns whether the beginning of a text has as many whole lines as [`detect`] looks at.
+/// Returns whether the beginning of a text has enough whole lines for [`detect`].
 pub(crate) fn is_sample(start: &[u8], terminator: u8) -> bool {
-    // The last line may be cut off, so one more is needed.
+    // One more line is needed, because the last one may be incomplete.
     sample(start, terminator).nth(SAMPLE_LINES).is_some()
 }
 
-/// Lines that are neither empty nor comments.
+/// Returns the lines that are neither empty nor comments.
 fn sample(text: &[u8], terminator: u8) -> impl Iterator<Item = &[u8]> {
     text.split(move |b| *b == terminator).filter(|line| {
-        // A semicolon may be a delimiter behind an empty field.
+        // A semicolon at the beginning of a line may be a delimiter after an empty field.
         let first = line.trim_ascii().first();
         first.is_some_and(|first| *first == b';' || !COMMENTS.contains(first))
     })
 }
 
-/// The delimiter of a text: the first of semicolon, tab and comma that stands outside quotes on
-/// most of the first lines (a decimal comma may stand between semicolons or tabs, so comma comes
-/// last), otherwise blanks.
+/// Returns the delimiter of a text: the first of semicolon, tab and comma that occurs outside
+/// quotes on most of the first lines, otherwise blanks. Comma comes last because it may be the
+/// decimal sign of numbers between semicolons or tabs.
 pub(crate) fn detect(text: &[u8], terminator: u8) -> Delimiter {
     let sample: Vec<&[u8]> = sample(text, terminator).take(SAMPLE_LINES).collect();
     let usual = |byte: u8| {
@@ -39,8 +39,8 @@ pub(crate) fn detect(text: &[u8], terminator: u8) -> Delimiter {
         .map_or(Delimiter::Blanks, Delimiter::Byte)
 }
 
-/// The decimal sign of most numbers on the first lines; `None` if no number has one, or as many have
-/// a point as a comma.
+/// Returns the decimal sign of most numbers on the first lines; `None` if no number has one, or if
+/// points and commas are equally frequent.
 pub(crate) fn decimal_sign(
     text: &[u8],
     terminator: u8,
@@ -79,15 +79,15 @@ fn outside_quotes(line: &[u8], byte: u8) -> bool {
     })
 }
 
-/// A number in a field.
+/// Number in a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Number {
     pub value: f64,
-    /// `None` if it has no decimal places.
+    /// Decimal sign; `None` for a number without decimal places.
     pub sign: Option<DecimalSign>,
 }
 
-/// The number in a field; `with_point` is room for one that has a comma.
+/// Returns the number in a field; `with_point` is a buffer for a number with a comma.
 pub(crate) fn number(
     field: &[u8],
     delimiter: Delimiter,

@@ -6,14 +6,14 @@ use memchr::{memchr, memchr_iter};
 
 use super::delimiter::{Delimiter, is_comment, words};
 
-/// The quote around fields that hold delimiters or line breaks.
+/// Quote around fields that contain delimiters or line breaks.
 const QUOTE: u8 = b'"';
 
 /// Separators of rows and fields.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
     pub delimiter: Delimiter,
-    /// Last byte of a line: a line feed, or a carriage return where there is none.
+    /// Last byte of a line: a line feed, or a carriage return in a text without line feeds.
     pub terminator: u8,
 }
 
@@ -26,16 +26,16 @@ pub(crate) struct Row<'a> {
     pub at: usize,
     /// Number of line ends before it in the text.
     pub line: u64,
-    /// Whether it holds a quote that may matter.
+    /// `true` if it has a quote that may enclose a field.
     pub is_quoted: bool,
 }
 
-/// The rows of a text that begins with a row.
+/// Iterator over the rows of a text that begins with a row.
 #[derive(Debug, Clone)]
 pub(crate) struct RowIter<'a> {
     text: &'a [u8],
     layout: Layout,
-    /// Whether quotes are looked for.
+    /// `true` if quotes are interpreted.
     has_quotes: bool,
     at: usize,
     line: u64,
@@ -47,7 +47,7 @@ impl<'a> RowIter<'a> {
         Self { text, layout, has_quotes, at: 0, line: 0 }
     }
 
-    /// Offset behind the last complete row or line, from which on the text is incomplete.
+    /// Returns the offset after the last complete row or line.
     pub fn complete(text: &'a [u8], layout: Layout) -> usize {
         let mut rows = Self::new(text, layout);
         if !rows.has_quotes {
@@ -62,7 +62,7 @@ impl<'a> RowIter<'a> {
         complete
     }
 
-    /// The next row, empty line or comment, and whether it has an end.
+    /// Returns the next row, empty line or comment, and whether it ends with a line break.
     fn next_line(&mut self) -> Option<(Row<'a>, bool)> {
         if self.at >= self.text.len() {
             return None;
@@ -86,7 +86,7 @@ impl<'a> RowIter<'a> {
                 if state != State::Quoted || !ended {
                     break;
                 }
-                // The line break belongs to the field.
+                // This line break is inside the quotes, so it belongs to the field.
                 from = end;
                 (end, ended) = end_from(end + 1);
                 self.line += 1;
@@ -116,15 +116,15 @@ impl<'a> Iterator for RowIter<'a> {
     }
 }
 
-/// Position in a row between delimiters and quotes, as RFC 4180 and the programs that stretch it
-/// have it: a quote counts at the beginning of a field only, two within a quoted field are one, and
-/// text behind the closing quote belongs to the field.
+/// Position in a row relative to delimiters and quotes, as in RFC 4180 and in programs that extend
+/// it: a quote counts only at the beginning of a field, two quotes within a quoted field stand for
+/// one, and text after the closing quote belongs to the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     FieldStart,
     Plain,
     Quoted,
-    /// Behind a quote within a quoted field.
+    /// After a quote within a quoted field.
     QuoteInQuoted,
 }
 
@@ -144,7 +144,7 @@ impl State {
     }
 }
 
-/// The fields of one row, without blanks around them and without their quotes.
+/// Fields of one row, without the blanks and the quotes around them.
 #[derive(Debug, Default)]
 pub(crate) struct Fields {
     text: Vec<u8>,
@@ -173,13 +173,13 @@ impl Fields {
         let mut state = State::FieldStart;
         let mut field = Vec::new();
         for (at, byte) in row.iter().enumerate() {
-            // A line break is a line feed, in whatever file.
+            // A line break inside a field is read as a line feed on every system.
             if *byte == b'\r' && row.get(at + 1) == Some(&b'\n') {
                 continue;
             }
             let next = state.next(*byte, delimiter);
             match (state, next) {
-                // A quote that opens or may close.
+                // This quote opens a field, or may close it.
                 (State::FieldStart, State::Quoted) | (_, State::QuoteInQuoted) => {}
                 (_, State::FieldStart) => {
                     self.push(&field);
@@ -198,17 +198,17 @@ impl Fields {
         self.ranges.push(from..self.text.len());
     }
 
-    /// Number of fields.
+    /// Returns the number of fields.
     pub fn len(&self) -> usize {
         self.ranges.len()
     }
 
-    /// Number of fields up to the last that is not empty.
+    /// Returns the number of fields up to the last one that is not empty.
     pub fn filled(&self) -> usize {
         self.ranges.iter().rposition(|range| !range.is_empty()).map_or(0, |last| last + 1)
     }
 
-    /// A field, empty beyond the last.
+    /// Returns a field; an empty one after the last.
     pub fn get(&self, field: usize) -> &[u8] {
         self.ranges.get(field).map_or(&[], |range| &self.text[range.clone()])
     }

@@ -6,24 +6,25 @@ use super::fields::{Fields, Layout, Row, RowIter};
 use super::rows::text_of;
 use crate::units::Unit;
 
-/// Number of rows that are looked at.
+/// Maximum number of rows in which the beginning of the table is searched for.
 const ROWS: usize = 24;
 
-/// Minimum number of rows of numbers that make a table.
+/// Minimum number of consecutive rows of numbers in a table.
 const MIN_NUMBERS: usize = 2;
 
-/// Names and units above the rows of numbers, where they are not simply the first row and perhaps the second.
+/// Names and units above the rows of numbers, if they are not just in the first row and perhaps the
+/// second.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heading {
     /// One name per column.
     pub names: Vec<String>,
     /// Texts for the units of the columns; empty if there is no such row.
     pub units: Vec<String>,
-    /// Row of numbers with which the table begins, counted from 0.
+    /// Row of numbers at which the table begins, counted from 0.
     pub begin: usize,
-    /// Row of the names, counted from 0; `None` if they stand in a comment.
+    /// Row of the names, counted from 0; `None` if they are in a comment.
     pub names_row: Option<usize>,
-    /// Number of fields of a row up to the last that is not empty, the smallest of the first rows.
+    /// Smallest number of fields, up to the last one that is not empty, in the first rows.
     pub filled: usize,
 }
 
@@ -45,8 +46,8 @@ pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
 }
 
 impl Heading {
-    /// Finds names and units above the numbers; `None` if the first row names the columns, perhaps with units in the
-    /// second, or if no row does.
+    /// Detects names and units above the numbers; `None` if the first row names the columns,
+    /// perhaps with units in the second row, or if no row does.
     pub fn find(text: &[u8], rows: &[Beginning<'_>], layout: Layout) -> Option<Self> {
         let is_numbers = |row: &Beginning<'_>| 2 * numbers(row, layout) >= row.fields.filled();
         let begin = rows.iter().rposition(|row| !is_numbers(row)).map_or(0, |last| last + 1);
@@ -56,18 +57,19 @@ impl Heading {
         }
         let (filled, width) = (table[0].fields.filled(), table[0].fields.len());
         let above = &rows[..begin];
-        // One name more than fields: all rows lack the last one, or all but a comment in the first.
-        let others = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(filled);
-        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == others);
-        let has_comment = others + 1 == filled
+        // There is one name more than fields: in all rows the last field is missing, or in all but
+        // the first row, whose extra field is a comment.
+        let usual = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(filled);
+        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == usual);
+        let has_comment = usual + 1 == filled
             && above.iter().flat_map(texts).any(|name| name.eq_ignore_ascii_case("comment"));
-        let filled = if has_comment && is_uniform { others } else { filled };
-        let is_longer = |row: &Beginning<'_>| is_uniform && row.fields.filled() == others + 1;
+        let filled = if has_comment && is_uniform { usual } else { filled };
+        let is_longer = |row: &Beginning<'_>| is_uniform && row.fields.filled() == usual + 1;
         let is_alike = |row: &Beginning<'_>| {
             let count = row.fields.filled();
             count == filled || is_longer(row) || row.fields.len() == width
         };
-        // A row of numbers alone is one of data, unless it numbers the channels.
+        // A row of numbers only is a row of data, unless it numbers the channels.
         let is_data_row = |(at, row): (usize, &Beginning<'_>)| {
             numbers(row, layout) == row.fields.filled() && !(at == 0 && is_numbering(row))
         };
@@ -77,18 +79,19 @@ impl Heading {
         let heading = |names: Vec<String>, units: Vec<String>, names_row: Option<usize>| {
             Some(Self { names, units, begin, names_row, filled })
         };
-        let comment = || of_comments(&text[..rows[0].row.at], width, layout);
+        let comment = || names_in_comments(&text[..rows[0].row.at], width, layout);
         match above {
             [] => {
-                let all = table.iter().all(|row| numbers(row, layout) == row.fields.filled());
-                let (names, units) = comment().filter(|_| all)?;
+                let are_numeric =
+                    table.iter().all(|row| numbers(row, layout) == row.fields.filled());
+                let (names, units) = comment().filter(|_| are_numeric)?;
                 heading(names, units, None)
             }
             [units] if is_units(units, layout) => {
                 let (names, _) = comment()?;
                 heading(names, texts(units), Some(0))
             }
-            [names] if is_longer(names) && others == filled && numbers(names, layout) == 0 => {
+            [names] if is_longer(names) && usual == filled && numbers(names, layout) == 0 => {
                 heading(texts(names), Vec::new(), Some(0))
             }
             [first, second] if !is_channels(first, layout) || is_units(second, layout) => {
@@ -111,7 +114,7 @@ impl Heading {
     }
 }
 
-/// Number of fields that are numbers or instants.
+/// Returns the number of fields that are numbers or instants.
 fn numbers(row: &Beginning<'_>, layout: Layout) -> usize {
     row.fields.iter().filter(|field| is_data(field, layout.delimiter)).count()
 }
@@ -155,10 +158,14 @@ fn is_channels(row: &Beginning<'_>, layout: Layout) -> bool {
     })
 }
 
-/// Names, and perhaps units, in the comments directly above a table of some columns.
-fn of_comments(above: &[u8], width: usize, layout: Layout) -> Option<(Vec<String>, Vec<String>)> {
+/// Returns names, and perhaps units, in the comments directly above a table of `width` columns.
+fn names_in_comments(
+    above: &[u8],
+    width: usize,
+    layout: Layout,
+) -> Option<(Vec<String>, Vec<String>)> {
     let mut lines = above.split(|b| *b == layout.terminator).rev().map(<[u8]>::trim_ascii_end);
-    // The last line ends with the terminator.
+    // The text ends with a terminator, after which there is no line.
     lines.next();
     let mut next = || {
         let line = lines.next().filter(|line| is_comment(line, layout.delimiter))?;
@@ -174,7 +181,7 @@ fn of_comments(above: &[u8], width: usize, layout: Layout) -> Option<(Vec<String
     })
 }
 
-/// The fields of a comment, if there is one for each column and none is a number.
+/// Returns the fields of a comment, if there is one per column and none is a number.
 fn fields_of(comment: &str, width: usize, layout: Layout) -> Option<Vec<String>> {
     let text = comment.trim_start_matches(['#', '%', '!', ';', ' ']);
     let split = |delimiter: Delimiter| -> Vec<String> {
@@ -200,7 +207,7 @@ fn fields_of(comment: &str, width: usize, layout: Layout) -> Option<Vec<String>>
     candidates.into_iter().find(|fields| fields.len() == width && fields.iter().all(is_name))
 }
 
-/// Words of which those in brackets belong to the one before: `time [s] acc [m/s^2]`.
+/// Joins words in brackets with the word before them: `time [s] acc [m/s^2]`.
 fn with_brackets_joined(words: Vec<String>) -> Vec<String> {
     let mut joined: Vec<String> = Vec::new();
     for word in words {

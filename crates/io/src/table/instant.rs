@@ -1,12 +1,13 @@
-//! Instants of dates and clocks: `2023-03-14T09:26:53.000`, `14.03.2023 09:26:53,5`, `09:26:53.589`.
+//! Instants as dates and clock times: `2023-03-14T09:26:53.000`, `14.03.2023 09:26:53,5`,
+//! `09:26:53.589`.
 
-/// Seconds of a day.
+/// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Longest text of an instant, in bytes.
+/// Maximum length of the text of an instant, in bytes.
 const MAX_BYTES: usize = 48;
 
-/// An instant: a day, counted from 1970-01-01, where there is a date, and seconds of the day.
+/// Instant: the day, counted from 1970-01-01, if there is a date, and the seconds of the day.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instant {
     pub day: Option<i64>,
@@ -31,14 +32,14 @@ impl Instant {
         Some(Self { day, seconds: seconds(clock.trim())? })
     }
 
-    /// Returns the seconds since the beginning of a day, counted from 1970-01-01.
+    /// Returns the seconds since the beginning of the day `origin`, counted from 1970-01-01.
     pub fn since(self, origin: i64) -> f64 {
         let days = self.day.map_or(0, |day| day - origin);
         days as f64 * DAY_S + self.seconds
     }
 }
 
-/// Reads a date as the number of its day from 1970-01-01: year first, or the year last.
+/// Reads a date, with the year first or last, and returns its day counted from 1970-01-01.
 fn date(text: &str) -> Option<i64> {
     let separator = ['-', '/', '.'].into_iter().find(|sign| text.contains(*sign))?;
     let mut parts = text.split(separator).map(|part| (part.len(), part.parse::<i64>().ok()));
@@ -48,7 +49,7 @@ fn date(text: &str) -> Option<i64> {
     }
     let (year, month, day) = match (first, second, third) {
         ((4, Some(year)), (1 | 2, Some(month)), (1 | 2, Some(day))) => (year, month, day),
-        // The day before the month, but with a stroke where only that can be.
+        // The day comes before the month, except with a slash if only the other order is possible.
         ((1 | 2, Some(a)), (1 | 2, Some(b)), (4, Some(year))) => {
             let month_first = separator == '/' && a <= 12;
             if month_first { (year, a, b) } else { (year, b, a) }
@@ -59,7 +60,7 @@ fn date(text: &str) -> Option<i64> {
     possible.then(|| day_number(year, month, day))
 }
 
-/// Number of a day of the Gregorian calendar, counted from 1970-01-01.
+/// Returns the number of a day of the Gregorian calendar, counted from 1970-01-01.
 ///
 /// # Source
 /// E. Hinnant, *chrono-Compatible Low-Level Date Algorithms*, `days_from_civil`.
@@ -71,7 +72,8 @@ fn day_number(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year - 719_468
 }
 
-/// Reads the time of a day, in s: `hh:mm`, `hh:mm:ss.fff`, `mm:ss.fff`, with AM or PM; a zone at the end is left out.
+/// Reads a time of day, in s: `hh:mm`, `hh:mm:ss.fff`, `mm:ss.fff`, with AM or PM; a time zone at
+/// the end is ignored.
 fn seconds(text: &str) -> Option<f64> {
     let lower = text.to_lowercase();
     let (text, half) = match (lower.strip_suffix("am"), lower.strip_suffix("pm")) {

@@ -1,4 +1,4 @@
-//! The contents of a file, column by column, usable or not.
+//! Survey of a file: which of its columns are usable, and their contents.
 
 use std::ops::ControlFlow;
 
@@ -8,39 +8,41 @@ use super::time_axis::Steps;
 use super::{RecordFile, time_unit};
 use crate::IoError;
 
-/// Result of reading a file to its end, with columns of which some may be unusable.
+/// Result of reading a file to its end; some columns may be unusable.
 #[derive(Debug)]
 pub struct Inventory {
-    /// Number of samples that most columns of the file have; in text, all of them.
+    /// Most frequent number of samples of a column; equal for all columns of a text.
     pub samples: usize,
-    /// Contents of each column asked for, or the reason why it cannot be used.
+    /// Contents of each requested column, or the reason why it cannot be used.
     pub columns: Vec<Result<Tally, IoError>>,
-    /// Time axis of the column of instants, if one is given, or the reason why it has none.
+    /// Time axis from the column of instants, if one is given, or the reason why it has none.
     pub sampling: Option<Result<Sampling, IoError>>,
     /// Last line of a text, counted from 1 in the file, if no line break ends it: the file may have
-    /// been cut off within its last number.
+    /// been truncated within its last number.
     pub open_line: Option<u64>,
-    /// Remarks on the end of a long text, which [`Table::remarks`](super::Table::remarks) does not have.
+    /// Remarks on the end of a long text, which are not in
+    /// [`Table::remarks`](super::Table::remarks).
     pub remarks: Vec<String>,
 }
 
 /// Contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
-    /// Number of its samples.
+    /// Number of samples.
     pub samples: usize,
     /// Mean of the samples, in the unit of the column.
     pub mean: f64,
 }
 
 impl RecordFile {
-    /// Reads columns to the end, by their indices, counted from 0, and the time axis from the column
-    /// `instants`, in its stated unit. On the way `take` gets every sample of each column that is usable so
-    /// far, in order: the place of the column in `columns`, the number of the first sample, counted from 0,
-    /// and this and further samples, in the unit of the column.
+    /// Reads columns to the end, by their indices, counted from 0, and the time axis from the
+    /// column `instants`, in its stated unit. In the same pass, `take` receives every sample of
+    /// each column that is usable so far, in order: the index of the column in `columns`, the
+    /// number of the first sample, counted from 0, and this and further samples, in the unit of the
+    /// column.
     ///
     /// # Errors
-    /// Errors of a column or of the time axis are part of the result, as by
+    /// Errors of a column or of the time axis are part of the result, as in
     /// [`Table::column`](super::Table::column) and [`Table::sampling`](super::Table::sampling);
     /// those of the file are those of [`Table::read_with`](super::Table::read_with).
     ///
@@ -64,7 +66,7 @@ impl RecordFile {
             let mut steps = Steps::default();
             let times = self.head.values(column)?;
             for (k, time) in times.iter().enumerate() {
-                steps.push(*time, || self.head.place(k));
+                steps.push(*time, || self.head.position(k));
             }
             self.sampling_of(column, steps, times.len())
         };
@@ -83,7 +85,7 @@ impl RecordFile {
         instants: Option<usize>,
         take: &mut dyn FnMut(usize, usize, &[f64]),
     ) -> Result<Inventory, IoError> {
-        // The sum of no numbers, as of a column in memory.
+        // The sum of no numbers is −0 in Rust, as for a column in memory.
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();
@@ -96,7 +98,7 @@ impl RecordFile {
             }
             for times in instants.iter().flat_map(|column| &rows.column(*column).values) {
                 for (k, time) in (first..).zip(times) {
-                    steps.push(*time, || rows.lines().place(k));
+                    steps.push(*time, || rows.lines().position(k));
                 }
             }
             Ok::<_, IoError>(ControlFlow::Continue(()))
@@ -123,7 +125,7 @@ impl RecordFile {
         })
     }
 
-    /// The time axis of `len` samples at the instants of a column.
+    /// Returns the time axis of `len` samples at the instants of a column.
     pub(super) fn sampling_of(
         &self,
         column: usize,

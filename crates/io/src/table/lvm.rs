@@ -7,24 +7,24 @@ use memchr::memmem;
 
 use super::rows::text_of;
 
-/// First words of such a file.
+/// First bytes of such a file.
 const MAGIC: &[u8] = b"LabVIEW Measurement";
 
-/// Line that ends the header of the file, and that of each segment.
+/// Line that ends the header of the file, and the header of each segment.
 const END: &[u8] = b"***End_of_Header***";
 
 /// Name of a column of instants.
 pub(super) const X: &str = "X_Value";
 
-/// Largest header, in bytes.
+/// Maximum length of the header, in bytes.
 pub(super) const MAX_BYTES: usize = 1 << 20;
 
 /// Header of a LabVIEW measurement file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LvmHeader {
-    /// Number of its lines.
+    /// Number of lines of the header.
     pub lines: u64,
-    /// Number of its bytes.
+    /// Number of bytes of the header.
     pub bytes: usize,
     /// Text for the unit of each channel.
     pub units: Vec<String>,
@@ -34,14 +34,14 @@ pub(super) struct LvmHeader {
     pub instants: Instants,
 }
 
-/// Columns of instants in the table.
+/// Number of columns of instants in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Instants {
-    /// None; the first field of a row is empty.
+    /// No column; the first field of a row is empty.
     No,
-    /// One for all channels.
+    /// One column for all channels.
     One,
-    /// One before each channel.
+    /// One column before each channel.
     Each,
 }
 
@@ -50,23 +50,23 @@ pub(super) fn is_lvm(text: &[u8]) -> bool {
     text.starts_with(MAGIC)
 }
 
-/// Returns whether the text reaches beyond the headers.
+/// Returns whether the text has the end of the headers.
 pub(super) fn is_complete(text: &[u8]) -> bool {
     LvmHeader::parse(text, b'\n').is_some_and(|header| text[header.bytes..].contains(&b'\n'))
 }
 
 impl LvmHeader {
-    /// Reads the header of the file and that of its first segment; `None` if there is none.
+    /// Reads the headers of the file and of its first segment; `None` if there is none.
     pub fn parse(text: &[u8], terminator: u8) -> Option<Self> {
         let start = &text[..text.len().min(MAX_BYTES)];
         let mut ends = memmem::find_iter(start, END);
         let first = ends.next()?;
-        // A second one belongs to the segment unless the table has begun before it.
+        // A second header belongs to the segment, unless it follows the beginning of the table.
         let table = memmem::find(&start[first..], X.as_bytes()).map(|at| first + at);
         let last =
             ends.next().filter(|end| table.is_none_or(|table| *end < table)).unwrap_or(first);
         let mut bytes = last + start[last..].iter().position(|b| *b == terminator)? + 1;
-        // Empty lines above the names.
+        // Skips empty lines above the names.
         while let Some(len) = start[bytes..].iter().position(|b| *b == terminator)
             && start[bytes..bytes + len].trim_ascii().is_empty()
         {
@@ -106,7 +106,7 @@ impl LvmHeader {
         Some(header)
     }
 
-    /// Returns the column of a channel, both counted from 0.
+    /// Returns the column of a channel; both are counted from 0.
     pub fn column(&self, channel: usize) -> usize {
         match self.instants {
             Instants::No | Instants::One => channel + 1,

@@ -1,4 +1,4 @@
-//! A table of columns as a measuring program writes it.
+//! Table of the columns of a record file.
 
 mod batch;
 mod blocks;
@@ -38,31 +38,31 @@ use crate::units::{
 };
 use crate::{IoError, escaped, mat, uff};
 
-/// Number of columns that a message lists.
+/// Maximum number of columns that a message lists.
 const MOST_LISTED: usize = 50;
 
-/// The columns of a record file, whatever its format.
+/// Columns of a record file of any format.
 ///
 /// | Format | Recognised by | Columns |
 /// |---|---|---|
 /// | delimited text | none of the others | fields of a row |
-/// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, columns of matrices, fields of structs |
-/// | MATLAB 7.3, HDF5 | its first bytes | data sets by their paths, columns of matrices, fields of structs |
-/// | universal file, datasets 58 and 58b | `    -1` in its first line | functions of time, by node and direction |
+/// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, matrix columns, struct fields |
+/// | MATLAB 7.3, HDF5 | its first bytes | data sets by path, matrix columns, struct fields |
+/// | universal file, datasets 58, 58b | `    -1` in its first line | functions of time, by node |
 /// | gzip around any of them | its first two bytes | |
 ///
 /// In text:
 ///
-/// - The delimiter (comma, semicolon, tab, blanks) and the decimal sign are detected; a decimal comma
-///   needs another delimiter.
+/// - The delimiter (comma, semicolon, tab, blanks) and the decimal sign are detected; a decimal
+///   comma needs another delimiter.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
-///   numbers only. A second row without any number holds their units.
-/// - Lines that start with `#`, and empty lines, are skipped; so are header lines above the table, by
-///   [`ReadOptions::skip_lines`].
+///   numbers only. A second row without any number gives their units.
+/// - Lines that start with `#`, and empty lines, are skipped; so are header lines above the table,
+///   by [`ReadOptions::skip_lines`].
 /// - UTF-16 is read if the file begins with a byte order mark.
 ///
 /// A column is chosen by its name, or by its number counted from 1; a column that is not used may
-/// hold anything. Only the numbers are kept in memory, not the text.
+/// have any contents. Only the numbers are kept in memory, not the text.
 #[derive(Debug)]
 pub struct Table {
     file: String,
@@ -72,13 +72,13 @@ pub struct Table {
     contents: Contents,
 }
 
-/// The first rows of a file.
+/// First rows of a file.
 struct FirstRows {
     table: Table,
-    /// Whether these are all.
+    /// `true` if the file has no further rows.
     is_whole: bool,
     decimal: Option<DecimalSign>,
-    /// Counter of the bytes that the file has stored, as far as it was read.
+    /// Number of stored bytes of the file that were read.
     stored: Stored,
 }
 
@@ -97,17 +97,17 @@ impl Table {
     /// As [`Table::read`], and [`IoError::NothingToSkip`] for lines to be skipped in a file that is
     /// no text.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, IoError> {
-        Self::of_source(Source::open(path.as_ref())?, options)
+        Self::from_source(Source::open(path.as_ref())?, options)
     }
 
     /// Reads the table in the bytes of a file; `file` is its name in messages.
     ///
     /// # Errors
-    /// [`IoError::Empty`] without data, [`IoError::Ragged`] where the number of fields changes,
-    /// [`IoError::AboveTable`] where that is because of text above the table,
-    /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
-    /// universal file that breaks its format, [`IoError::Parquet`], [`IoError::Hdf5`], [`IoError::UnknownFormat`],
-    /// [`IoError::TooLarge`] beyond the [`Limits`](crate::Limits).
+    /// [`IoError::Empty`] without data, [`IoError::Ragged`] if the number of fields changes,
+    /// [`IoError::AboveTable`] if it changes because of text above the table,
+    /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or universal
+    /// file that breaks its format, [`IoError::Parquet`], [`IoError::Hdf5`],
+    /// [`IoError::UnknownFormat`], [`IoError::TooLarge`] beyond the [`Limits`](crate::Limits).
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
         Self::parse_with(file, bytes, &ReadOptions::default())
     }
@@ -121,15 +121,15 @@ impl Table {
         bytes: &[u8],
         options: &ReadOptions,
     ) -> Result<Self, IoError> {
-        Self::of_source(Source::new(file.into(), bytes)?, options)
+        Self::from_source(Source::new(file.into(), bytes)?, options)
     }
 
     /// Reads the table of a source.
-    pub(crate) fn of_source(source: Source<'_>, options: &ReadOptions) -> Result<Self, IoError> {
+    pub(crate) fn from_source(source: Source<'_>, options: &ReadOptions) -> Result<Self, IoError> {
         Ok(Self::first_rows(source, options, usize::MAX)?.table)
     }
 
-    /// Reads a table, of a text at most the first `limit` rows and one more.
+    /// Reads a table; of a text, at most the first `limit` rows and one more.
     fn first_rows(
         mut source: Source<'_>,
         options: &ReadOptions,
@@ -180,54 +180,56 @@ impl Table {
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
         contents.check_names(&file, &options.limits)?;
-        let table = Self { gzip, utf16, ..Self::of_contents(file, contents) };
+        let table = Self { gzip, utf16, ..Self::from_contents(file, contents) };
         Ok(FirstRows { table, is_whole, decimal, stored })
     }
 
-    /// Takes named columns from memory; `name` is that of the table in messages. A unit may stand in the
-    /// name of a column, as in a file; one that holds infinite numbers or NaN is refused where it is used.
+    /// Creates a table from named columns in memory; `name` is that of the table in messages. The
+    /// name of a column may have a unit, as in a file; a column with infinite numbers or NaN is
+    /// refused when it is used.
     pub fn from_columns(
         name: impl Into<String>,
         columns: impl IntoIterator<Item = (String, Vec<f64>)>,
     ) -> Self {
-        let columns = columns.into_iter().map(|(name, values)| Column::of_numbers(name, values));
+        let columns = columns.into_iter().map(|(name, values)| Column::from_numbers(name, values));
         let contents = Contents {
             format: "columns in memory".into(),
             columns: columns.collect(),
             ..Contents::default()
         };
-        Self::of_contents(name.into(), contents.with_usual_length())
+        Self::from_contents(name.into(), contents.with_usual_length())
     }
 
-    /// A table of what was read from a file.
-    pub(crate) fn of_contents(file: String, contents: Contents) -> Self {
+    /// Creates a table from the contents of a file.
+    pub(crate) fn from_contents(file: String, contents: Contents) -> Self {
         let names = contents.columns.iter().map(|column| column.name.clone()).collect();
         Self { file, gzip: false, utf16: false, names, contents }
     }
 
-    /// Name of the file in messages.
+    /// Returns the name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Name of the format, for people.
+    /// Returns the name of the format, for messages.
     pub fn format(&self) -> String {
         let encoding = if self.utf16 { ", in UTF-16" } else { "" };
         let around = if self.gzip { ", in gzip" } else { "" };
         format!("{}{encoding}{around}", self.contents.format)
     }
 
-    /// Arrays of complex numbers beside the columns.
+    /// Returns the arrays of complex numbers, which are not columns.
     pub(crate) fn complex(&self) -> &[ComplexArray] {
         &self.contents.complex
     }
 
-    /// Number of columns, nameless ones included.
+    /// Returns the number of columns, including those without a name.
     pub fn width(&self) -> usize {
         self.names.len()
     }
 
-    /// Most frequent number of samples of a column; in text, that of all.
+    /// Returns the most frequent number of samples of a column; it is equal for all columns of a
+    /// text.
     pub fn len(&self) -> usize {
         self.contents.samples
     }
@@ -237,12 +239,12 @@ impl Table {
         self.len() == 0
     }
 
-    /// Names of the columns, empty for columns without a name.
+    /// Returns the names of the columns, empty for columns without a name.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Description of a column in the file besides its name, by its index counted from 0.
+    /// Returns the description of a column in addition to its name, by its index counted from 0.
     ///
     /// # Panics
     /// If there is no such column.
@@ -250,14 +252,15 @@ impl Table {
         &self.contents.columns[column].about
     }
 
-    /// Text for the unit of a column in a line of units, a label or an attribute, by its index; empty if there is none.
+    /// Returns the text for the unit of a column in a line of units, a label or an attribute, by
+    /// its index; empty if there is none.
     pub(crate) fn unit_text(&self, column: usize) -> &str {
         &self.contents.columns[column].unit
     }
 
-    /// The unit in which the numbers of a column are taken, by its index counted from 0: in its name in brackets
-    /// (`Force [kN]`, `[mm] x`), after a stroke (`F / kN`) or as a word (`force_lbf`), or in the line of units.
-    /// [`Table::to_si`] has the factor.
+    /// Returns the unit of the numbers of a column, by its index counted from 0: the name states it
+    /// in brackets (`Force [kN]`, `[mm] x`), after a stroke (`F / kN`) or as a word (`force_lbf`),
+    /// or the line of units does. [`Table::to_si`] returns the factor.
     ///
     /// # Panics
     /// If there is no such column.
@@ -265,8 +268,8 @@ impl Table {
         self.stated_unit(column, None)?.used().cloned()
     }
 
-    /// Returns what a column states about its unit, by its index counted from 0, where it should
-    /// hold a quantity: the unit, or a text that may be one and is not understood.
+    /// Returns what a column, by its index counted from 0, states about its unit if it should have
+    /// the quantity `wanted`: the unit, or a text that may be a unit and is not understood.
     ///
     /// # Panics
     /// If there is no such column.
@@ -287,10 +290,12 @@ impl Table {
         }
     }
 
-    /// States the unit of a column, whatever its name says; the column is chosen as in [`Table::find`].
+    /// Sets the unit of a column and ignores the unit in its name; the column is chosen as in
+    /// [`Table::find`].
     ///
     /// # Errors
-    /// [`IoError::NoUnit`] if the text is no unit of a force, a response or a time, and those of [`Table::find`].
+    /// [`IoError::NoUnit`] if the text is not a unit of a force, a response or a time, and those of
+    /// [`Table::find`].
     pub fn set_unit(&mut self, column: &str, unit: &str) -> Result<(), IoError> {
         let at = self.find(column)?;
         let unit = Unit::parse(unit).ok_or_else(|| IoError::NoUnit { text: unit.into() })?;
@@ -298,11 +303,12 @@ impl Table {
         Ok(())
     }
 
-    /// States the factor that takes a column to SI units, in SI units per unit of the column; the column is chosen as in
-    /// [`Table::find`].
+    /// Sets the factor that converts a column to SI units, in SI units per unit of the column; the
+    /// column is chosen as in [`Table::find`].
     ///
     /// # Errors
-    /// [`IoError::NoScale`] unless the factor is finite and not 0, and those of [`Table::find`].
+    /// [`IoError::NoScale`] unless the factor is finite and not 0, and the errors of
+    /// [`Table::find`].
     pub fn set_scale(&mut self, column: &str, factor: f64) -> Result<(), IoError> {
         let at = self.find(column)?;
         if !factor.is_normal() {
@@ -312,8 +318,8 @@ impl Table {
         Ok(())
     }
 
-    /// Factor that takes a column, by its index counted from 0, to the SI unit of `wanted` (N, m, m/s,
-    /// m/s²): 1 where it says no unit.
+    /// Returns the factor that converts a column, by its index counted from 0, to the SI unit of
+    /// `wanted` (N, m, m/s, m/s²): 1 if it states no unit.
     ///
     /// # Errors
     /// [`IoError::OtherQuantity`] if its unit is one of another quantity.
@@ -334,20 +340,19 @@ impl Table {
         }
     }
 
-    /// Single numbers that the file holds beside its columns.
+    /// Returns the single numbers that the file has in addition to its columns.
     pub fn scalars(&self) -> &[(String, f64)] {
         &self.contents.scalars
     }
 
-    /// Further information from the file: its units, or what was left out of it.
+    /// Returns notes about the file, such as its units or what was left out.
     pub fn remarks(&self) -> &[String] {
         &self.contents.remarks
     }
 
-    /// Returns whether columns have a time axis in the file, [`TimeAxis::OfFile`]: that of a universal
-    /// file,
-    /// or the rate that a number in a MATLAB file states by its name (`Fs`, `dt`) where no column is
-    /// called time.
+    /// Returns whether columns have a time axis in the file, [`TimeAxis::OfFile`]: that of a
+    /// universal file, or the rate that a named number in a MATLAB file states (`Fs`, `dt`) if no
+    /// column is called time.
     pub fn has_time_axis(&self) -> bool {
         self.contents.columns.iter().any(|column| match column.axis {
             Axis::Unknown => false,
@@ -356,8 +361,8 @@ impl Table {
         })
     }
 
-    /// Name and value of the number beside the columns (`Fs`, `dt`) that states their sampling rate, where
-    /// [`TimeAxis::OfFile`] is taken from one.
+    /// Returns name and value of the number (`Fs`, `dt`) that states the sampling rate, if
+    /// [`TimeAxis::OfFile`] comes from such a number.
     pub fn stated_rate(&self) -> Option<&(String, f64)> {
         let stated = self.contents.columns.iter().find_map(|column| match column.axis {
             Axis::Stated { scalar, .. } => Some(scalar),
@@ -366,7 +371,8 @@ impl Table {
         stated.filter(|_| self.time_column().is_none()).map(|at| &self.contents.scalars[at])
     }
 
-    /// The first column named `time` or `t`, in any case, with a unit (`time_ms`, `Time [s]`) or without.
+    /// Returns the first column named `time` or `t`, in upper or lower case, with a unit
+    /// (`time_ms`, `Time [s]`) or without.
     pub fn time_column(&self) -> Option<&str> {
         let is_time = |at: &usize| {
             let column = &self.contents.columns[*at];
@@ -376,9 +382,8 @@ impl Table {
         (0..self.width()).find(is_time).map(|at| self.names[at].as_str())
     }
 
-    /// Returns whether a time column, by its index counted from 0, states its unit, in its name or in
-    /// the line
-    /// of units; otherwise it is taken as seconds.
+    /// Returns whether a time column, by its index counted from 0, states its unit, in its name or
+    /// in the line of units; otherwise it is read in seconds.
     ///
     /// # Panics
     /// If there is no such column.
@@ -387,7 +392,8 @@ impl Table {
         column.has_instants || time_unit::unit_of(column).is_some()
     }
 
-    /// Returns the first column that is called time and states a unit that is not one of time, with that text.
+    /// Returns the first column that is called time but states a unit of another quantity, with the
+    /// text of that unit.
     pub fn unclear_time(&self) -> Option<(usize, String)> {
         (0..self.width()).find_map(|at| {
             let column = &self.contents.columns[at];
@@ -396,37 +402,37 @@ impl Table {
         })
     }
 
-    /// Indices, counted from 0, of the columns that have a name or a first value; a trailing delimiter
-    /// makes a column without either.
+    /// Returns the indices, counted from 0, of the columns that have a name or a first value; a
+    /// column that a trailing delimiter creates has neither.
     pub fn filled_columns(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.width()).filter(|c| self.contents.columns[*c].filled)
     }
 
-    /// Place of a sample, counted from 0, in the file.
-    pub fn place(&self, sample: usize) -> Place {
-        self.contents.lines.place(sample)
+    /// Returns the position in the file of a sample, counted from 0.
+    pub fn position(&self, sample: usize) -> Place {
+        self.contents.lines.position(sample)
     }
 
-    /// List of the columns, for a message: `1 "time", 2 "force"`; of the first ones if there are very
-    /// many.
+    /// Returns a list of the columns, for a message: `1 "time", 2 "force"`; only of the first ones
+    /// if there are very many.
     pub fn available(&self) -> String {
         self.list(self.filled_columns())
     }
 
-    /// List of columns by their indices, of the first ones if there are very many.
+    /// Returns a list of columns by their indices; only of the first ones if there are very many.
     fn list(&self, mut columns: impl Iterator<Item = usize>) -> String {
         let mut list: Vec<String> =
             columns.by_ref().take(MOST_LISTED).map(|c| self.label(c)).collect();
-        let others = columns.count();
-        if others > 0 {
-            list.push(format!("… ({others} more)"));
+        let unlisted = columns.count();
+        if unlisted > 0 {
+            list.push(format!("… ({unlisted} more)"));
         }
         list.join(", ")
     }
 
-    /// Index, counted from 0, of the column with this name; failing that, of the one with this name
-    /// without its unit (`Fx` for `Fx [N]`), in this case or in another; failing that, of the one with this
-    /// number, counted from 1.
+    /// Returns the index, counted from 0, of the column with this name; if there is none, of the
+    /// one with this name without its unit (`Fx` for `Fx [N]`), then of the one with this name in
+    /// another case; finally, of the one with this number, counted from 1.
     ///
     /// # Errors
     /// [`IoError::MissingColumn`], [`IoError::AmbiguousColumn`].
@@ -468,23 +474,23 @@ impl Table {
         named.or_else(number).ok_or_else(missing)
     }
 
-    /// The numbers of the column `wanted`, chosen as in [`Table::find`].
+    /// Returns the numbers of the column `wanted`, chosen as in [`Table::find`].
     ///
     /// # Errors
-    /// [`IoError::NotANumber`], [`IoError::EmptyField`] and [`IoError::NotFinite`] with the place of
-    /// the first one, [`IoError::NoNumbers`], and those of [`Table::find`].
+    /// [`IoError::NotANumber`], [`IoError::EmptyField`] and [`IoError::NotFinite`] with the
+    /// position of the first one, [`IoError::NoNumbers`], and the errors of [`Table::find`].
     pub fn column(&self, wanted: &str) -> Result<&[f64], IoError> {
         self.values(self.find(wanted)?)
     }
 
-    /// The time axis of the columns `wanted`, or, if none is named, of those that have as many
-    /// samples as most.
+    /// Returns the time axis of the columns `wanted`; if none is named, of the columns with the
+    /// most frequent number of samples.
     ///
     /// # Errors
     /// [`IoError::NonUniformTime`], [`IoError::SingleSample`], [`IoError::SampleRate`];
     /// [`IoError::Lengths`] if the columns are not equally long; [`IoError::NoTimeAxis`],
-    /// [`IoError::TimeAxes`] and [`IoError::RateContradicts`] where columns bring their own time
-    /// axes; and those of [`Table::column`].
+    /// [`IoError::TimeAxes`] and [`IoError::RateContradicts`] if columns have time axes of their
+    /// own; and the errors of [`Table::column`].
     pub fn sampling(
         &self,
         time: &TimeAxis<'_>,
@@ -499,8 +505,9 @@ impl Table {
         time.sampling(self, &columns)
     }
 
-    /// A record of the columns `wanted`, one channel each, on the given time axis. The numbers are
-    /// those of the file, in the units that its columns say: [`Table::to_si`] has the factors.
+    /// Returns a record of the columns `wanted`, one channel each, on the given time axis. The
+    /// numbers are those of the file, in the units that its columns state: [`Table::to_si`] returns
+    /// the factors.
     ///
     /// # Errors
     /// [`IoError::DuplicateColumn`] if a column is used twice (the time column included), and those
@@ -521,7 +528,7 @@ impl Table {
         self.signal(Record::new(sampling, data))
     }
 
-    /// The indices of the columns `wanted`, each used once, and not for the instants too.
+    /// Returns the indices of the columns `wanted`, each used once and not as the time column, too.
     fn record_columns(
         &self,
         time: &TimeAxis<'_>,
@@ -539,7 +546,7 @@ impl Table {
         made.map_err(|source| IoError::Signal { file: self.file.clone(), source })
     }
 
-    /// The indices of columns, each used once.
+    /// Returns the indices of columns, each used once.
     fn distinct(&self, wanted: &[&str]) -> Result<Vec<usize>, IoError> {
         let columns: Vec<usize> = wanted.iter().map(|w| self.find(w)).collect::<Result<_, _>>()?;
         for (second, column) in columns.iter().enumerate() {
@@ -556,17 +563,17 @@ impl Table {
         Ok(columns)
     }
 
-    /// The common number of samples of the columns `wanted`.
+    /// Returns the common number of samples of the columns `wanted`.
     ///
     /// # Errors
-    /// [`IoError::Lengths`] if they differ, and those of [`Table::column`].
+    /// [`IoError::Lengths`] if they differ, and the errors of [`Table::column`].
     pub fn common_length(&self, wanted: &[impl AsRef<str>]) -> Result<usize, IoError> {
         let columns: Vec<usize> =
             wanted.iter().map(|w| self.find(w.as_ref())).collect::<Result<_, _>>()?;
         time_axis::common_length(self, &columns)
     }
 
-    /// The numbers of a column, by its index counted from 0.
+    /// Returns the numbers of a column, by its index counted from 0.
     ///
     /// # Errors
     /// As [`Table::column`].
@@ -580,13 +587,13 @@ impl Table {
         }
     }
 
-    /// The time axis of a column in the file, by its index.
+    /// Returns the time axis of a column in the file, by its index.
     pub(crate) fn axis(&self, column: usize) -> Axis {
         self.contents.columns[column].axis
     }
 
-    /// Name of a column for results, by its index counted from 0: without its unit, control characters
-    /// shown; `column 2` where it has none.
+    /// Returns the name of a column for results, by its index counted from 0: without its unit,
+    /// with control characters escaped; `column 2` if it has none.
     ///
     /// # Panics
     /// If there is no such column.
@@ -597,7 +604,7 @@ impl Table {
         }
     }
 
-    /// Number and name of a column for a message, by its index counted from 0: `2 "force"`.
+    /// Returns number and name of a column for a message, by its index counted from 0: `2 "force"`.
     ///
     /// # Panics
     /// If there is no such column.

@@ -1,13 +1,13 @@
-//! The line on which a table begins below other text.
+//! Detection of the line at which a table begins below other text.
 
 use super::delimiter::is_comment;
 use super::dialect::{detect, is_data};
 use super::fields::{Fields, Layout, Row, RowIter};
 
-/// Number of rows looked at: a header, units, and numbers.
+/// Number of rows that are checked: a header, units, and numbers.
 const ROWS: usize = 4;
 
-/// Maximum number of lines above a table; one further down is not found.
+/// Maximum number of lines above a table; a table further down is not detected.
 const MOST_LINES: usize = 5000;
 
 /// Beginning of a table.
@@ -19,21 +19,21 @@ pub(crate) struct Beginning {
     pub fields: usize,
 }
 
-/// Finds the first line from which on rows have the same number of fields, two or more, and are
-/// numbers below at most two rows of words.
+/// Returns the first line after which rows have the same number of fields, two or more, and are
+/// numbers after at most two rows of words.
 pub(crate) fn table(text: &[u8], terminator: u8) -> Option<Beginning> {
-    let mut rest = text;
+    let mut remaining = text;
     for line in (1..).take(MOST_LINES) {
-        if let Some(fields) = begins(rest, terminator) {
+        if let Some(fields) = begins(remaining, terminator) {
             return Some(Beginning { line, fields });
         }
-        let end = rest.iter().position(|b| *b == terminator)?;
-        rest = &rest[end + 1..];
+        let end = remaining.iter().position(|b| *b == terminator)?;
+        remaining = &remaining[end + 1..];
     }
     None
 }
 
-/// Number of fields of the rows, if a table begins here.
+/// Returns the number of fields of the rows, if a table begins at this line.
 fn begins(text: &[u8], terminator: u8) -> Option<usize> {
     let delimiter = detect(text, terminator);
     let rows = first_rows(text, Layout { delimiter, terminator });
@@ -50,7 +50,7 @@ fn begins(text: &[u8], terminator: u8) -> Option<usize> {
     table.then_some(width)
 }
 
-/// The first rows; none if the first line is empty or a comment.
+/// Returns the first rows; none if the first line is empty or a comment.
 fn first_rows(text: &[u8], layout: Layout) -> Vec<Fields> {
     let first = text.split(|b| *b == layout.terminator).next().unwrap_or_default();
     if first.trim_ascii().is_empty() || is_comment(first.trim_ascii(), layout.delimiter) {

@@ -1,35 +1,37 @@
-//! Instants that were rounded to the digits with which they are printed.
+//! Instants that are rounded to the digits with which they are printed.
 
-/// Rounding over the step from which on instants are too coarse: a missing sample could pass for
-/// rounding.
+/// Maximum rounding error of the instants in steps; above it, a missing sample could not be
+/// distinguished from rounding.
 const COARSEST: f64 = 1.0;
 
-/// The same of fewer instants than [`FEW`], which could be rounded ones whatever they are.
+/// Maximum rounding error, in steps, of fewer instants than [`FEW`], with which almost any spacing
+/// agrees.
 const COARSEST_OF_FEW: f64 = 0.5;
 
-/// Number of instants that tell rounding from uneven steps.
+/// Minimum number of instants with which rounding can be distinguished from uneven steps.
 const FEW: usize = 16;
 
-/// Part of a step by which instants may miss equally spaced ones beyond their rounding.
+/// Maximum deviation of instants from equal spacing, in addition to their rounding, in steps.
 const SLACK: f64 = 0.01;
 
-/// Number of corners of a hull beyond which the instants lie on a curve: those of rounded ones grow with
-/// the third root of their number.
+/// Maximum number of corners of an envelope; with more, the instants are on a curve: for rounded
+/// instants the number of corners grows only with the cube root of their number.
 const MOST_CORNERS: usize = 1 << 16;
 
-/// Digits of a double, beyond which no decimal rounding shows.
+/// Number of digits of a double; a rounding beyond it is not visible.
 const DOUBLE_DIGITS: i32 = 17;
 
-/// Number of instants, the first ones, that are looked at once their digits are known.
+/// Number of first instants that are stored and checked once their digits are known.
 const BEGINNING: usize = 1024;
 
-/// A test whether instants, taken one by one, are equally spaced but for rounding.
+/// Test whether instants, passed one by one, are equally spaced except for rounding.
 ///
-/// The unit of the last digit is taken from the numbers themselves: the largest numbers of decimal
-/// places and of significant digits seen. Each instant was somewhere within half a unit of what is
-/// printed; the instants are equally spaced as long as a straight line passes through all of these
-/// intervals. There is one if the concave envelope of their lower ends lies below the convex envelope of
-/// their upper ends, which takes one pass and few corners.
+/// The unit of the last digit is determined from the numbers themselves: the largest numbers of
+/// decimal places and of significant digits so far. The true value of each instant is within half a
+/// unit of the printed one; the instants are equally spaced as long as a straight line passes
+/// through all of these intervals. There is one if the concave envelope of their lower ends lies
+/// below the convex envelope of their upper ends, which can be tested in one pass and with few
+/// corners.
 #[derive(Debug)]
 pub(super) struct PrintedInstants {
     count: usize,
@@ -38,33 +40,33 @@ pub(super) struct PrintedInstants {
     /// Largest number of decimal places and of significant digits so far.
     decimals: i32,
     digits: i32,
-    /// Whether all are single precision.
+    /// `true` if all instants are single-precision numbers.
     is_single: bool,
-    /// Whether the distance of any from the first one overflows.
+    /// `true` if the difference between any instant and the first one overflows.
     overflows: bool,
-    /// Rounding unit of the instants within a decade.
+    /// Rounding unit of the instants in the current decade.
     decade: Decade,
     beginning: Vec<f64>,
-    /// Intervals of the instants behind the beginning.
+    /// Intervals of the instants after the first ones.
     intervals: Intervals,
 }
 
-/// Intervals through which a straight line is to pass, by their number.
+/// Intervals through which a straight line should pass, at their numbers.
 #[derive(Debug, Clone, Default)]
 struct Intervals {
     /// Corners of the concave envelope of the lower ends.
     lower_ends: Vec<Corner>,
     /// Corners of the convex envelope of the upper ends, with the opposite sign.
     upper_ends: Vec<Corner>,
-    /// More corners than rounding makes.
+    /// `true` if there are more corners than rounding creates.
     is_curved: bool,
 }
 
-/// A corner of an envelope: number of the interval, and end.
+/// Corner of an envelope: number of the interval, and value of its end.
 type Corner = (f64, f64);
 
 impl Intervals {
-    /// Adds the interval behind all others.
+    /// Adds the interval after all others.
     fn push(&mut self, number: f64, middle: f64, half: f64) {
         if self.is_curved {
             return;
@@ -76,20 +78,20 @@ impl Intervals {
         }
     }
 
-    /// Adds the intervals of `others`, which are behind all of these.
+    /// Adds the intervals of `others`, which come after all of these.
     fn append(&mut self, others: &Self) {
         self.is_curved |= others.is_curved;
         others.lower_ends.iter().for_each(|corner| add_corner(&mut self.lower_ends, *corner));
         others.upper_ends.iter().for_each(|corner| add_corner(&mut self.upper_ends, *corner));
     }
 
-    /// Returns how much all intervals must grow in all for a line to pass through them; zero or less if
-    /// one does.
+    /// Returns by how much all intervals together would have to grow for a line to pass through
+    /// them; zero or less if one does.
     fn overlap(&self) -> f64 {
         if self.is_curved {
             return f64::INFINITY;
         }
-        // The sum of two concave functions is largest at a corner of either.
+        // The sum of two concave functions is largest at a corner of one of them.
         let at_corners = |corners: &[Corner], others: &[Corner]| {
             let mut from = 0;
             let mut largest = f64::NEG_INFINITY;
@@ -108,10 +110,10 @@ impl Intervals {
     }
 }
 
-/// Adds a point behind all corners of a concave envelope.
+/// Adds a point after all corners of a concave envelope.
 fn add_corner(corners: &mut Vec<Corner>, point: Corner) {
     while let [.., a, b] = corners[..] {
-        // The middle one is below the chord of the others.
+        // The middle point is below the chord of its neighbours.
         if (b.1 - a.1) * (point.0 - a.0) > (point.1 - a.1) * (b.0 - a.0) {
             break;
         }
@@ -120,7 +122,7 @@ fn add_corner(corners: &mut Vec<Corner>, point: Corner) {
     corners.push(point);
 }
 
-/// The rounding unit of numbers between two powers of ten.
+/// Rounding unit of numbers between two powers of ten.
 #[derive(Debug, Clone, Copy)]
 struct Decade {
     from: f64,
@@ -129,7 +131,7 @@ struct Decade {
 }
 
 impl Decade {
-    /// One that holds no number.
+    /// A decade that contains no number.
     const NONE: Self = Self { from: 1.0, to: 0.0, unit: 1.0 };
 }
 
@@ -151,7 +153,7 @@ impl Default for PrintedInstants {
 }
 
 impl PrintedInstants {
-    /// Takes the next instant.
+    /// Adds the next instant.
     pub fn push(&mut self, time: f64) {
         self.is_single = self.is_single && f64::from(time as f32) == time;
         if self.count == 0 {
@@ -176,7 +178,7 @@ impl PrintedInstants {
         self.count += 1;
     }
 
-    /// Returns whether the instants are equally spaced but for rounding by less than the step.
+    /// Returns whether the instants are equally spaced except for rounding by less than a step.
     pub fn are_uniform(&self) -> bool {
         let mut intervals = Intervals::default();
         for (k, time) in self.beginning.iter().enumerate() {
@@ -193,17 +195,17 @@ impl PrintedInstants {
             && intervals.overlap() <= SLACK * step
     }
 
-    /// Largest distance of a printed instant from the one that was rounded.
+    /// Returns the largest possible rounding error of a printed instant.
     fn rounding(&self, time: f64, unit: f64) -> f64 {
         0.5 * self.coarser(time, unit) + f64::EPSILON * (time.abs() + self.first.abs())
     }
 
-    /// The unit of an instant, or that of single precision if it is larger.
+    /// Returns the larger of the unit of an instant and the unit of single precision.
     fn coarser(&self, time: f64, unit: f64) -> f64 {
         if self.is_single { unit.max(single_unit(time)) } else { unit }
     }
 
-    /// The unit to which an instant was rounded.
+    /// Returns the unit to which an instant was rounded.
     fn unit(&mut self, time: f64) -> f64 {
         let size = time.abs();
         if !(self.decade.from..self.decade.to).contains(&size) {
@@ -216,32 +218,34 @@ impl PrintedInstants {
     }
 }
 
-/// Exponent of ten of a number; `None` for zero.
+/// Returns the exponent of ten of a number; `None` for zero.
 fn magnitude(value: f64) -> Option<i32> {
     let exponent = value.abs().log10();
     exponent.is_finite().then(|| exponent.floor() as i32)
 }
 
-/// The unit of a number that is printed with so many decimal places and significant digits at most.
+/// Returns the unit of a number that is printed with at most this many decimal places and
+/// significant digits.
 fn decimal_unit(value: f64, decimals: i32, digits: i32) -> f64 {
     let exponent = magnitude(value).map_or(-decimals, |m| (m + 1 - digits).max(-decimals));
     10_f64.powi(exponent)
 }
 
-/// The distance from a number to the next one in single precision.
+/// Returns the distance from a number to the next one in single precision.
 fn single_unit(value: f64) -> f64 {
     let single = value.abs() as f32;
     f64::from(single.next_up()) - f64::from(single)
 }
 
-/// Returns whether a number is a multiple of a unit, as far as a double can tell.
+/// Returns whether a number is a multiple of a unit, to the accuracy of a double.
 fn is_multiple(value: f64, unit: f64) -> bool {
     let multiple = value / unit;
     let tolerance = 1e-6 + 4.0 * f64::EPSILON * multiple.abs();
     (multiple - multiple.round()).abs() <= tolerance
 }
 
-/// Decimal places and significant digits of the shortest text that is this number.
+/// Returns the numbers of decimal places and significant digits of the shortest text of this
+/// number.
 fn printed(value: f64) -> (i32, i32) {
     let text = format!("{value:e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));

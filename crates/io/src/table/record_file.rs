@@ -1,4 +1,4 @@
-//! Records of any length, read repeatedly in blocks.
+//! Records of any length, which are read repeatedly in blocks.
 
 use std::fs;
 use std::ops::{ControlFlow, Range};
@@ -17,11 +17,11 @@ use crate::contents::{DecimalSign, Lines, Unusable};
 use crate::limits::ReadOptions;
 use crate::{IoError, standard};
 
-/// A record file whose samples need not fit in memory.
+/// Record file whose samples need not fit in memory.
 ///
-/// A text with more rows than may be held is read again for each pass over its samples, in memory
-/// that does not grow with the file. Shorter texts, other formats, and what can be read only once (a
-/// pipe) are held whole.
+/// A text with more rows than the memory may have is read again for each pass over its samples; the
+/// memory needed does not grow with the file. Shorter texts, other formats, and sources that can be
+/// read only once (a pipe) are kept in memory as a whole.
 ///
 /// ```
 /// use mechid_io::{IoError, ReadOptions, RecordFile, TimeAxis};
@@ -51,7 +51,7 @@ pub struct RecordFile {
     whole: bool,
     /// Decimal sign of the first samples.
     decimal: Option<DecimalSign>,
-    /// Memory that work on the record may take, in bytes.
+    /// Memory that processing the record may use, in bytes.
     memory: usize,
 }
 
@@ -60,11 +60,11 @@ pub struct RecordFile {
 pub struct Survey {
     /// Time axis of the columns.
     pub sampling: Sampling,
-    /// Mean of each, in its unit.
+    /// Mean of each column, in its unit.
     pub means: Vec<f64>,
-    /// Largest magnitude of each, in its unit.
+    /// Largest magnitude of each column, in its unit.
     pub peaks: Vec<f64>,
-    /// Further information from the file, as [`Table::remarks`].
+    /// Notes about the file, as [`Table::remarks`].
     pub remarks: Vec<String>,
 }
 
@@ -76,11 +76,12 @@ struct Chunk<'a> {
     lines: &'a Lines,
 }
 
-/// Callback for rows read again and the index of the first of them; says whether to go on.
+/// Callback for rows that are read again and the index of the first of them; returns whether to
+/// continue.
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file, or standard input as `-`; at most `held` rows of a text are held in memory.
+    /// Opens a file, or standard input as `-`; at most `held` rows of a text are kept in memory.
     ///
     /// # Errors
     /// As [`Table::read_with`].
@@ -103,13 +104,13 @@ impl RecordFile {
         Ok(Self { path, options: *options, head, whole, decimal, memory })
     }
 
-    /// Returns the memory, in bytes, that work on the record may take: [`Limits::memory`](crate::Limits::memory)
-    /// of the size of the file.
+    /// Returns the memory, in bytes, that processing the record may use:
+    /// [`Limits::memory`](crate::Limits::memory) for the size of the file.
     pub fn memory(&self) -> usize {
         self.memory
     }
 
-    /// Takes a table that was read before as a file held whole.
+    /// Creates a record file from a table in memory.
     pub fn of_table(table: Table) -> Self {
         let (path, options) = (PathBuf::from(table.file()), ReadOptions::default());
         let values = table.contents.columns.iter().filter_map(|column| column.values.as_ref().ok());
@@ -118,18 +119,18 @@ impl RecordFile {
         Self { path, options, head: table, whole: true, decimal: None, memory }
     }
 
-    /// Sets the memory, in bytes, that work on the record may take.
+    /// Sets the memory, in bytes, that processing the record may use.
     #[must_use]
     pub fn with_memory(self, memory: usize) -> Self {
         Self { memory, ..self }
     }
 
-    /// The table, with only the first samples if the file is not held whole.
+    /// Returns the table, with only the first samples if the file is not completely in memory.
     pub fn head(&self) -> &Table {
         &self.head
     }
 
-    /// States the unit of a column, as [`Table::set_unit`] does.
+    /// Sets the unit of a column, as [`Table::set_unit`] does.
     ///
     /// # Errors
     /// As [`Table::set_unit`].
@@ -137,7 +138,8 @@ impl RecordFile {
         self.head.set_unit(column, unit)
     }
 
-    /// States the factor of a column, in SI units per unit of the column, as [`Table::set_scale`] does.
+    /// Sets the factor of a column, in SI units per unit of the column, as [`Table::set_scale`]
+    /// does.
     ///
     /// # Errors
     /// As [`Table::set_scale`].
@@ -150,8 +152,8 @@ impl RecordFile {
         self.whole
     }
 
-    /// Frees the numbers of [`RecordFile::head`] of a file that is read again for each pass; names, units
-    /// and remarks stay.
+    /// Removes the numbers of [`RecordFile::head`] from memory if the file is read again for each
+    /// pass; names, units and remarks stay.
     pub fn forget_head(&mut self) {
         if self.whole {
             return;
@@ -163,7 +165,7 @@ impl RecordFile {
         }
     }
 
-    /// Reads the columns `wanted` to the end: their time axis, means and peaks.
+    /// Reads the columns `wanted` to the end and returns their time axis, means and peaks.
     ///
     /// # Errors
     /// As [`Table::record`].
@@ -189,7 +191,7 @@ impl RecordFile {
             }
             if instants.is_some() {
                 for (k, time) in (chunk.first..).zip(chunk.columns[count]) {
-                    steps.push(*time, || chunk.lines.place(k));
+                    steps.push(*time, || chunk.lines.position(k));
                 }
             }
             len = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
@@ -203,11 +205,12 @@ impl RecordFile {
             (false, Some(column)) => self.sampling_of(column, steps, lengths[count])?,
             (false, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
-                // The header of the file states it, or it is missing, which is the error.
+                // The header of the file states the time axis; if it is missing, this returns the
+                // error.
                 _ => self.head.signal(self.head.sampling(time, wanted)?.with_len(len))?,
             },
         };
-        // The time column first, as in a table held whole.
+        // The time column is checked first, as for a table in memory.
         let order = (count..columns.len()).chain(0..count);
         let order: Vec<_> = order.map(|c| (columns[c], lengths[c])).collect();
         time_axis::same_length(&self.head, &order)?;
@@ -219,8 +222,9 @@ impl RecordFile {
         Ok(Survey { sampling, means, peaks, remarks })
     }
 
-    /// Passes the samples `window` of the columns `wanted` to `take` in blocks of `rows` rows (samples ×
-    /// columns), each `advance` rows after the one before; the last block may be shorter.
+    /// Passes the samples `window` of the columns `wanted` to `take` in blocks of `rows` rows
+    /// (samples × columns), each `advance` rows after the previous one; the last block may be
+    /// shorter.
     ///
     /// # Errors
     /// As [`Table::column`], [`IoError::Read`] if the file has become shorter, and those of `take`.
@@ -256,22 +260,23 @@ impl RecordFile {
         take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), E>,
     ) -> Result<(), E> {
         assert!(0 < advance && advance <= rows, "blocks of {rows} rows, {advance} apart");
-        let mut held: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
+        let mut buffered: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let (mut end, mut fresh) = (window.start, false);
         self.chunks(columns, &mut |chunk| {
             let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             let mut next = window.start.max(chunk.first);
-            // At most one block at a time: a table in memory is a single chunk.
+            // The buffer grows by at most one block at a time, because a table in memory is a
+            // single chunk.
             while next < last.min(window.end) {
                 let upto = last.min(window.end).min(next + rows);
-                for (values, column) in held.iter_mut().zip(chunk.columns) {
+                for (values, column) in buffered.iter_mut().zip(chunk.columns) {
                     values.extend_from_slice(&column[next - chunk.first..upto - chunk.first]);
                 }
                 (next, end, fresh) = (upto, upto, true);
-                while held.first().is_some_and(|values| values.len() >= rows) {
-                    take(matrix(&held, rows))?;
-                    held.iter_mut().for_each(|values| drop(values.drain(..advance)));
-                    fresh = held.first().is_some_and(|values| values.len() > rows - advance);
+                while buffered.first().is_some_and(|values| values.len() >= rows) {
+                    take(matrix(&buffered, rows))?;
+                    buffered.iter_mut().for_each(|values| drop(values.drain(..advance)));
+                    fresh = buffered.first().is_some_and(|values| values.len() > rows - advance);
                 }
             }
             Ok::<_, E>(if last < window.end {
@@ -284,8 +289,8 @@ impl RecordFile {
             let source = std::io::ErrorKind::UnexpectedEof.into();
             return Err(IoError::Read { file: self.head.file().into(), source }.into());
         }
-        match held.first().map_or(0, Vec::len) {
-            rest if rest > 0 && fresh => take(matrix(&held, rest)),
+        match buffered.first().map_or(0, Vec::len) {
+            rest if rest > 0 && fresh => take(matrix(&buffered, rest)),
             _ => Ok(()),
         }
     }
@@ -310,7 +315,7 @@ impl RecordFile {
                 None => Ok(ControlFlow::Continue(())),
             }
         })?;
-        // The first unusable column is reported, as of a table in memory.
+        // The first unusable column is reported, as for a table in memory.
         for column in columns {
             if let Err(why) = &reader.rows().column(*column).values {
                 return Err(self.unusable(*column, why).into());
@@ -320,7 +325,7 @@ impl RecordFile {
     }
 
     /// Reads the numbers of some columns of a text again, block by block, until `take` breaks. The
-    /// reader that is left knows what is wrong with a column.
+    /// returned reader has the reason if a column is unusable.
     pub(super) fn rows<E: From<IoError>>(
         &self,
         columns: &[usize],
@@ -346,7 +351,7 @@ impl RecordFile {
     }
 }
 
-/// The first rows of some columns.
+/// Returns the first rows of some columns.
 fn matrix(columns: &[Vec<f64>], rows: usize) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(rows, columns.len());
     for (mut into, column) in matrix.column_iter_mut().zip(columns) {

@@ -1,4 +1,4 @@
-//! Rows of fields into columns of numbers, none of which is held as text.
+//! Rows of fields converted to columns of numbers; the text is not kept.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub(super) struct Rows {
     limits: Limits,
     /// Counter of the bytes read of the file.
     stored: Stored,
-    /// Decimal sign of the numbers, as far as it is known.
+    /// Decimal sign of the numbers, if it is known.
     decimal: Option<DecimalSign>,
     /// `None` before the first row.
     first: Option<FirstRow>,
@@ -36,25 +36,26 @@ pub(super) struct Rows {
     lines: Lines,
     /// Header of a LabVIEW measurement file.
     lvm: Option<LvmHeader>,
-    /// Days from which the instants of columns count, by column.
+    /// Reference days of the instants of columns, by column.
     origins: BTreeMap<usize, i64>,
-    /// Rows of empty fields not yet followed by another one: line and number of fields. At the end
-    /// of the file they do not count.
+    /// Line and number of fields of rows of empty fields that no other row has followed yet. At the
+    /// end of the file they are ignored.
     empty: Vec<(u64, usize)>,
 }
 
-/// The first row, which all others are like.
+/// Properties of the first row, which all other rows must have.
 #[derive(Debug, Clone, Copy)]
 struct FirstRow {
     line: u64,
     /// Number of fields.
     width: usize,
-    /// Number of fields up to the last that is not empty.
+    /// Number of fields up to the last one that is not empty.
     filled: usize,
 }
 
 impl Rows {
-    /// No rows yet; the columns `wanted` will be read, by their indices, or all.
+    /// Creates an empty reader of rows; it will read the columns `wanted`, by their indices, or
+    /// all.
     pub fn new(
         file: String,
         layout: Layout,
@@ -82,43 +83,43 @@ impl Rows {
         }
     }
 
-    /// Takes units and time axes from the header of a LabVIEW measurement file.
+    /// Adds units and time axes from the header of a LabVIEW measurement file.
     #[must_use]
     pub fn with_lvm(self, lvm: Option<LvmHeader>) -> Self {
         Self { lvm, ..self }
     }
 
-    /// Line of the first row, if there was one.
+    /// Returns the line of the first row, if there was one.
     pub fn first_line(&self) -> Option<u64> {
         self.first.map(|first| first.line)
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.columns.len()
     }
 
-    /// Number of samples so far.
+    /// Returns the number of samples so far.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// Decimal sign of the numbers so far.
+    /// Returns the decimal sign of the numbers so far.
     pub fn decimal(&self) -> Option<DecimalSign> {
         self.decimal
     }
 
-    /// A column, by its index, with the samples since [`Rows::forget`].
+    /// Returns a column, by its index, with the samples since [`Rows::forget`].
     pub fn column(&self, column: usize) -> &Column {
         &self.columns[column]
     }
 
-    /// Lines of the samples since [`Rows::forget`].
+    /// Returns the lines of the samples since [`Rows::forget`].
     pub fn lines(&self) -> &Lines {
         &self.lines
     }
 
-    /// Forgets the samples so far, but neither their number nor why a column cannot be used.
+    /// Removes the samples so far; their number and the reasons for unusable columns are kept.
     pub fn forget(&mut self) {
         for values in self.columns.iter_mut().filter_map(|column| column.values.as_mut().ok()) {
             values.clear();
@@ -126,7 +127,7 @@ impl Rows {
         self.lines.clear();
     }
 
-    /// Keeps at most the first samples, of those since the beginning.
+    /// Keeps at most the first `samples` samples, counted from the beginning.
     pub fn truncate(&mut self, samples: usize) {
         for values in self.columns.iter_mut().filter_map(|column| column.values.as_mut().ok()) {
             values.truncate(samples);
@@ -134,7 +135,7 @@ impl Rows {
         self.samples = self.samples.min(samples);
     }
 
-    /// Takes the names and units of the columns from the beginning of the text, until a row of
+    /// Reads the names and units of the columns at the beginning of the text, until a row of
     /// samples follows; returns the offset of that row in the block.
     pub fn begin(&mut self, block: &Block) -> Result<usize, IoError> {
         if self.has_samples {
@@ -176,8 +177,8 @@ impl Rows {
         Ok(block.text.len())
     }
 
-    /// Takes names and units that stand in several rows or in comments above the first row of numbers; returns the
-    /// offset of that row in the block, or `None` if there are none of these.
+    /// Reads names and units that are in several rows or in comments above the first row of
+    /// numbers; returns the offset of that row in the block, or `None` if there is no such heading.
     fn take_heading(&mut self, block: &Block) -> Result<Option<usize>, IoError> {
         let rows = heading::first_rows(&block.text, self.layout);
         if rows.iter().any(|row| row.row.text.len() > self.limits.row_bytes) {
@@ -202,7 +203,7 @@ impl Rows {
         Ok(Some(begin.row.at))
     }
 
-    /// Takes what the first row of numbers says about the columns.
+    /// Initialises the columns from the first row of numbers.
     fn begin_samples(&mut self, fields: &Fields) {
         for &column in self.wanted.iter().flatten() {
             self.columns[column].filled |= !fields.get(column).is_empty();
@@ -217,7 +218,7 @@ impl Rows {
         self.has_samples = true;
     }
 
-    /// Gives the columns the units and the time axes of a LabVIEW header.
+    /// Assigns the units and the time axes of a LabVIEW header to the columns.
     fn apply_lvm(&mut self) {
         let Some(lvm) = self.lvm.take() else { return };
         for (channel, unit) in lvm.units.iter().enumerate() {
@@ -238,15 +239,15 @@ impl Rows {
             let Some(column) = self.columns.get_mut(at) else { break };
             column.axis = axis;
         }
-        // Columns of instants have one name: the second is called so.
+        // All columns of instants have the same name, so the second and further ones get a number.
         let instants = self.columns.iter_mut().filter(|column| column.name == lvm::X);
         for (number, column) in instants.enumerate().skip(1) {
             column.name = format!("{} {}", lvm::X, number + 1);
         }
     }
 
-    /// Takes the number of columns from the first row and, if any of its fields is no number, their
-    /// names.
+    /// Reads the number of columns from the first row and, if any of its fields is not a number,
+    /// their names.
     fn take_first(&mut self, line: u64, fields: &Fields) -> Result<(), IoError> {
         self.make_columns(line, fields.len(), fields.filled())?;
         let is_name = |field: &[u8]| !field.is_empty() && !is_data(field, self.layout.delimiter);
@@ -260,7 +261,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Makes columns without names, for rows of `width` fields.
+    /// Creates columns without names, for rows of `width` fields.
     fn make_columns(&mut self, line: u64, width: usize, filled: usize) -> Result<(), IoError> {
         if width > self.limits.columns {
             let (at, limit) = (Place::Line(line), Limit::Columns(self.limits.columns));
@@ -273,7 +274,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Takes the units of the columns, if the row below the names has no number at all.
+    /// Reads the units of the columns, if the row below the names has no number at all.
     fn take_units(&mut self, fields: &Fields) -> bool {
         self.has_units =
             self.has_header && !fields.iter().any(|field| is_data(field, self.layout.delimiter));
@@ -286,7 +287,7 @@ impl Rows {
         self.has_units
     }
 
-    /// Layout and decimal sign known before the next rows are read.
+    /// Returns layout and decimal sign, as far as they are known before the next rows are read.
     pub fn plan(&self) -> Plan {
         let (width, filled) = self.first.map_or((0, 0), |first| (first.width, first.filled));
         let origins = match (self.origins.is_empty(), &self.wanted) {
@@ -306,7 +307,8 @@ impl Rows {
         }
     }
 
-    /// Returns whether rows were read on the assumption of another decimal sign than that of the rows before.
+    /// Returns whether rows were read with the wrong decimal sign, because the rows before them had
+    /// none.
     pub fn contradicts(&self, batch: &Batch) -> bool {
         self.decimal.is_some() && batch.decimal.is_some() && self.decimal != batch.decimal
     }
@@ -363,17 +365,18 @@ impl Rows {
         }
     }
 
-    /// The columns with all samples since [`Rows::forget`].
+    /// Returns the columns with all samples since [`Rows::forget`].
     ///
     /// # Errors
     /// [`IoError::Empty`] without samples.
     pub fn finish(self) -> Result<Contents, IoError> {
         if self.samples == 0 {
-            let found = match self.has_header {
-                true => "there is a header and nothing below it",
-                false => "it is empty",
+            let finding = if self.has_header {
+                "there is a header and nothing below it"
+            } else {
+                "it is empty"
             };
-            return Err(IoError::Empty { file: self.file, found });
+            return Err(IoError::Empty { file: self.file, found: finding });
         }
         let comma = match self.decimal {
             Some(DecimalSign::Comma) => ", decimal comma",
@@ -388,19 +391,20 @@ impl Rows {
         })
     }
 
-    /// Returns whether more numbers are held than the limit allows.
+    /// Returns an error if more numbers are in memory than the limit allows.
     pub fn check_numbers(&self) -> Result<(), IoError> {
         let width = self.wanted.as_ref().map_or(0, Vec::len);
         let numbers = self.samples.saturating_mul(width);
         let mut budget = Budget::new(&self.limits, self.stored.bytes());
         budget.take_numbers(numbers).map_err(|limit| {
-            let at = self.lines.place(self.samples.saturating_sub(1));
+            let at = self.lines.position(self.samples.saturating_sub(1));
             IoError::TooLarge { file: self.file.clone(), at, limit }
         })
     }
 }
 
-/// Text of a field: UTF-8, or otherwise Latin-1, in which spreadsheets of Windows write `µm` and `m/s²`.
+/// Converts a field to text from UTF-8, or otherwise from Latin-1, in which Windows spreadsheets
+/// write `µm` and `m/s²`.
 pub(super) fn text_of(field: &[u8]) -> String {
     match std::str::from_utf8(field) {
         Ok(text) => text.to_owned(),

@@ -1,4 +1,4 @@
-//! The bytes of a file, without gzip, text as UTF-8, and their format.
+//! The bytes of a file, unpacked from gzip and with text as UTF-8, and their format.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::Path;
@@ -15,16 +15,16 @@ use crate::{IoError, escaped, standard};
 /// Number of bytes read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// Number of bytes unpacked between two looks at the limits.
+/// Number of bytes unpacked between two checks of the limits.
 const AT_ONCE: u64 = 1 << 20;
 
 /// Byte order mark of UTF-8.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Number of bytes from which the format is detected.
+/// Number of first bytes that are used to detect the format.
 const HEAD: u64 = 512;
 
-/// Number of bytes, as they are stored, that were read of a file.
+/// Counter of the stored bytes of a file that were read.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Stored(Arc<AtomicUsize>);
 
@@ -34,7 +34,7 @@ impl Stored {
     }
 }
 
-/// A stream whose bytes are counted.
+/// Stream whose bytes are counted.
 struct Counted<R> {
     stream: R,
     stored: Stored,
@@ -48,10 +48,10 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-/// An unpacked text that is held to a number of bytes for what was read of its file.
+/// Unpacked text whose length is limited by the number of bytes read of its file.
 struct Bounded<'a> {
     text: Box<dyn BufRead + Send + 'a>,
-    /// Number of its bytes read so far.
+    /// Number of unpacked bytes read so far.
     bytes: usize,
     stored: Stored,
     limits: Limits,
@@ -82,21 +82,21 @@ impl Read for Bounded<'_> {
     }
 }
 
-/// An unpacked text has more than so many bytes.
+/// Error for an unpacked text with more bytes than the limit.
 #[derive(Debug, thiserror::Error)]
 #[error("the unpacked text is longer than {0} bytes")]
 struct TooLong(usize);
 
-/// A file being read.
+/// File that is being read.
 pub(crate) struct Source<'a> {
     pub file: String,
-    /// Whether it is read through gzip.
+    /// `true` if it is read through gzip.
     pub gzip: bool,
-    /// Whether it is UTF-16, read as UTF-8.
+    /// `true` for UTF-16, which is converted to UTF-8.
     pub utf16: bool,
-    /// Counter of its bytes before they are unpacked.
+    /// Counter of its stored bytes.
     pub stored: Stored,
-    /// Its first bytes, which stand in `reader` too.
+    /// First bytes, which `reader` also returns.
     head: Vec<u8>,
     pub reader: Box<dyn BufRead + Send + 'a>,
 }
@@ -106,9 +106,9 @@ pub(crate) struct Source<'a> {
 pub(crate) enum Kind {
     Text,
     Json,
-    /// MATLAB level 5, which its versions 5 to 7.2 write.
+    /// MATLAB level 5, which MATLAB versions 5 to 7.2 write.
     Mat5,
-    /// HDF5, which MATLAB writes since version 7.3 on request.
+    /// HDF5, which MATLAB can write since version 7.3.
     Hdf5,
     Uff,
     Parquet,
@@ -125,7 +125,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Looks at the first bytes of a stream; `file` is its name in messages.
+    /// Reads the first bytes of a stream; `file` is its name in messages.
     pub fn new(file: String, raw: impl Read + Send + 'a) -> Result<Self, IoError> {
         let file = escaped(&file).into_owned();
         let stored = Stored::default();
@@ -154,7 +154,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Format of the file.
+    /// Returns the format of the file.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
         if head.starts_with(b"MATLAB 5.0 MAT-file") {
@@ -174,13 +174,14 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Last byte of a line: a line feed, or a carriage return in a text without any.
+    /// Returns the last byte of a line: a line feed, or a carriage return in a text without line
+    /// feeds.
     pub fn terminator(&self) -> u8 {
         let is_old = self.head.contains(&b'\r') && !self.head.contains(&b'\n');
         if is_old { b'\r' } else { b'\n' }
     }
 
-    /// Reads the rest of the file; what gzip unpacks is held to the limits.
+    /// Reads the rest of the file; the limits apply to the unpacked bytes.
     pub fn bytes(&mut self, limits: &Limits) -> Result<Vec<u8>, IoError> {
         let mut bytes = Vec::new();
         loop {
@@ -192,7 +193,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Refuses more unpacked bytes than the limits allow for what was read.
+    /// Refuses more unpacked bytes than the limits allow for the bytes read.
     fn check_unpacked(&self, len: usize, limits: &Limits) -> Result<(), IoError> {
         let (most, limit) = self.budget(limits).unpacked_bytes();
         if self.gzip && len > most {
@@ -202,7 +203,7 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Holds a text that is unpacked to the limits.
+    /// Applies the limits to a text while it is unpacked.
     #[must_use]
     pub fn bounded(self, limits: &Limits) -> Self {
         if !self.gzip {
@@ -213,13 +214,13 @@ impl<'a> Source<'a> {
         Self { reader, ..self }
     }
 
-    /// Returns the limits for what was read.
+    /// Returns the memory budget for the bytes read.
     pub fn budget(&self, limits: &Limits) -> Budget {
         Budget::new(limits, self.stored.bytes())
     }
 }
 
-/// The first bytes of a stream, and the stream with them still in it.
+/// Returns the first bytes of a stream, and a stream that still begins with them.
 fn peek<'a>(
     mut stream: Box<dyn BufRead + Send + 'a>,
 ) -> io::Result<(Vec<u8>, Box<dyn BufRead + Send + 'a>)> {
@@ -228,14 +229,14 @@ fn peek<'a>(
     Ok((head.clone(), Box::new(Cursor::new(head).chain(stream))))
 }
 
-/// Returns whether the first bytes are the byte order mark of UTF-16, and not that of UTF-32.
+/// Returns whether the first bytes are the byte order mark of UTF-16, and not of UTF-32.
 fn is_utf16(head: &[u8]) -> bool {
     let little = head.starts_with(&[0xff, 0xfe]) && !head.starts_with(&[0xff, 0xfe, 0, 0]);
     little || head.starts_with(&[0xfe, 0xff])
 }
 
-/// Returns whether the first bytes are no text: zeros may stand only at its end, where a preallocated file has
-/// them.
+/// Returns whether the first bytes are not text: zero bytes are allowed only at the end, as in a
+/// preallocated file.
 fn is_binary(head: &[u8]) -> bool {
     let text = head.len() - head.iter().rev().take_while(|b| **b == 0).count();
     let is_control = |b: &u8| *b < b' ' && !b.is_ascii_whitespace();
@@ -243,13 +244,13 @@ fn is_binary(head: &[u8]) -> bool {
         || head[..text].contains(&0)
 }
 
-/// Returns whether the first bytes are those of Parquet, and not the name of a column in a text.
+/// Returns whether the first bytes identify Parquet, and are not the name of a column in a text.
 fn is_parquet(head: &[u8]) -> bool {
-    let rest = head.strip_prefix(b"PAR1").and_then(<[u8]>::first);
-    rest.is_some_and(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
+    let after_magic = head.strip_prefix(b"PAR1").and_then(<[u8]>::first);
+    after_magic.is_some_and(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
 }
 
-/// Returns whether a text begins as an object of JSON does, or a list of objects.
+/// Returns whether a text begins like a JSON object or a list of objects.
 fn is_json(head: &[u8]) -> bool {
     let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
     let mut marks = text.iter().filter(|b| !b.is_ascii_whitespace());
@@ -259,7 +260,7 @@ fn is_json(head: &[u8]) -> bool {
     )
 }
 
-/// The error for a failed read: of the file, or of the gzip around it.
+/// Returns the error for a failed read: of the file, or of the gzip around it.
 pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     let file = file.to_owned();
     if let Some(TooLong(most)) = source.get_ref().and_then(|cause| cause.downcast_ref()) {
@@ -272,8 +273,8 @@ pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }
 }
 
-/// Returns whether the first line that is not empty holds -1 in its columns 5 and 6, and the next one the
-/// number of a dataset in its first six, or a misplaced 58b.
+/// Returns whether the first line that is not empty has -1 in its columns 5 and 6, and the next one
+/// the number of a dataset in its first six columns, or a misplaced 58b.
 fn is_uff(head: &[u8]) -> bool {
     let mut lines =
         head.split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end).skip_while(|line| line.is_empty());

@@ -1,4 +1,4 @@
-//! Delimited text into columns of numbers, on all cores and in the order of the file.
+//! Delimited text converted to columns of numbers, on all cores and in the order of the file.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -17,14 +17,14 @@ use crate::IoError;
 use crate::contents::{Contents, DecimalSign};
 use crate::limits::ReadOptions;
 
-/// Largest number of threads that read rows; more would wait for memory.
+/// Maximum number of threads that read rows; more would wait for memory.
 const MOST_THREADS: usize = 8;
 
-/// A text on its way into columns.
+/// Reader of a text into columns.
 #[derive(Debug)]
 pub(super) struct TextReader<'a> {
     layout: Layout,
-    /// Beginning of the table by its looks, lines counted in the file.
+    /// Line at which the table seems to begin, counted in the file.
     table: Option<Beginning>,
     blocks: Blocks<'a>,
     rows: Rows,
@@ -33,17 +33,17 @@ pub(super) struct TextReader<'a> {
 /// Columns of a text to read, and properties of the text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wanted {
-    /// Indices of the columns, rising; all if `None`.
+    /// Indices of the columns, in rising order; all if `None`.
     pub columns: Option<Vec<usize>>,
     /// Decimal sign, if the text was read before.
     pub decimal: Option<DecimalSign>,
 }
 
-/// Callback for the rows so far after each block; says whether to go on.
+/// Callback for the rows so far after each block; returns whether to continue.
 pub(super) type TakeRows<'a, E> = dyn FnMut(&mut Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl<'a> TextReader<'a> {
-    /// Finds the dialect of a text.
+    /// Opens a text and detects its dialect.
     pub fn open(
         source: Source<'a>,
         options: &ReadOptions,
@@ -65,21 +65,21 @@ impl<'a> TextReader<'a> {
         Ok(Self { layout, table, blocks, rows })
     }
 
-    /// The rows so far.
+    /// Returns the rows so far.
     pub fn rows(&self) -> &Rows {
         &self.rows
     }
 
-    /// The end of the text, if it was reached.
+    /// Returns the end of the text, if it was reached.
     pub fn end(&self) -> Option<TextEnd> {
         self.blocks.end()
     }
 
-    /// Reads rows until the text ends, or `take`, which gets them block by block, breaks; returns
-    /// whether the text has ended.
+    /// Reads rows until the text ends, or until `take`, which receives them block by block, breaks;
+    /// returns whether the text has ended.
     pub fn read<E: From<IoError>>(&mut self, take: &mut TakeRows<'_, E>) -> Result<bool, E> {
         let (mut block, mut batch) = (Block::default(), Batch::default());
-        // The names come first, and a short text needs no threads.
+        // The names come first, and a short text is read faster without threads.
         for _ in 0..2 {
             loop {
                 if !self.blocks.next(self.layout, &mut block)? {
@@ -107,7 +107,7 @@ impl<'a> TextReader<'a> {
         let Self { layout, table, blocks, rows } = self;
         let (layout, plan) = (*layout, rows.plan());
         let shared = Mutex::new(Shared { blocks, next: 0 });
-        // As many blocks are under way as the threads can work on while others wait to be taken.
+        // Each thread processes one block while one more per thread waits to be appended.
         let (free, freed) = channel();
         let freed = Mutex::new(freed);
         let under_way = 2 * threads;
@@ -141,13 +141,13 @@ impl<'a> TextReader<'a> {
                 }
                 drop(free.send(work));
             }
-            // The threads end where nobody takes their work any more.
+            // Dropping the channels ends the threads.
             drop((finished, free));
             Ok(false)
         })
     }
 
-    /// The contents of the file, which ends with `end`.
+    /// Returns the contents of the file, which ends with `end`.
     ///
     /// # Errors
     /// [`IoError::Empty`] without samples, [`IoError::AboveTable`] if the table seems to begin
@@ -167,21 +167,21 @@ impl<'a> TextReader<'a> {
     }
 }
 
-/// The source of blocks that threads share.
+/// Source of blocks that the threads share.
 struct Shared<'a, 'b> {
     blocks: &'a mut Blocks<'b>,
     /// Number of the next block.
     next: usize,
 }
 
-/// A block and its rows.
+/// Block and its rows.
 #[derive(Debug, Default)]
 struct Work {
     block: Block,
     batch: Batch,
 }
 
-/// Reads the rows of one block after the other until the text ends or nobody takes them.
+/// Reads the rows of one block after the other until the text ends or the receiver is closed.
 fn worker(
     layout: Layout,
     plan: &Plan,
@@ -211,12 +211,13 @@ fn worker(
     }
 }
 
-/// Locks what only a panic elsewhere could have left locked, and that panic is on its way out.
+/// Locks a mutex. Only a panic in another thread can have poisoned it, and that panic is passed on.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Explains rows that differ in length by what stands above the table, if something does.
+/// Returns the error for text above the table, if there is any, otherwise `error` about rows of
+/// different lengths.
 fn above_or(table: Option<Beginning>, rows: &Rows, error: IoError) -> IoError {
     match &error {
         IoError::Ragged { file, .. } => above(table, rows, file).unwrap_or(error),
@@ -224,7 +225,7 @@ fn above_or(table: Option<Beginning>, rows: &Rows, error: IoError) -> IoError {
     }
 }
 
-/// The error for text above the table, if there is any.
+/// Returns the error for text above the table, if there is any.
 fn above(table: Option<Beginning>, rows: &Rows, file: &str) -> Option<IoError> {
     let Beginning { line, fields } = table?;
     let above = rows.first_line()? < line;

@@ -7,11 +7,11 @@ use super::{Table, time_unit};
 use crate::IoError;
 use crate::contents::{Axis, Place};
 
-/// The time axis of columns of a [`Table`].
+/// Time axis of the columns of a [`Table`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeAxis<'a> {
-    /// A time column, chosen by name or number: in the unit that its name or the line of units states,
-    /// otherwise in seconds.
+    /// Time column, chosen by name or number: in the unit that its name or the line of units
+    /// states, otherwise in seconds.
     Column(&'a str),
     /// A known sampling rate, in Hz.
     RateHz(f64),
@@ -19,15 +19,15 @@ pub enum TimeAxis<'a> {
     OfFile,
 }
 
-/// Largest deviation of a step from the median step, as a fraction of it: a hundredth of a step is a
-/// phase error of 1.8° at the Nyquist frequency.
+/// Maximum deviation of a step from the median step, as a fraction of it: a hundredth of a step is
+/// a phase error of 1.8° at the Nyquist frequency.
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// Rates and steps are the same if they differ by this part at most: universal files print them with
-/// six digits.
+/// Maximum relative difference between two steps or rates that count as equal: universal files
+/// print them with six digits.
 const SAME_STEP: f64 = 1e-5;
 
-/// The instants of one column.
+/// Sampling instants of one column.
 #[derive(Debug, Clone, Copy)]
 struct Instants {
     /// First instant (s).
@@ -37,7 +37,7 @@ struct Instants {
 }
 
 impl TimeAxis<'_> {
-    /// The time axis of columns, by their indices.
+    /// Returns the time axis of columns, by their indices.
     pub(super) fn sampling(&self, table: &Table, columns: &[usize]) -> Result<Sampling, IoError> {
         let signal = |source| IoError::Signal { file: table.file().into(), source };
         match *self {
@@ -52,8 +52,8 @@ impl TimeAxis<'_> {
                 let column = table.find(column)?;
                 let unit = time_unit::unit(&table.contents.columns[column]);
                 let dt = uniform_step(table, table.values(column)?, unit)?;
-                let all: Vec<usize> = [&[column], columns].concat();
-                Sampling::new(dt, common_length(table, &all)?).map_err(signal)
+                let all_columns: Vec<usize> = [&[column], columns].concat();
+                Sampling::new(dt, common_length(table, &all_columns)?).map_err(signal)
             }
             TimeAxis::OfFile => {
                 let step = common_instants(table, columns)?.step;
@@ -63,7 +63,7 @@ impl TimeAxis<'_> {
     }
 }
 
-/// The common number of samples of the columns.
+/// Returns the common number of samples of the columns.
 pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, IoError> {
     let mut lengths = Vec::new();
     for column in columns {
@@ -72,7 +72,7 @@ pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, I
     Ok(same_length(table, &lengths)?.unwrap_or(table.len()))
 }
 
-/// The length of all columns (index, number of samples); `None` without columns.
+/// Returns the length of all columns (index, number of samples); `None` without columns.
 pub(super) fn same_length(
     table: &Table,
     lengths: &[(usize, usize)],
@@ -81,12 +81,12 @@ pub(super) fn same_length(
     if lengths.iter().all(|(_, other)| Some(*other) == len) {
         return Ok(len);
     }
-    let each = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));
-    let lengths = each.collect::<Vec<_>>().join(", ");
+    let descriptions = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));
+    let lengths = descriptions.collect::<Vec<_>>().join(", ");
     Err(IoError::Lengths { file: table.file().into(), lengths })
 }
 
-/// The common instants of the columns in the file.
+/// Returns the common instants of the columns in the file.
 fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError> {
     let mut common: Option<(usize, Instants)> = None;
     for column in columns {
@@ -98,7 +98,7 @@ fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError
             common = Some((*column, own));
             continue;
         };
-        // Starts may differ by as little as steps may.
+        // The first instants may differ by as much as the steps may.
         let together = (own.start - instants.start).abs() <= STEP_TOLERANCE * instants.step
             && same(own.step, instants.step);
         if !together {
@@ -118,7 +118,7 @@ fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError
         .ok_or_else(|| IoError::NoTimeAxis { file: table.file().into(), column: table.available() })
 }
 
-/// The instants of a column in the file.
+/// Returns the instants of a column in the file.
 fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoError> {
     Ok(match table.axis(column) {
         Axis::Unknown => None,
@@ -150,8 +150,8 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_STEP * a.abs().max(b.abs())
 }
 
-/// An error if the file gives a column another rate. What only the name of a number states may be
-/// overruled.
+/// Returns an error if the file gives a column another rate. A rate that only a named number states
+/// may be replaced.
 fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError> {
     if matches!(table.axis(column), Axis::Stated { .. } | Axis::Contradiction { .. }) {
         return Ok(());
@@ -167,7 +167,7 @@ fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError>
     }
 }
 
-/// A time axis of known rate.
+/// Returns a time axis with a known rate.
 pub(super) fn at_rate(file: &str, rate_hz: f64, len: usize) -> Result<Sampling, IoError> {
     if !(rate_hz > 0.0 && (1.0 / rate_hz).is_normal()) {
         return Err(IoError::SampleRate { rate_hz });
@@ -176,16 +176,16 @@ pub(super) fn at_rate(file: &str, rate_hz: f64, len: usize) -> Result<Sampling, 
         .map_err(|source| IoError::Signal { file: file.into(), source })
 }
 
-/// The mean step, in s, of instants in `unit` s that are equally spaced.
+/// Returns the mean step, in s, of equally spaced instants in `unit` s.
 fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError> {
     let mut steps = Steps::default();
     for (k, time) in times.iter().enumerate() {
-        steps.push(*time, || table.place(k));
+        steps.push(*time, || table.position(k));
     }
     steps.step(table.file(), unit)
 }
 
-/// Number of steps, the first ones, whose median is the usual step.
+/// Number of first steps whose median is the usual step.
 const MEDIAN_STEPS: usize = 1024;
 
 /// Running statistics of the steps between instants.
@@ -202,7 +202,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// Takes the next instant and its place.
+    /// Adds the next instant and its position in the file.
     pub fn push(&mut self, time: f64, place: impl Fn() -> Place) {
         if self.instants == 0 {
             self.first = time;
@@ -223,7 +223,8 @@ impl Steps {
         self.instants += 1;
     }
 
-    /// The mean step, in s, of instants in `unit` s, if they are equally spaced.
+    /// Returns the mean step, in s, of instants in `unit` s, or an error if they are not equally
+    /// spaced.
     pub fn step(mut self, file: &str, unit: f64) -> Result<f64, IoError> {
         let (Some(shortest), Some(longest)) = (self.shortest, self.longest) else {
             return Err(IoError::SingleSample { file: file.into() });
@@ -232,7 +233,7 @@ impl Steps {
         let (_, &mut usual, _) = self.beginning.select_nth_unstable_by(middle, f64::total_cmp);
         let off = |(step, _): (f64, Place)| (step - usual).abs();
         let worst = if off(shortest) > off(longest) { shortest } else { longest };
-        // Steps of zero, negative ones and those that overflow are refused, too.
+        // Steps that are zero or negative or that overflow are refused, too.
         let is_uniform = usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual;
         if is_uniform || self.printed.are_uniform() {
             return Ok(unit * (self.last - self.first) / (self.instants - 1) as f64);

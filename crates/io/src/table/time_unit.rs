@@ -1,4 +1,4 @@
-//! Time columns and their units, by their names.
+//! Time columns and their units, identified by their names.
 
 use crate::contents::{Column, Override};
 use crate::units::{Evidence, Quantity, stated, without_unit};
@@ -7,8 +7,8 @@ use crate::units::{Evidence, Quantity, stated, without_unit};
 const NAMES: [&str; 8] =
     ["time", "t", "zeit", "timestamp", "time stamp", "time_stamp", "elapsed time", "x_value"];
 
-/// The unit of a time column, in s: that of its name or else of the line of units; seconds if
-/// neither states one, and for instants of dates and clocks, which are read in seconds.
+/// Returns the unit of a time column, in s: from its name or else the line of units; seconds if
+/// neither states one. Instants of dates and clock times are always in seconds.
 pub(super) fn unit(column: &Column) -> f64 {
     if column.has_instants {
         return 1.0;
@@ -28,7 +28,8 @@ pub(super) fn unit_of(column: &Column) -> Option<f64> {
     }
 }
 
-/// Returns whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `TIME(S)`.
+/// Returns whether a column with this name is a time column: `time`, `t`, `Time_s`, `time [ms]`,
+/// `TIME(S)`.
 pub(crate) fn is_time(name: &str) -> bool {
     is_called_time(name)
         && stated(name, "", Some(Quantity::Time)).is_none_or(|stated| {
@@ -37,23 +38,24 @@ pub(crate) fn is_time(name: &str) -> bool {
         })
 }
 
-/// Returns whether a column is called time, in whatever unit.
+/// Returns whether a column is called time, in any unit.
 pub(super) fn is_called_time(name: &str) -> bool {
     let bare = without_unit(name).to_lowercase();
-    // The last part of a path in an HDF5 file or a struct.
+    // The last part is the name, in a path of an HDF5 file or a struct.
     let last = bare.rsplit(['/', '.']).next().unwrap_or(&bare);
     NAMES.contains(&bare.as_str()) || NAMES.contains(&last.trim())
 }
 
-/// Returns the text of a unit that a time column states and that is not one of time.
+/// Returns the text of a unit of another quantity that a time column states.
 pub(super) fn unclear(column: &Column) -> Option<String> {
     let stated = stated(&column.name, &column.unit, Some(Quantity::Time))?;
     let unclear = stated.evidence == Evidence::Unused && !is_clock(&stated.text);
-    let other = stated.used().is_some_and(|unit| unit.quantity != Quantity::Time);
-    (column.overriding.is_none() && (unclear || other)).then_some(stated.text)
+    let is_another = stated.used().is_some_and(|unit| unit.quantity != Quantity::Time);
+    (column.overriding.is_none() && (unclear || is_another)).then_some(stated.text)
 }
 
-/// Returns whether a text is the pattern of a clock or a date, such as `hh:mm:ss.fff`, or a time zone.
+/// Returns whether a text is a pattern for clock times or dates, such as `hh:mm:ss.fff`, or a time
+/// zone.
 fn is_clock(text: &str) -> bool {
     let lower = text.to_lowercase();
     let pattern = lower.contains(':') && lower.chars().all(|c| "hmsf0yd:./- t'".contains(c));
@@ -85,14 +87,14 @@ mod tests {
             ("X_Value", 1.0),
         ] {
             assert!(is_time(name), "{name}");
-            assert_eq!(unit(&Column::of_numbers(name.into(), vec![0.0])), seconds, "{name}");
+            assert_eq!(unit(&Column::from_numbers(name.into(), vec![0.0])), seconds, "{name}");
         }
         for name in
             ["", "force", "times", "time_of_flight", "t_ref", "ms", "time [mm]", "time [samples]"]
         {
             assert!(!is_time(name), "{name}");
         }
-        let samples = Column::of_numbers("time [samples]".into(), vec![0.0]);
+        let samples = Column::from_numbers("time [samples]".into(), vec![0.0]);
         assert_eq!(unclear(&samples).as_deref(), Some("samples"));
     }
 }

@@ -1,4 +1,4 @@
-//! A dataset 58 as a column of a table.
+//! Conversion of a dataset 58 to columns of a table.
 
 use super::header::Header;
 use super::lines::{Line, Lines};
@@ -10,7 +10,8 @@ use crate::limits::Budget;
 /// Abscissa types other than time: frequency, and revolutions or orders of a shaft.
 const NOT_TIME: [u32; 3] = [18, 19, 20];
 
-/// Adds the columns of the dataset whose number stands on `id`: one or, for uneven instants, two.
+/// Adds the columns of the dataset whose number is on the line `id`: one or, for uneven instants,
+/// two.
 pub(super) fn read(
     lines: &mut Lines<'_>,
     id: &Line<'_>,
@@ -22,18 +23,18 @@ pub(super) fn read(
     Ok(())
 }
 
-/// Reads the dataset whose number stands on `id`: its description and its numbers.
+/// Reads the dataset whose number is on the line `id`: its description and its numbers.
 pub(super) fn dataset(
     lines: &mut Lines<'_>,
     id: &Line<'_>,
     budget: &mut Budget,
 ) -> Result<(Header, Vec<f64>), Fault> {
-    let binary = Binary::of(id)?;
+    let binary = Binary::from_id(id)?;
     let header = Header::read(lines)?;
     if header.count == 0 {
         return Err(Fault::new(header.form_at, "a function without values"));
     }
-    // A number takes a byte at least, whatever the header says.
+    // A number needs at least one byte, so a forged header cannot claim more memory than that.
     let numbers = header.numbers().min(lines.rest().len());
     let room = (0..if header.is_even { 1 } else { 2 }).try_for_each(|_| budget.take_column());
     room.and_then(|()| budget.take_numbers(numbers))
@@ -71,13 +72,13 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
     }
     if header.is_even {
         let axis = Axis::Even { start: header.start, step: header.step };
-        columns.push(Column { about, axis, unit, kind, ..Column::of_numbers(name, values) });
+        columns.push(Column { about, axis, unit, kind, ..Column::from_numbers(name, values) });
         return;
     }
     let (pairs, _) = values.as_chunks::<2>();
     let (times, values) = pairs.iter().map(|[time, value]| (*time, *value)).unzip();
-    // The instants are their own time axis, too.
+    // The column of instants is its own time axis, too.
     let axis = Axis::Column(columns.len());
-    columns.push(Column { axis, ..Column::of_numbers(format!("{name} time"), times) });
-    columns.push(Column { about, axis, unit, kind, ..Column::of_numbers(name, values) });
+    columns.push(Column { axis, ..Column::from_numbers(format!("{name} time"), times) });
+    columns.push(Column { about, axis, unit, kind, ..Column::from_numbers(name, values) });
 }

@@ -8,12 +8,12 @@ use crate::IoError;
 use crate::contents::{Fault, Place};
 use crate::geometry::{Geometry, GeometryPoint};
 
-/// Nodes and trace lines by their numbers.
+/// Nodes and trace lines, identified by their numbers.
 #[derive(Default)]
 struct Model {
     nodes: BTreeMap<u32, [f64; 3]>,
     lines: Vec<[u32; 2]>,
-    /// Length in the file of 1 m.
+    /// Factor from m to the unit of length in the file.
     length: Option<f64>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn read_geometry(file: &str, bytes: &[u8]) -> Result<Geometry, IoErro
         position: position.map(|value| value / length),
     };
     let index: BTreeMap<u32, usize> = model.nodes.keys().zip(0..).map(|(k, at)| (*k, at)).collect();
-    // A line to a node that the file does not have cannot be drawn.
+    // A line to a node that the file does not define cannot be drawn, so it is omitted.
     let pairs = model.lines.iter().filter_map(|[a, b]| Some([*index.get(a)?, *index.get(b)?]));
     Ok(Geometry { lines: pairs.collect(), points: model.nodes.iter().map(point).collect() })
 }
@@ -62,8 +62,8 @@ fn model(lines: &mut Lines<'_>) -> Result<Model, Fault> {
     Ok(model)
 }
 
-/// Nodes to the end of the dataset: number, coordinate systems and colour, then the coordinates on the same line (15) or
-/// on the next (2411).
+/// Reads nodes to the end of the dataset: number, coordinate systems and colour, then the
+/// coordinates on the same line (15) or on the next (2411).
 fn nodes(lines: &mut Lines<'_>, model: &mut Model, is_one_line: bool) -> Result<(), Fault> {
     loop {
         let line = lines.required("dataset has no end: the file is cut short")?;
@@ -72,9 +72,10 @@ fn nodes(lines: &mut Lines<'_>, model: &mut Model, is_one_line: bool) -> Result<
         }
         let node: u32 = number(columns(&line, 0, 10))
             .ok_or_else(|| line.fault("the number of the node is missing in columns 1 to 10"))?;
-        let (line, start, width) = match is_one_line {
-            true => (line, 40, 13),
-            false => (lines.required("the coordinates of a node are missing")?, 0, 25),
+        let (line, start, width) = if is_one_line {
+            (line, 40, 13)
+        } else {
+            (lines.required("the coordinates of a node are missing")?, 0, 25)
         };
         let position = [0, 1, 2].map(|k| number::<f64>(columns(&line, start + k * width, width)));
         let [Some(x), Some(y), Some(z)] = position.map(|v| v.filter(|v| v.is_finite())) else {
@@ -89,7 +90,7 @@ fn nodes(lines: &mut Lines<'_>, model: &mut Model, is_one_line: bool) -> Result<
     }
 }
 
-/// A chain of nodes; 0 lifts the pen.
+/// Reads a trace line, which is a list of nodes; 0 interrupts it.
 fn trace_lines(lines: &mut Lines<'_>, model: &mut Model) -> Result<(), Fault> {
     let about = lines.required("a trace line has no description")?;
     lines.required("a trace line has no name")?;
@@ -118,6 +119,6 @@ fn trace_lines(lines: &mut Lines<'_>, model: &mut Model) -> Result<(), Fault> {
 }
 
 fn columns<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
-    let rest = line.text.get(from..).unwrap_or_default();
-    rest.get(..width).unwrap_or(rest)
+    let tail = line.text.get(from..).unwrap_or_default();
+    tail.get(..width).unwrap_or(tail)
 }

@@ -4,11 +4,11 @@ use super::lines::{Line, Lines, number};
 use crate::contents::Fault;
 use crate::responses::AveragedSegments;
 
-/// Beginning of a second line of description that states the decay that a window adds, in 1/s.
+/// Prefix of a second line of description that states the decay, in 1/s, that a window adds.
 pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
 
-/// Beginning of a third line of description that states what the responses are averages over, by the numbers of
-/// [`AveragedSegments`].
+/// Prefix of a third line of description that states the segments over which the responses are
+/// averages, in the order of [`AveragedSegments::numbers`].
 pub(super) const SEGMENTS: &str = "SEGMENTS ";
 
 /// Description of the function in a dataset 58.
@@ -16,31 +16,32 @@ pub(super) const SEGMENTS: &str = "SEGMENTS ";
 pub(crate) struct Header {
     /// The first line, empty if it says NONE.
     pub title: String,
-    /// Rate, in 1/s, that an exponential window adds to every decay, as the second line states it.
+    /// Decay, in 1/s, that an exponential window adds to every mode, as the second line states it.
     pub added_decay: Option<f64>,
-    /// Segments that it is an average over, as the third line states them.
+    /// Segments over which it was averaged, as the third line states them.
     pub segments: Option<AveragedSegments>,
     /// 1 is a response in time, 4 a frequency response function.
     pub function: u32,
-    /// Node and direction at which it was measured.
+    /// Node and direction of the measurement.
     pub response: String,
-    /// Node and direction to which it refers, if any.
+    /// Node and direction of the reference, if any.
     pub reference: Option<String>,
     pub is_complex: bool,
     pub is_double: bool,
-    /// Values, or pairs of instant and value.
+    /// Number of values, or of pairs of instant and value.
     pub count: usize,
     pub is_even: bool,
-    /// First abscissa and increment, if even.
+    /// First abscissa and increment, for even spacing.
     pub start: f64,
     pub step: f64,
     /// 17 is time, 18 frequency.
     pub abscissa: u32,
-    /// Quantity, for people; empty if the file does not state it.
+    /// Quantity, for messages; empty if the file does not state it.
     pub quantity: String,
-    /// Labels of the units of the ordinate and of what it is divided by; empty without one.
+    /// Labels of the units of the ordinate and of its denominator; empty without one.
     pub units: [String; 2],
-    /// Data types of the ordinate and of what it is divided by: 8, 11 and 12 are a response, 13 a force.
+    /// Data types of the ordinate and of its denominator: 8, 11 and 12 are a response, 13 is a
+    /// force.
     pub ordinate: [u32; 2],
     /// The line with the numbers, for messages.
     pub form_at: usize,
@@ -95,13 +96,13 @@ impl Header {
         })
     }
 
-    /// Number of the numbers in the file: values, each with its instant where the spacing is uneven.
+    /// Returns how many numbers the file has: the values and, for uneven spacing, their instants.
     pub fn numbers(&self) -> usize {
-        let each = 1 + usize::from(self.is_complex) + usize::from(!self.is_even);
-        self.count.saturating_mul(each)
+        let numbers_per_value = 1 + usize::from(self.is_complex) + usize::from(!self.is_even);
+        self.count.saturating_mul(numbers_per_value)
     }
 
-    /// Kind of the function, for people.
+    /// Returns the kind of the function, for messages.
     pub fn kind(&self) -> String {
         match self.function {
             0 => "a function of unknown kind".into(),
@@ -120,20 +121,20 @@ impl Header {
     }
 }
 
-/// Segments that numbers with spaces between them state.
+/// Reads the segments from numbers separated by spaces.
 fn segments_of(text: &[u8]) -> Option<AveragedSegments> {
     let fields = text.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
     let numbers: Option<Vec<f64>> = fields.map(number).collect();
-    AveragedSegments::of_numbers(numbers?.try_into().ok()?)
+    AveragedSegments::from_numbers(numbers?.try_into().ok()?)
 }
 
-/// A field of a line; blank beyond the end.
+/// Returns a field of a line; blank after the end of the line.
 fn field<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
-    let rest = line.text.get(from..).unwrap_or_default();
-    rest.get(..width).unwrap_or(rest).trim_ascii()
+    let tail = line.text.get(from..).unwrap_or_default();
+    tail.get(..width).unwrap_or(tail).trim_ascii()
 }
 
-/// A whole number in a field, 0 if it is blank.
+/// Returns a whole number in a field, 0 if it is blank.
 fn whole<T: std::str::FromStr + Default>(
     line: &Line<'_>,
     from: usize,
@@ -146,7 +147,7 @@ fn whole<T: std::str::FromStr + Default>(
     number(text).ok_or_else(|| wrong(line, from, width, "whole number"))
 }
 
-/// A real number in a field of 13 columns, 0 if it is blank.
+/// Returns a real number in a field of 13 columns, 0 if it is blank.
 fn real(line: &Line<'_>, from: usize) -> Result<f64, Fault> {
     let text = field(line, from, 13);
     if text.is_empty() {
@@ -160,7 +161,7 @@ fn wrong(line: &Line<'_>, from: usize, width: usize, kind: &str) -> Fault {
     line.fault(format!("\"{text}\" in columns {} to {} is no {kind}", from + 1, from + width))
 }
 
-/// A label, empty if it says NONE.
+/// Returns a label, empty if it is NONE.
 fn label(text: &[u8]) -> String {
     match String::from_utf8_lossy(text.trim_ascii()) {
         none if none.eq_ignore_ascii_case("none") => String::new(),
@@ -168,7 +169,7 @@ fn label(text: &[u8]) -> String {
     }
 }
 
-/// Node and direction as engineers write them: `12+Z`, `3-RX`; a scalar is its node alone.
+/// Returns node and direction in the usual form: `12+Z`, `3-RX`; a scalar is its node alone.
 fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<String, Fault> {
     let sign = if direction < 0 { '-' } else { '+' };
     let axis = match direction.unsigned_abs() {
@@ -184,7 +185,7 @@ fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<S
     Ok(format!("{node}{sign}{axis}"))
 }
 
-/// Quantity of the ordinate: its label or, without one, its type, and its unit.
+/// Returns the quantity of the ordinate: its label or, without one, its type, and its unit.
 fn quantity(line: &Line<'_>) -> Result<String, Fault> {
     let kind: u32 = whole(line, 0, 10)?;
     let (name, unit) = (label(field(line, 26, 20)), label(field(line, 47, 20)));

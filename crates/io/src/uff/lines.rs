@@ -1,4 +1,4 @@
-//! Lines of a universal file, and numbers in Fortran's fields.
+//! Lines of a universal file, and numbers in Fortran fields.
 
 use crate::contents::Fault;
 
@@ -15,7 +15,7 @@ impl Line<'_> {
     }
 }
 
-/// The lines of a file, and the bytes between them.
+/// Reader of the lines of a file, and of binary data between them.
 #[derive(Debug)]
 pub(crate) struct Lines<'a> {
     bytes: &'a [u8],
@@ -27,45 +27,45 @@ impl<'a> Lines<'a> {
         Self { bytes, next: 0 }
     }
 
-    /// The next line, without its end.
+    /// Returns the next line, without its line break.
     pub fn next(&mut self) -> Option<Line<'a>> {
-        let rest = self.rest();
-        if rest.is_empty() {
+        let remaining = self.rest();
+        if remaining.is_empty() {
             return None;
         }
-        let end = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
-        let line = Line { text: rest[..end].trim_ascii_end(), at: self.next };
+        let end = remaining.iter().position(|b| *b == b'\n').unwrap_or(remaining.len());
+        let line = Line { text: remaining[..end].trim_ascii_end(), at: self.next };
         self.next += end + 1;
         Some(line)
     }
 
-    /// Reads the next line; at the end, the error `missing`.
+    /// Returns the next line; at the end, the error `missing`.
     pub fn required(&mut self, missing: &str) -> Result<Line<'a>, Fault> {
         let at = self.bytes.len();
         self.next().ok_or_else(|| Fault::new(at, missing))
     }
 
-    /// The rest of the bytes.
+    /// Returns the remaining bytes.
     pub fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.next..).unwrap_or_default()
     }
 
-    /// Offset of the rest.
+    /// Returns the offset of the remaining bytes.
     pub fn at(&self) -> usize {
         self.next
     }
 
-    /// Takes `len` bytes, or fewer at the end.
+    /// Returns the next `len` bytes, or fewer at the end.
     pub fn take(&mut self, len: usize) -> &'a [u8] {
         let taken = self.rest().get(..len).unwrap_or(self.rest());
         self.next += taken.len();
         taken
     }
 
-    /// The number of the line on which a byte stands, counted from 1.
+    /// Returns the number of the line with the byte at offset `at`, counted from 1.
     pub fn number_at(&self, at: usize) -> u64 {
         let before = &self.bytes[..at.min(self.bytes.len())];
-        // At the very end: the last line there is.
+        // The end of the file belongs to the last line.
         let before = if at >= self.bytes.len() { before.trim_ascii_end() } else { before };
         1 + before.iter().filter(|b| **b == b'\n').count() as u64
     }
@@ -76,7 +76,7 @@ pub(crate) fn is_mark(line: &[u8]) -> bool {
     line == b"    -1"
 }
 
-/// A number in a field, if there is one; Fortran writes 1.0D+00 for double precision.
+/// Returns the number in a field, if there is one; Fortran writes 1.0D+00 for double precision.
 pub(crate) fn number<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(field).ok()?.trim();
     text.parse().ok().or_else(|| text.replace(['D', 'd'], "E").parse().ok())

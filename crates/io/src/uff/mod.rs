@@ -1,8 +1,8 @@
 //! Universal files: functions of time, and frequency responses, in datasets 58 and 58b.
 //!
 //! # Source
-//! University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets 58,
-//! 58b, 151 and 164.
+//! University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets
+//! 58, 58b, 151 and 164.
 
 mod function;
 mod geometry;
@@ -75,13 +75,13 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
     Ok(contents)
 }
 
-/// Leaves out the rest of a dataset.
+/// Skips the rest of a dataset.
 fn skip_to_end(lines: &mut Lines<'_>) -> Result<(), Fault> {
     while !is_mark(lines.required("dataset has no end: the file is cut short")?.text) {}
     Ok(())
 }
 
-/// The number of a dataset, in columns 1 to 6 of its first line.
+/// Returns the number of a dataset, in columns 1 to 6 of its first line.
 fn dataset_number(id: &Line<'_>) -> Result<u32, Fault> {
     let field = id.text.get(..6).unwrap_or(id.text);
     number(field).ok_or_else(|| {
@@ -94,16 +94,16 @@ fn dataset_number(id: &Line<'_>) -> Result<u32, Fault> {
     })
 }
 
-/// Units that dataset 164 describes.
+/// Units in dataset 164.
 struct Units {
     code: u32,
     name: String,
-    /// Factors by which lengths and forces in SI units are multiplied in the file.
+    /// Factors from SI units to the units of the file, for lengths and forces.
     length: f64,
     force: f64,
 }
 
-/// The units that dataset 164 describes.
+/// Reads the units in dataset 164.
 fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
     let first = lines.required("the units are cut short")?;
     let code: u32 = number(first.text.get(..10).unwrap_or(first.text))
@@ -119,13 +119,13 @@ fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
 }
 
 impl Units {
-    /// States the unit of columns whose quantity is known and whose label is no unit.
+    /// Sets the unit of columns with a known quantity whose label is not a unit.
     fn apply(&self, columns: &mut [Column]) {
         for column in columns {
             let Some(quantity) = column.kind else { continue };
             let per_si = if quantity == Quantity::Force { self.force } else { self.length };
             let in_si = 1.0 / per_si;
-            // A label in SI units is often left as it was.
+            // A label in SI units is often left unchanged when a program writes other units.
             let is_stated = Unit::parse(&column.unit).is_some_and(|unit| unit.in_si != 1.0);
             if !is_stated && in_si.is_normal() && in_si > 0.0 && in_si != 1.0 {
                 let name = format!("the unit of dataset 164 (code {} {})", self.code, self.name);
@@ -134,8 +134,8 @@ impl Units {
         }
     }
 
-    /// Factor that takes a frequency response to SI units, by its labels or, without them, by the factors of the file;
-    /// with the labels that are used.
+    /// Returns the factor that converts a frequency response to SI units, from its labels or,
+    /// without them, from the factors of the file; and the labels that were used.
     fn factor(stated: Option<&Self>, labels: &[String; 2]) -> (f64, Vec<String>) {
         let [motion, force] = labels;
         let of_label = |label: &String, is_force: bool| {

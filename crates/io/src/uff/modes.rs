@@ -14,17 +14,17 @@ use crate::geometry::{NodalMode, NodalModes};
 /// Names of the values at a node, in the order of the dataset.
 const DIRECTIONS: [&str; 6] = ["+X", "+Y", "+Z", "+RX", "+RY", "+RZ"];
 
-/// Largest number of values at a node: translations and rotations.
+/// Maximum number of values at a node: translations and rotations.
 const MOST_VALUES: usize = DIRECTIONS.len();
 
-/// A mode with the values at each node.
+/// Mode with the values at each node.
 struct Nodal {
     frequency_hz: f64,
     damping_ratio: f64,
     values: BTreeMap<u32, Vec<Complex<f64>>>,
 }
 
-/// Reads the modes of a file; directions in which no node moves in any mode are left out.
+/// Reads the modes of a file; directions without motion in all modes are omitted.
 pub(crate) fn read_modes(file: &str, bytes: &[u8]) -> Result<NodalModes, IoError> {
     let mut lines = Lines::new(bytes);
     let modes = modes(&mut lines).map_err(|fault| {
@@ -88,7 +88,7 @@ fn modes(lines: &mut Lines<'_>) -> Result<Vec<Nodal>, Fault> {
     Ok(modes)
 }
 
-/// Reads a dataset 55; `None` if its data are not those of a mode.
+/// Reads a dataset 55; `None` if its data are not a mode.
 fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
     const SHORT: &str = "dataset 55 is cut short";
     for _ in 0..5 {
@@ -100,7 +100,7 @@ fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
             .ok_or_else(|| line.fault(format!("no whole number in field {}", at + 1)))
     };
     let (analysis, data, width) = (integer(&kind, 1)?, integer(&kind, 4)?, integer(&kind, 5)?);
-    // Normal modes, and complex eigenvalues of first and second order.
+    // The analysis types are normal modes, and complex eigenvalues of first and second order.
     if ![2, 3, 7].contains(&analysis) {
         skip_to_end(lines)?;
         return Ok(None);
@@ -132,17 +132,17 @@ fn mode(lines: &mut Lines<'_>) -> Result<Option<Nodal>, Fault> {
         }
         let node: u32 = number(columns(&line, 0, 10))
             .ok_or_else(|| line.fault("the number of the node is missing in columns 1 to 10"))?;
-        let each = if data == 5 { 2 } else { 1 };
-        let numbers = numbers(lines, each * width)?;
+        let numbers_per_value = if data == 5 { 2 } else { 1 };
+        let numbers = numbers(lines, numbers_per_value * width)?;
         let complex = |part: &[f64]| Complex::new(part[0], part.get(1).copied().unwrap_or(0.0));
-        if nodes.insert(node, numbers.chunks(each).map(complex).collect()).is_some() {
+        if nodes.insert(node, numbers.chunks(numbers_per_value).map(complex).collect()).is_some() {
             return Err(line.fault(format!("node {node} is there twice")));
         }
     }
     Ok(Some(Nodal { frequency_hz, damping_ratio, values: nodes }))
 }
 
-/// Largest number of type-specific numbers that a dataset is believed to state.
+/// Maximum number of type-specific real numbers; a dataset with more is an error.
 const MOST_REALS: usize = 64;
 
 /// Reads numbers in fields of 13 columns, six a line.
@@ -162,8 +162,8 @@ fn numbers(lines: &mut Lines<'_>, count: usize) -> Result<Vec<f64>, Fault> {
 }
 
 fn columns<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
-    let rest = line.text.get(from..).unwrap_or_default();
-    rest.get(..width).unwrap_or(rest)
+    let tail = line.text.get(from..).unwrap_or_default();
+    tail.get(..width).unwrap_or(tail)
 }
 
 #[cfg(test)]

@@ -21,10 +21,10 @@ const FREQUENCY: u32 = 18;
 /// Data type of an excitation force.
 const EXCITATION_FORCE: u32 = 13;
 
-/// Data type of any quantity, which the label or the user states.
+/// Data type of any quantity; the label or the user states which.
 const GENERAL: u32 = 1;
 
-/// Relative difference of two frequencies, in printed single precision.
+/// Maximum relative difference between two equal frequencies printed in single precision.
 const SAME_FREQUENCY: f64 = 2e-5;
 
 /// Reads the frequency responses of a file, in SI units.
@@ -103,15 +103,19 @@ fn add(
             header.kind()
         )));
     }
-    let each = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
-    let rows = values.chunks_exact(each);
-    let frequency_hz: Vec<f64> = match header.is_even {
-        true => (0..header.count).map(|k| header.start + k as f64 * header.step).collect(),
-        false => rows.clone().map(|row| row[0]).collect(),
+    let numbers_per_value = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
+    let rows = values.chunks_exact(numbers_per_value);
+    let frequency_hz: Vec<f64> = if header.is_even {
+        (0..header.count).map(|k| header.start + k as f64 * header.step).collect()
+    } else {
+        rows.clone().map(|row| row[0]).collect()
     };
-    let numbers = rows.map(|row| match header.is_complex {
-        true => Complex::new(row[each - 2], row[each - 1]),
-        false => Complex::from(row[each - 1]),
+    let numbers = rows.map(|row| {
+        if header.is_complex {
+            Complex::new(row[numbers_per_value - 2], row[numbers_per_value - 1])
+        } else {
+            Complex::from(row[numbers_per_value - 1])
+        }
     });
     let numbers: Vec<Complex<f64>> = numbers.collect();
     if let Some(at) = numbers.iter().position(|z| !z.is_finite()) {
@@ -168,7 +172,7 @@ fn quantity_of_label(label: &str) -> Option<ResponseQuantity> {
     }
 }
 
-/// Takes the frequencies of the first function, and asks the others for the same.
+/// Stores the frequencies of the first function, and compares all others with them.
 fn same_frequencies(
     responses: &mut FrequencyResponses,
     id: &Line<'_>,
@@ -191,7 +195,7 @@ fn same_frequencies(
     }
 }
 
-/// Takes the responses to SI units, by their labels and the factors of the file.
+/// Converts the responses to SI units, by their labels and the factors of the file.
 fn to_si(responses: &mut FrequencyResponses, labels: &[[String; 2]], stated: Option<&Units>) {
     let (mut by_label, mut of_file) = (BTreeMap::new(), None);
     for (function, labels) in responses.functions.iter_mut().zip(labels) {

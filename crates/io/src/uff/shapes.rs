@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 
 use crate::geometry::{Geometry, PointShape};
 
-/// Numbers of nodes on a line of dataset 82.
+/// Number of nodes per line of dataset 82.
 const ON_LINE: usize = 8;
 
-/// Writes points, lines and complex modes in SI units.
+/// Returns points, lines and complex modes in SI units as datasets.
 pub(crate) fn write_shapes(geometry: &Geometry, shapes: &[PointShape]) -> String {
     let mut text = String::new();
     let numbers = node_numbers(geometry);
@@ -36,8 +36,8 @@ pub(crate) fn write_shapes(geometry: &Geometry, shapes: &[PointShape]) -> String
     text
 }
 
-/// One complex mode: structural model (1), complex eigenvalue (3), translations (2), displacement (8), complex
-/// (5), three values at each node.
+/// Appends one complex mode: structural model (1), complex eigenvalue (3), translations (2),
+/// displacement (8), complex (5), three values at each node.
 fn mode(text: &mut String, number: usize, shape: &PointShape, numbers: &[u32]) {
     let _ = writeln!(text, "    -1\n    55\nmode shape\nNONE\nNONE");
     let _ = writeln!(
@@ -59,14 +59,14 @@ fn mode(text: &mut String, number: usize, shape: &PointShape, numbers: &[u32]) {
     let _ = writeln!(text, "    -1");
 }
 
-/// Numbers of the nodes: their names where all are different numbers, otherwise from 1.
+/// Returns the numbers of the nodes: their names if all are different numbers, otherwise from 1.
 fn node_numbers(geometry: &Geometry) -> Vec<u32> {
     let named: Option<Vec<u32>> =
         geometry.points.iter().map(|point| point.name.parse().ok().filter(|n| *n > 0)).collect();
     named.unwrap_or_else(|| (1..).take(geometry.points.len()).collect())
 }
 
-/// The lines as one chain, with 0 where the pen is lifted.
+/// Returns the lines as one trace line, interrupted by 0.
 fn chain(geometry: &Geometry, numbers: &[u32]) -> Vec<u32> {
     let mut chain: Vec<u32> = Vec::new();
     for [a, b] in &geometry.lines {
@@ -82,7 +82,7 @@ fn chain(geometry: &Geometry, numbers: &[u32]) -> Vec<u32> {
     chain
 }
 
-/// A number in a field of 13 columns, as Fortran's E13.5 has it.
+/// Returns a number in a field of 13 columns, in Fortran format E13.5.
 fn field(value: f64) -> String {
     let text = format!("{value:.5e}");
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));

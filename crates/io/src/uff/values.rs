@@ -6,11 +6,11 @@ use super::header::Header;
 use super::lines::{Line, Lines, is_mark, number};
 use crate::contents::Fault;
 
-/// Width of a printed number in single and in double precision.
+/// Width of a printed number, in single and in double precision.
 const SINGLE: usize = 13;
 const DOUBLE: usize = 20;
 
-/// The printed numbers up to the end of the dataset, whose mark is left to read.
+/// Reads the printed numbers up to the mark at the end of the dataset, which is not consumed.
 pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
     let expected = header.numbers();
     let mut values = Vec::new();
@@ -33,7 +33,7 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
     Ok(values)
 }
 
-/// The numbers of a line, between blanks or, where they touch, by their columns.
+/// Reads the numbers of a line: separated by blanks, or by their columns if they touch.
 fn row(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result<(), Fault> {
     let before = values.len();
     let blank = |b: &u8| b.is_ascii_whitespace();
@@ -48,19 +48,19 @@ fn row(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result<(), Fa
 }
 
 fn by_columns(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result<(), Fault> {
-    let mut rest = line.text;
-    while !rest.trim_ascii().is_empty() {
-        // In uneven spacing the instants are single precision even among double values.
-        let each = 2 + usize::from(header.is_complex);
-        let is_instant = !header.is_even && values.len().is_multiple_of(each);
+    let mut remaining = line.text;
+    while !remaining.trim_ascii().is_empty() {
+        // Unevenly spaced instants are single precision even if the values are double.
+        let numbers_per_value = 2 + usize::from(header.is_complex);
+        let is_instant = !header.is_even && values.len().is_multiple_of(numbers_per_value);
         let width = if header.is_double && !is_instant { DOUBLE } else { SINGLE };
-        let (field, after) = rest.split_at(width.min(rest.len()));
+        let (field, after) = remaining.split_at(width.min(remaining.len()));
         let value = number(field).ok_or_else(|| {
             let text = String::from_utf8_lossy(field.trim_ascii()).into_owned();
             line.fault(format!("\"{text}\" is not a number"))
         })?;
         values.push(value);
-        rest = after;
+        remaining = after;
     }
     Ok(())
 }
@@ -72,8 +72,9 @@ pub(crate) struct Binary {
 }
 
 impl Binary {
-    /// Reads the format from the line with the number of the dataset; `None` if the values are printed.
-    pub fn of(id: &Line<'_>) -> Result<Option<Self>, Fault> {
+    /// Reads the format from the line with the number of the dataset; `None` if the values are
+    /// printed.
+    pub fn from_id(id: &Line<'_>) -> Result<Option<Self>, Fault> {
         if !matches!(id.text.get(6), Some(b'b' | b'B')) {
             return Ok(None);
         }
@@ -93,12 +94,12 @@ impl Binary {
         }
     }
 
-    /// Reads the numbers, which the end of the dataset must follow.
+    /// Reads the numbers; the end of the dataset must follow.
     pub fn read(self, header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
         let width = if header.is_double { 8 } else { 4 };
         let expected = header.numbers();
         let plain = expected.saturating_mul(width);
-        // By the standard, instants are single precision; some programs write double.
+        // The standard requires single-precision instants; some programs write double.
         let narrow = plain.saturating_sub(4 * header.count);
         let is_mixed = header.is_double
             && !header.is_even
@@ -111,9 +112,9 @@ impl Binary {
             return Err(Fault::new(lines.at(), what));
         }
         let mut bytes = lines.take(len);
-        let each = 2 + usize::from(header.is_complex);
+        let numbers_per_value = 2 + usize::from(header.is_complex);
         let values = (0..expected).map(|k| {
-            let narrow = width == 4 || (is_mixed && k % each == 0);
+            let narrow = width == 4 || (is_mixed && k % numbers_per_value == 0);
             self.number(&mut bytes, narrow).unwrap_or(f64::NAN)
         });
         let values = values.collect();
@@ -123,7 +124,7 @@ impl Binary {
         Ok(values)
     }
 
-    /// The next number, of 4 or 8 bytes.
+    /// Returns the next number, of 4 or 8 bytes.
     fn number(self, bytes: &mut &[u8], narrow: bool) -> Option<f64> {
         if narrow {
             let (number, rest) = bytes.split_first_chunk::<4>()?;
@@ -142,10 +143,12 @@ impl Binary {
     }
 }
 
-/// Returns whether the mark of an end follows so many bytes, at once or on the next line.
+/// Returns whether the mark at the end of a dataset follows after `len` bytes, directly or on the
+/// next line.
 fn ends_after(bytes: &[u8], len: usize) -> bool {
     let Some(rest) = bytes.get(len..) else { return false };
     let line_end = rest.iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
-    let rest = &rest[line_end.min(2)..];
-    rest.starts_with(b"    -1") && rest.get(6).is_none_or(u8::is_ascii_whitespace)
+    let after_line_end = &rest[line_end.min(2)..];
+    after_line_end.starts_with(b"    -1")
+        && after_line_end.get(6).is_none_or(u8::is_ascii_whitespace)
 }

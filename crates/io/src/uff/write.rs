@@ -1,4 +1,4 @@
-//! Frequency responses as datasets 151, 164 and 58.
+//! Writer of frequency responses as datasets 151, 164 and 58.
 
 use std::fmt::Write as _;
 
@@ -7,16 +7,17 @@ use mechid_model::ResponseQuantity;
 use super::header::{ADDED_DECAY, SEGMENTS};
 use crate::responses::{FrequencyResponses, ResponseFunction};
 
-/// Relative deviation of evenly spaced frequencies from a constant step.
+/// Maximum relative deviation of evenly spaced frequencies from a constant step.
 const EVEN: f64 = 1e-9;
 
-/// Writes a universal file: a header (151), SI units (164), and a dataset 58 for each frequency
-/// response and coherence, in double precision; or the point that is not written as a node and a
+/// Returns a universal file: a header (151), SI units (164), and a dataset 58 for each frequency
+/// response and coherence, in double precision; the error is a point that is not a node and a
 /// direction.
 pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, String> {
     let mut text = String::new();
     let title = printable(&responses.file);
-    // Name, description, program, dates, program and date of the file; a date is not repeatable.
+    // The lines are name, description, program, dates, program and date of the file; a date would
+    // make two runs differ.
     for line in ["    -1", "   151", &title, "NONE", "mechid"] {
         let _ = writeln!(text, "{line}");
     }
@@ -75,7 +76,7 @@ pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, 
 /// Data type, name and unit.
 type Ordinate = (u32, &'static str, &'static str);
 
-/// Response and force of a frequency response.
+/// Returns the ordinates of response and force of a frequency response.
 fn ordinate(function: &ResponseFunction) -> [Ordinate; 2] {
     let response = match function.quantity {
         Some(ResponseQuantity::Displacement) => (8, "Displacement", "m"),
@@ -88,7 +89,7 @@ fn ordinate(function: &ResponseFunction) -> [Ordinate; 2] {
 
 struct Dataset<'a> {
     title: &'a str,
-    /// Second and third line of description.
+    /// Second and third line of the description.
     about: [&'a str; 2],
     /// 4 is a frequency response function, 6 a coherence.
     function: u32,
@@ -98,7 +99,7 @@ struct Dataset<'a> {
     ordinate: [Ordinate; 2],
     is_complex: bool,
     frequency_hz: &'a [f64],
-    /// Values, a complex one as two numbers.
+    /// Values; a complex value is two numbers.
     numbers: Vec<f64>,
 }
 
@@ -125,16 +126,17 @@ impl Dataset<'_> {
         axis(text, (18, "Frequency", "Hz"));
         self.ordinate.into_iter().for_each(|ordinate| axis(text, ordinate));
         axis(text, (0, "NONE", "NONE"));
-        let each = if self.is_complex { 2 } else { 1 };
-        // By the standard, four numbers a line; of uneven frequencies, two values with theirs or one.
+        let numbers_per_value = if self.is_complex { 2 } else { 1 };
+        // The standard requires four numbers per line; with uneven frequencies, one or two values
+        // with their frequencies.
         let values = match (is_even, self.is_complex) {
             (true, true) => 2,
             (true, false) => 4,
             (false, true) => 1,
             (false, false) => 2,
         };
-        for (line, numbers) in self.numbers.chunks(values * each).enumerate() {
-            for (at, value) in numbers.chunks(each).enumerate() {
+        for (line, numbers) in self.numbers.chunks(values * numbers_per_value).enumerate() {
+            for (at, value) in numbers.chunks(numbers_per_value).enumerate() {
                 if !is_even {
                     text.push_str(&narrow(hz[line * values + at]));
                 }
@@ -148,12 +150,12 @@ impl Dataset<'_> {
     }
 }
 
-/// An axis: data type, exponents of its unit, name and unit.
+/// Appends an axis: data type, exponents of its unit, name and unit.
 fn axis(text: &mut String, (kind, name, unit): Ordinate) {
     let _ = writeln!(text, "{kind:10}{:5}{:5}{:5} {name:20} {unit:20}", 0, 0, 0);
 }
 
-/// A number in a field of 13 columns, with as many digits as fit.
+/// Returns a number in a field of 13 columns, with as many digits as fit.
 fn narrow(number: f64) -> String {
     let mut digits = 8;
     loop {
@@ -165,7 +167,7 @@ fn narrow(number: f64) -> String {
     }
 }
 
-/// Node and direction of a point such as `12+Z`; a node alone is a scalar.
+/// Returns node and direction of a point such as `12+Z`; a node alone is a scalar.
 fn point(label: &str) -> Result<(u32, i32), String> {
     node_and_direction(label).ok_or_else(|| label.to_owned())
 }
@@ -179,12 +181,12 @@ fn node_and_direction(label: &str) -> Option<(u32, i32)> {
     Some((node.parse().ok()?, sign * (axis as i32 + 1)))
 }
 
-/// A line of at most 80 printable characters.
+/// Returns a line of at most 80 printable characters.
 fn printable(text: &str) -> String {
-    let kept: String =
+    let printable: String =
         text.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' }).collect();
-    // A line that looks like the end of a dataset would be one.
-    format!("FRF of {}", kept.get(..kept.len().min(72)).unwrap_or_default())
+    // A title that looks like the end of a dataset would end it, so it gets a prefix.
+    format!("FRF of {}", printable.get(..printable.len().min(72)).unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -2,16 +2,16 @@
 
 use super::vocabulary::{Dimension, Entry, VOCABULARY};
 
-/// Largest length of a unit, in bytes; a longer text is none.
+/// Maximum length of a unit, in bytes; a longer text is not a unit.
 const MAX_BYTES: usize = 64;
 
-/// Largest depth of brackets in a unit.
+/// Maximum depth of brackets in a unit.
 const MAX_DEPTH: usize = 4;
 
-/// Largest magnitude of an exponent.
+/// Maximum magnitude of an exponent.
 const MAX_POWER: i8 = 4;
 
-/// A unit: its dimension and its size in SI units.
+/// Dimension of a unit and its size in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Expression {
     pub dimension: Dimension,
@@ -46,7 +46,7 @@ impl Expression {
     }
 }
 
-/// Returns the unit of this spelling. Another case is taken where only one unit has the letters.
+/// Returns the unit with this spelling. The case is ignored if only one unit has these letters.
 fn lookup(word: &str) -> Option<Expression> {
     let word = word.replace('μ', "µ");
     let of = |entry: &Entry| Expression { dimension: entry.dimension, in_si: entry.in_si };
@@ -54,14 +54,14 @@ fn lookup(word: &str) -> Option<Expression> {
     if let Some(entry) = exact {
         return Some(of(entry));
     }
-    let mut alike = VOCABULARY.iter().filter(|entry| {
+    let mut matches = VOCABULARY.iter().filter(|entry| {
         entry.spellings.iter().any(|spelling| spelling.eq_ignore_ascii_case(&word))
     });
-    let first = alike.next()?;
-    alike.next().is_none().then(|| of(first))
+    let first = matches.next()?;
+    matches.next().is_none().then(|| of(first))
 }
 
-/// A reader of products and quotients of units.
+/// Parser of products and quotients of units.
 struct Parser<'a> {
     rest: &'a str,
     depth: usize,
@@ -82,11 +82,12 @@ impl Parser<'_> {
         }
     }
 
-    /// Reads the sign between two factors: 1 for a product, −1 for a quotient; `None` at the end.
+    /// Reads the operator between two factors: 1 for a product, −1 for a quotient; `None` at the
+    /// end.
     fn operator(&mut self) -> Option<i8> {
         let mut trimmed = self.rest.trim_start();
         let is_apart = trimmed.len() < self.rest.len();
-        // The point of an abbreviation: `in.`, `in./s²`.
+        // The point belongs to an abbreviation: `in.`, `in./s²`.
         if let Some(rest) = trimmed.strip_prefix('.')
             && !rest.starts_with(char::is_alphabetic)
         {
@@ -180,7 +181,7 @@ impl Parser<'_> {
     }
 }
 
-/// A factor of a product.
+/// Factor of a product.
 struct Power {
     base: Expression,
     power: i8,
@@ -192,7 +193,7 @@ impl Power {
     }
 }
 
-/// Returns the plain character of a raised one.
+/// Returns the plain character of a superscript.
 fn raised(c: char) -> Option<char> {
     Some(match c {
         '⁻' => '-',

@@ -7,33 +7,33 @@ use super::vocabulary::{Dimension, G};
 use super::words::{is_ambiguous, is_label, is_quantity_word, quantity_word, split_words};
 use super::{Quantity, Unit};
 
-/// Largest number of words of a text for a unit; a longer one without a unit is a description.
+/// Maximum number of words of a text for a unit; a longer one that is not a unit is a description.
 const MAX_UNIT_WORDS: usize = 2;
 
-/// Strength of what a header says about the unit of its column.
+/// Reliability of the unit that a header states for its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Evidence {
-    /// The unit is stated.
+    /// The unit is stated clearly.
     Stated,
-    /// The unit is read from the header, and other readings are possible.
+    /// The unit is read from the header, but other interpretations are possible.
     Likely,
-    /// The text may be a unit; the numbers are taken without it.
+    /// The text may be a unit; the numbers are read without it.
     Unused,
 }
 
-/// Text in the header of a column that states its unit, or may do so.
+/// Text in the header of a column that is or may be its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatedUnit {
-    /// Text, as it is written.
+    /// Text in its original form.
     pub text: String,
     /// Unit that the text is or may be; `None` if it is not understood.
     pub unit: Option<Unit>,
-    /// Strength of the statement.
+    /// Reliability of the statement.
     pub evidence: Evidence,
 }
 
 impl StatedUnit {
-    /// Returns the unit in which the numbers of the column are taken; `None` stands for SI units.
+    /// Returns the unit in which the numbers of the column are read; `None` means SI units.
     pub fn used(&self) -> Option<&Unit> {
         self.unit.as_ref().filter(|_| self.evidence != Evidence::Unused)
     }
@@ -43,51 +43,53 @@ impl StatedUnit {
     }
 }
 
-/// Returns what a column states about its unit: in its `name`, or as `unit`, a text of its own (in a line of units, a
-/// label or an attribute). With a `wanted` quantity, words of the name count that are units of it.
+/// Returns what a column states about its unit: in its `name`, or as a separate text `unit` (in a
+/// line of units, a label or an attribute). If a quantity is `wanted`, units of it count also as
+/// words of the name.
 pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
     let name = without_copy_number(name.trim());
     let brackets = brackets(name);
     let notes: Vec<&str> =
         brackets.iter().flat_map(|one| notes_of(&name[one.inner.clone()])).collect();
-    let in_brackets = of_notes(&notes, wanted);
+    let in_brackets = unit_in_notes(&notes, wanted);
     if let Some(found) = &in_brackets
         && found.evidence != Evidence::Unused
     {
         return in_brackets;
     }
     let outside = without_spans(name, brackets.into_iter().map(|one| one.span));
-    // The stroke of `velmm/s` is one of the unit, and no unit of time follows it.
+    // The stroke of `velmm/s` belongs to the unit, and a unit of time alone cannot follow it.
     let is_of_unit = |found: &StatedUnit| {
         let is_time = found.unit.as_ref().is_some_and(|unit| unit.quantity == Quantity::Time);
         is_time && wanted.is_some_and(|wanted| wanted != Quantity::Time)
     };
-    let of_stroke = || of_stroke(&outside).filter(|found| !is_of_unit(found));
-    let after_stroke = if in_brackets.is_none() { of_stroke() } else { None };
+    let unit_after_stroke = || unit_after_stroke(&outside).filter(|found| !is_of_unit(found));
+    let after_stroke = if in_brackets.is_none() { unit_after_stroke() } else { None };
     let of_text = || {
         let notes: Vec<&str> = notes_of(unit).collect();
-        // Several words that hold no unit describe the channel.
+        // Several words without a unit are a description of the channel.
         let is_description = unit.split_whitespace().count() > MAX_UNIT_WORDS;
-        of_notes(&notes, wanted).filter(|found| found.unit.is_some() || !is_description)
+        unit_in_notes(&notes, wanted).filter(|found| found.unit.is_some() || !is_description)
     };
-    let of_words = || in_brackets.is_none().then(|| of_words(&outside, wanted)).flatten();
+    let unit_from_words =
+        || in_brackets.is_none().then(|| unit_from_words(&outside, wanted)).flatten();
     let used = |found: &StatedUnit| found.evidence != Evidence::Unused;
     after_stroke
         .filter(used)
         .or_else(|| of_text().filter(used))
-        .or_else(of_words)
+        .or_else(unit_from_words)
         .or(in_brackets)
-        .or_else(of_stroke)
+        .or_else(unit_after_stroke)
         .or_else(of_text)
 }
 
-/// Returns a name without the unit that it states, in brackets, after a stroke or as its last words. Brackets at the end
-/// are removed, whatever they hold.
+/// Returns a name without the unit that it states in brackets, after a stroke or as its last words.
+/// Brackets at the end are always removed.
 pub(crate) fn without_unit(name: &str) -> String {
     let name = name.trim();
     let is_removed = |one: &Bracket| {
         let notes: Vec<&str> = notes_of(&name[one.inner.clone()]).collect();
-        one.span.end == name.len() || of_notes(&notes, None).is_some()
+        one.span.end == name.len() || unit_in_notes(&notes, None).is_some()
     };
     let removed = brackets(name).into_iter().filter(is_removed).map(|one| one.span);
     let removed: Vec<Range<usize>> = removed.collect();
@@ -111,8 +113,8 @@ pub(crate) fn without_unit(name: &str) -> String {
     }
 }
 
-/// Returns other forms of a name by which a person may call the column: without its unit, and without brackets that hold
-/// a unit alone.
+/// Returns shorter forms of a name with which a user may choose the column: without its unit, and
+/// without brackets that contain only a unit.
 pub(crate) fn names_without_unit(name: &str) -> [String; 2] {
     let is_unit = |one: &Bracket| {
         let note = read_note(&name[one.inner.clone()], None);
@@ -133,7 +135,7 @@ pub(crate) fn name_without_brackets(name: &str) -> String {
     without_spans(name, brackets(name).into_iter().map(|one| one.span))
 }
 
-/// Removes the number that pandas appends to a name that stood twice: `Force [N].1`.
+/// Removes the number that pandas appends to a name that occurs twice: `Force [N].1`.
 fn without_copy_number(name: &str) -> &str {
     match name.rsplit_once('.') {
         Some((before, number))
@@ -147,7 +149,7 @@ fn without_copy_number(name: &str) -> &str {
     }
 }
 
-/// The notes in a text, which semicolons and commas separate.
+/// Returns the notes in a text, separated by semicolons and commas.
 fn notes_of(text: &str) -> impl Iterator<Item = &str> {
     text.split([';', ',']).map(bare_note)
 }
@@ -161,7 +163,8 @@ struct Bracket {
     inner: Range<usize>,
 }
 
-/// Returns the outermost brackets of a name, with their contents; one that is never closed reaches to the end.
+/// Returns the outermost brackets of a name, with their contents; one that is never closed extends
+/// to the end.
 fn brackets(name: &str) -> Vec<Bracket> {
     const PAIRS: [(char, char); 5] = [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>'), ('（', '）')];
     let mut brackets = Vec::new();
@@ -189,7 +192,7 @@ fn brackets(name: &str) -> Vec<Bracket> {
     brackets
 }
 
-/// A name without some of its parts, blanks closed up.
+/// Returns a name without some of its parts and the blanks around them.
 fn without_spans(name: &str, spans: impl Iterator<Item = Range<usize>>) -> String {
     let (mut parts, mut from) = (Vec::new(), 0);
     for span in spans {
@@ -207,17 +210,17 @@ fn without_spans(name: &str, spans: impl Iterator<Item = Range<usize>>) -> Strin
 enum Note {
     /// A unit.
     Unit(Unit),
-    /// A unit with words that leave a doubt: `um pk-pk`.
+    /// Unit with further words that make it uncertain: `um pk-pk`.
     Qualified(Unit),
-    /// Not understood; with the unit that it may contain.
+    /// Text that is not understood; with the unit that it may contain.
     Unclear(Option<Unit>),
-    /// A place, a direction or a channel, and no unit.
+    /// Place, direction or channel rather than a unit.
     Label,
 }
 
-/// Reads what stands in brackets.
-fn of_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<StatedUnit> {
-    if let Some(unit) = of_sensitivity(notes) {
+/// Returns the unit that texts in brackets state.
+fn unit_in_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<StatedUnit> {
+    if let Some(unit) = unit_from_sensitivity(notes) {
         return Some(StatedUnit::new(&notes.join("; "), unit, Evidence::Stated));
     }
     let notes: Vec<(&str, Note)> =
@@ -246,12 +249,12 @@ fn of_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<StatedUnit> {
     unit(true).or_else(|| unit(false)).or_else(qualified).or_else(unclear)
 }
 
-/// A note without brackets around all of it and without the word `unit`.
+/// Returns a note without brackets around all of it and without the word `unit`.
 fn bare_note(note: &str) -> &str {
     let mut note = note.trim().trim_matches('"').trim();
     for (open, close) in [('[', ']'), ('{', '}'), ('<', '>'), ('(', ')')] {
         let inner = note.strip_prefix(open).and_then(|inner| inner.strip_suffix(close));
-        // The brackets of `(m/s²)·(s)` are not around all of it.
+        // The brackets of `(m/s²)·(s)` do not enclose all of it.
         note = inner.filter(|inner| !inner.contains(close)).unwrap_or(note).trim();
     }
     let lower = note.to_lowercase();
@@ -271,7 +274,7 @@ fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
         return Note::Unit(unit);
     }
     if let Some(Expression { dimension, .. }) = Expression::parse(note) {
-        // A load cell reads kg: kilograms-force.
+        // A load cell in kg measures kilograms-force.
         return if dimension == Dimension::MASS && wanted == Some(Quantity::Force) {
             let in_si = Expression::parse(note).map_or(1.0, |mass| mass.in_si) * G;
             Note::Qualified(Unit { name: note.into(), quantity: Quantity::Force, in_si })
@@ -282,7 +285,7 @@ fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
     if note.is_empty() || is_label(note) {
         return Note::Label;
     }
-    // `in mm`: a preposition, and no inch.
+    // The word `in` of `in mm` is a preposition and not an inch.
     if let Some(unit) = note.strip_prefix("in ").and_then(Unit::parse) {
         return Note::Unit(unit);
     }
@@ -305,14 +308,14 @@ fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
 
 /// Reads a number with a unit, such as a range: `±50 g`, `0.1 mm`, `x10 N`.
 fn with_number(note: &str) -> Option<Unit> {
-    let rest = note.trim_start_matches(['±', '+', '-', '~', '<', '>', '≤', '*', '×', ' ']);
-    let rest = rest.strip_prefix('x').unwrap_or(rest);
-    let (number, unit) = number_and_rest(rest)?;
+    let unsigned = note.trim_start_matches(['±', '+', '-', '~', '<', '>', '≤', '*', '×', ' ']);
+    let unsigned = unsigned.strip_prefix('x').unwrap_or(unsigned);
+    let (number, unit) = number_and_rest(unsigned)?;
     let unit = Unit::parse(unit)?;
     Some(Unit { name: note.into(), in_si: number * unit.in_si, ..unit })
 }
 
-/// Splits a positive number from the text behind it.
+/// Splits a positive number from the text after it.
 pub(crate) fn number_and_rest(text: &str) -> Option<(f64, &str)> {
     let is_part = |c: char| c.is_ascii_digit() || c == '.';
     let end = text.find(|c| !is_part(c)).unwrap_or(text.len());
@@ -320,8 +323,8 @@ pub(crate) fn number_and_rest(text: &str) -> Option<(f64, &str)> {
     (number > 0.0 && number.is_finite()).then(|| (number, text[end..].trim()))
 }
 
-/// Reads a sensitivity beside the unit of the converter: `mV; 11.2 mV/N` is 1/11.2 N.
-fn of_sensitivity(notes: &[&str]) -> Option<Unit> {
+/// Reads a sensitivity together with the unit of the converter: `mV; 11.2 mV/N` is 1/11.2 N.
+fn unit_from_sensitivity(notes: &[&str]) -> Option<Unit> {
     let notes: Vec<&str> = notes.iter().map(|note| bare_note(note)).collect();
     let raw = notes
         .iter()
@@ -332,7 +335,7 @@ fn of_sensitivity(notes: &[&str]) -> Option<Unit> {
         Some((note, (number, Expression::parse(rest).filter(|e| e.dimension.is_electric())?)))
     })?;
     let dimension = raw.dimension.times(per_unit.dimension, -1)?;
-    let quantity = Quantity::of_dimension(dimension)?;
+    let quantity = Quantity::from_dimension(dimension)?;
     let in_si = raw.in_si / (number * per_unit.in_si);
     in_si.is_normal().then(|| Unit { name: format!("1/({text})"), quantity, in_si })
 }
@@ -341,7 +344,7 @@ fn of_sensitivity(notes: &[&str]) -> Option<Unit> {
 fn stroke(name: &str) -> Option<(&str, Expression)> {
     let (before, after) = name.split_once('/')?;
     let unit = Expression::parse(after)?;
-    // The stroke of `vel_m/s` is one of the unit.
+    // The stroke of `vel_m/s` belongs to the unit.
     let is_unit_word = |span: &Range<usize>| {
         let word = &name[span.clone()];
         word.contains('/') && word.len() < name.len() && Unit::parse(word).is_some()
@@ -349,14 +352,14 @@ fn stroke(name: &str) -> Option<(&str, Expression)> {
     if split_words(name).iter().any(is_unit_word) {
         return None;
     }
-    // `v/mm/s` is no voltage over a velocity.
+    // `v/mm/s` is not a voltage divided by a velocity.
     let is_unit_alone = Expression::parse(name).is_some_and(|unit| !unit.dimension.is_electric());
     let is_name = !is_unit_alone && !before.trim().is_empty();
-    let is_unit = Quantity::of_dimension(unit.dimension).is_some();
+    let is_unit = Quantity::from_dimension(unit.dimension).is_some();
     (is_name && is_unit).then_some((before, unit))
 }
 
-fn of_stroke(name: &str) -> Option<StatedUnit> {
+fn unit_after_stroke(name: &str) -> Option<StatedUnit> {
     if stroke(name).is_some() {
         let (_, text) = name.split_once('/')?;
         return Some(StatedUnit::new(text, Unit::parse(text), Evidence::Stated));
@@ -374,12 +377,13 @@ struct UnitWords {
     evidence: Evidence,
 }
 
-fn of_words(name: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
+fn unit_from_words(name: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
     let words = unit_words(name, wanted)?;
     Some(StatedUnit::new(&words.text, words.unit, words.evidence))
 }
 
-/// Finds the words of a name that are a unit of the quantity wanted, or of that which the name speaks of.
+/// Returns the words of a name that are a unit of the quantity wanted, or of the quantity that the
+/// name states.
 fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWords> {
     if let (Some(wanted), Some(unit)) = (wanted, Unit::parse(name))
         && unit.quantity == wanted
@@ -441,7 +445,7 @@ fn joined_unit(words: &[&str]) -> Option<Unit> {
     })
 }
 
-/// Reads a unit that is written onto the name without a separator: `accG`, `forcekN`, `xmm`.
+/// Reads a unit that is appended to the name without a separator: `accG`, `forcekN`, `xmm`.
 fn glued(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWords> {
     words.iter().find_map(|span| {
         let word = &name[span.clone()];
@@ -459,7 +463,7 @@ fn glued(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWor
     })
 }
 
-/// Finds a word that names the output of a converter or an amplifier: `force_mV`, `acc counts`.
+/// Returns the word that names the output of a converter or an amplifier: `force_mV`, `acc counts`.
 fn electric(name: &str, words: &[Range<usize>]) -> Option<UnitWords> {
     let span = words.iter().skip(1).rev().find(|span| {
         let word = &name[(*span).clone()];

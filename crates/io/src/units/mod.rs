@@ -16,7 +16,7 @@ pub(crate) use self::header::{
 };
 use self::vocabulary::Dimension;
 
-/// Quantity that the numbers of a column measure, as far as a unit tells.
+/// Quantity that the numbers of a column measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quantity {
@@ -38,7 +38,7 @@ impl Quantity {
     /// An acceleration, in m/s².
     pub const ACCELERATION: Self = Self::Response(ResponseQuantity::Acceleration);
 
-    /// SI unit of the quantity.
+    /// Returns the SI unit of the quantity.
     pub fn si(self) -> &'static str {
         match self {
             Self::Force => "N",
@@ -48,7 +48,7 @@ impl Quantity {
         }
     }
 
-    fn of_dimension(dimension: Dimension) -> Option<Self> {
+    fn from_dimension(dimension: Dimension) -> Option<Self> {
         Some(match dimension {
             Dimension::FORCE => Self::Force,
             Dimension::LENGTH => Self::DISPLACEMENT,
@@ -89,26 +89,27 @@ impl fmt::Display for Quantity {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// Name, as it is written.
+    /// Name in its original form.
     pub name: String,
-    /// Quantity that it measures.
+    /// Measured quantity.
     pub quantity: Quantity,
     /// Size in N, m, m/s, m/s², s or Hz.
     pub in_si: f64,
 }
 
 impl Unit {
-    /// Reads a unit as people write it, such as `kN`, `lbs`, `mm/s^2`, `in.` or `G`; `None` for other text and
-    /// for units of other quantities.
+    /// Reads a unit in one of its usual spellings, such as `kN`, `lbs`, `mm/s^2`, `in.` or `G`;
+    /// `None` for other text and for units of other quantities.
     pub fn parse(text: &str) -> Option<Self> {
         let Expression { dimension, in_si } = Expression::parse(text)?;
-        let quantity = Quantity::of_dimension(dimension)?;
+        let quantity = Quantity::from_dimension(dimension)?;
         Some(Self { name: text.trim().into(), quantity, in_si })
     }
 }
 
-/// Returns what a column states about its unit: in its `name`, or as `unit`, a text of its own (in a line of units, a
-/// label or an attribute). With a `wanted` quantity, words of the name count that are units of it.
+/// Returns what a column states about its unit: in its `name`, or as a separate text `unit` (in a
+/// line of units, a label or an attribute). If a quantity is `wanted`, units of it count also as
+/// words of the name.
 pub fn stated_unit(name: &str, unit: &str, wanted: Option<Quantity>) -> Option<StatedUnit> {
     stated(name, unit, wanted)
 }
@@ -118,12 +119,12 @@ pub fn name_without_unit(name: &str) -> String {
     without_unit(name)
 }
 
-/// Quantity of a frequency response: a response over a force, or the inverse.
+/// Unit of a frequency response: a response over a force, or the inverse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ResponseUnit {
     /// Measured response.
     pub quantity: ResponseQuantity,
-    /// `true` of a force over a response: dynamic stiffness, mechanical impedance, apparent mass.
+    /// `true` for a force over a response: dynamic stiffness, mechanical impedance, apparent mass.
     pub is_inverse: bool,
     /// Size in the SI unit of the ratio.
     pub in_si: f64,

@@ -1,7 +1,7 @@
 //! The unit vocabulary: every spelling of a unit, with its dimension and its factor to SI.
 //!
 //! This is the only list of units. Names of columns, lines of units, labels of universal files,
-//! attributes of HDF5 files, axes of frequency and time, and data frames are all read by it.
+//! attributes of HDF5 files, axes of frequency and time, and data frames all use it.
 
 /// Exponents of length, time, force, voltage, charge and counts.
 ///
@@ -24,7 +24,8 @@ impl Dimension {
     const CHARGE: Self = Self([0, 0, 0, 0, 1, 0]);
     const COUNT: Self = Self([0, 0, 0, 0, 0, 1]);
 
-    /// Returns whether the numbers are those of a converter or an amplifier: voltage, charge or counts.
+    /// Returns whether the numbers are the output of a converter or an amplifier: voltage, charge
+    /// or counts.
     pub fn is_electric(self) -> bool {
         self.0[3..].iter().any(|exponent| *exponent != 0)
     }
@@ -39,7 +40,7 @@ impl Dimension {
     }
 }
 
-/// A unit and its spellings.
+/// Unit and its spellings.
 pub(super) struct Entry {
     /// Spellings, the usual one first.
     pub spellings: &'static [&'static str],
@@ -128,9 +129,10 @@ pub(super) const VOCABULARY: &[Entry] = &[
     entry(&["krad"], D::NONE, 1e3 / TURN),
     entry(&["deg", "degree", "degrees", "°"], D::NONE, 1.0 / 360.0),
     entry(&["cycle", "cycles", "rev", "revs"], D::NONE, 1.0),
-    // Mass, of apparent masses; a load cell in kg is read as one in kgf, and that is reported.
+    // Mass is a unit of apparent masses; a load cell in kg is read as one in kgf, and that is
+    // reported.
     entry(&["kg", "kilogram", "kilograms"], D::MASS, 1.0),
-    // Units that no force and no motion has: a column in one of them is never taken silently.
+    // No force and no response has these units: a column in one of them is never read silently.
     entry(&["Nm"], D::MOMENT, 1.0),
     entry(&["Pa", "pascal"], D::PRESSURE, 1.0),
     entry(&["kPa"], D::PRESSURE, 1e3),

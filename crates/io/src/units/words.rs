@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Quantity;
 
-/// Words that stand for a force.
+/// Words that mean a force.
 const FORCE: &[&str] = &[
     "force",
     "forces",
@@ -22,7 +22,7 @@ const FORCE: &[&str] = &[
     "fz",
 ];
 
-/// Words that stand for a displacement.
+/// Words that mean a displacement.
 const DISPLACEMENT: &[&str] = &[
     "disp",
     "displ",
@@ -40,10 +40,10 @@ const DISPLACEMENT: &[&str] = &[
     "weg",
 ];
 
-/// Words that stand for a velocity.
+/// Words that mean a velocity.
 const VELOCITY: &[&str] = &["vel", "velo", "velocity", "speed", "vibration", "vib"];
 
-/// Words that stand for an acceleration.
+/// Words that mean an acceleration.
 const ACCELERATION: &[&str] = &[
     "acc",
     "accel",
@@ -58,18 +58,19 @@ const ACCELERATION: &[&str] = &[
     "az",
 ];
 
-/// Words that stand for a time.
+/// Words that mean a time.
 const TIME: &[&str] = &["time", "t", "zeit", "timestamp", "elapsed"];
 
-/// Words that stand for a frequency.
+/// Words that mean a frequency.
 const FREQUENCY: &[&str] = &["frequency", "freq", "omega", "w", "f", "frequenz", "speed"];
 
-/// Units that are English words, symbols of other things or ends of names: they count as units only behind the name of
-/// their quantity.
+/// Units that are also English words, symbols of other quantities or ends of names: they count as
+/// units only after the name of their quantity.
 const AMBIGUOUS: &[&str] =
     &["g", "gs", "in", "ins", "m", "n", "s", "h", "d", "c", "v", "foot", "feet", "min"];
 
-/// Words in brackets that name a place, a direction, a channel or a treatment of the signal, and no unit.
+/// Words in brackets that name a place, a direction, a channel or a treatment of the signal rather
+/// than a unit.
 const LABELS: &[&str] = &[
     "x",
     "y",
@@ -182,19 +183,19 @@ const LABELS: &[&str] = &[
     "on",
 ];
 
-/// Returns the quantity that a word of three letters or more stands for.
+/// Returns the quantity that a word of three letters or more means.
 pub(super) fn quantity_word(word: &str) -> Option<Quantity> {
-    let all = [
+    let quantities = [
         Quantity::Force,
         Quantity::DISPLACEMENT,
         Quantity::VELOCITY,
         Quantity::ACCELERATION,
         Quantity::Time,
     ];
-    all.into_iter().find(|quantity| word.len() > 2 && is_quantity_word(word, *quantity))
+    quantities.into_iter().find(|quantity| word.len() > 2 && is_quantity_word(word, *quantity))
 }
 
-/// Returns whether a word, with a number behind it or not, stands for a quantity.
+/// Returns whether a word, with or without a number after it, means a quantity.
 pub(super) fn is_quantity_word(word: &str, quantity: Quantity) -> bool {
     let lower = word.to_lowercase();
     let word = lower.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -214,7 +215,8 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
     AMBIGUOUS.contains(&unit.to_lowercase().as_str())
 }
 
-/// Returns whether a text names places, directions or channels: `left`, `+Z`, `AI0`, `shaker 1`, `Dev1/ai0`.
+/// Returns whether a text names places, directions or channels: `left`, `+Z`, `AI0`, `shaker 1`,
+/// `Dev1/ai0`.
 pub(super) fn is_label(text: &str) -> bool {
     let mut words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     words.all(|word| {

@@ -70,7 +70,7 @@ fn the_decimal_sign_of_a_long_file_is_that_of_its_first_number_with_one() {
 fn old_line_ends_are_understood() {
     let table = table("t,f\r0,1\r1,2\r");
     assert_eq!(table.column("f").unwrap(), [1.0, 2.0]);
-    assert_eq!(table.place(1), Place::Line(3));
+    assert_eq!(table.position(1), Place::Line(3));
     let e = Table::parse("a.csv", b"t,f\r0,1\r1,?\r").unwrap().column("f").unwrap_err();
     assert!(matches!(e, IoError::NotANumber { line: 3, .. }), "{e}");
 }
@@ -118,7 +118,7 @@ fn quotes_are_followed_over_a_long_file() {
     let wanted: Vec<f64> = (0..60_000).map(|k| f64::from(k % 10)).collect();
     assert_eq!(table.column("f, N").unwrap(), wanted);
     for k in [0, 1, 2, 3, 29_999, 59_999] {
-        assert_eq!(table.place(k), Place::Line(lines[k]), "sample {k}");
+        assert_eq!(table.position(k), Place::Line(lines[k]), "sample {k}");
     }
 }
 

@@ -265,7 +265,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
             assert_eq!(told.column("3").unwrap(), [2.0, 3.0, 1.0]);
             // Lines are those of the file.
             let mut rows = text.lines().count() as u64;
-            assert_eq!(told.place(2).to_string(), format!("line {rows}"));
+            assert_eq!(told.position(2).to_string(), format!("line {rows}"));
             std::fs::write(&path, text + "3,4\n").unwrap();
             rows += 1;
             let e = read_below(&path, lines).unwrap_err().to_string();

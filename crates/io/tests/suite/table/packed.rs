@@ -81,7 +81,7 @@ fn lines_are_counted_through_a_long_file() {
         let table = Table::parse("a.csv", text.as_bytes()).unwrap();
         assert_eq!(table.len(), 20_000);
         for k in [0, 1, 3, 4, 9_999, 19_999] {
-            assert_eq!(table.place(k), Place::Line(lines[k]), "sample {k}");
+            assert_eq!(table.position(k), Place::Line(lines[k]), "sample {k}");
         }
         let bad = text.replace(&format!("{end}17777,7{end}"), &format!("{end}17777,?{end}"));
         let e = Table::parse("a.csv", bad.as_bytes()).unwrap().column("f").unwrap_err();
@@ -97,8 +97,8 @@ fn names_over_several_lines_and_a_start_without_delimiters() {
     let text = "# long\n\"time\n[s]\",\"force\n[N]\"\n0,1\n1,2\n2,3\n3,4\n";
     let table = Table::parse("a.csv", text.as_bytes()).unwrap();
     assert_eq!(table.names(), ["time\n[s]", "force\n[N]"]);
-    assert_eq!(table.place(0), Place::Line(5));
+    assert_eq!(table.position(0), Place::Line(5));
     let comments = "# a comment without any of the usual delimiters\n".repeat(1000);
     let table = Table::parse("a.csv", format!("{comments}0;1\n1;2\n").as_bytes()).unwrap();
-    assert_eq!((table.width(), table.place(1)), (2, Place::Line(1002)));
+    assert_eq!((table.width(), table.position(1)), (2, Place::Line(1002)));
 }
