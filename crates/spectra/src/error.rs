@@ -3,21 +3,21 @@
 use mechid_signal::{SignalError, message};
 use thiserror::Error;
 
-/// Error of spectral lines and their noise.
+/// Error in spectral lines or their noise.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SpectraError {
-    /// Two things that belong together have different sizes.
+    /// Two arguments that must have the same size differ in it.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
         /// Name of the items counted.
         what: &'static str,
         /// Number expected.
         expected: usize,
-        /// Number found.
+        /// Number given.
         got: usize,
     },
-    /// No spectral line lies in the band.
+    /// No spectral line is in the band.
     #[error(
         "no spectral line lies between {from_hz} and {to_hz} Hz: the record has lines every {spacing_hz} Hz up to {highest_hz} Hz"
     )]
@@ -40,15 +40,15 @@ pub enum SpectraError {
         /// In its unit.
         value: f64,
     },
-    /// Segments that do not move on, or leave samples out.
+    /// The step between segments is zero, or larger than a segment.
     #[error("segments of {} cannot start {} apart: from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
     Hop {
-        /// Samples of a segment.
+        /// Number of samples in a segment.
         len: usize,
-        /// Samples from one start to the next.
+        /// Number of samples from the start of one segment to the start of the next.
         hop: usize,
     },
-    /// No spectral line was chosen, or none of them carries force.
+    /// No spectral line was chosen, or none of them has force.
     #[error("no spectral line carries force: choose lines the excitation drives")]
     NoExcitedLine,
     /// A chosen line does not exist or carries no phase.
@@ -56,9 +56,9 @@ pub enum SpectraError {
         "line {line} cannot be used: lines 1 to {last} of this record have amplitude and phase"
     )]
     LineOutOfRange {
-        /// The line asked for.
+        /// Chosen line.
         line: usize,
-        /// The last usable line, just below half the sampling rate.
+        /// Last usable line, just below half the sampling rate.
         last: usize,
     },
     /// A frequency is not positive and finite.
@@ -75,7 +75,7 @@ pub enum SpectraError {
         /// Quantity of the second.
         right: mechid_model::ResponseQuantity,
     },
-    /// Two sets of spectral lines that must be the same are not.
+    /// Two sets of frequencies that must be equal differ.
     #[error("row {row}: {left} rad/s against {right} rad/s; both must hold the same frequencies")]
     FrequencyMismatch {
         /// First row that differs, counted from 0.
@@ -88,9 +88,9 @@ pub enum SpectraError {
     /// A ratio or covariance needs more averages than there are.
     #[error("signal cannot be told from noise: at least {needed} averages are needed, got {got}")]
     TooFewAverages {
-        /// Averages there are.
+        /// Number of averages.
         got: usize,
-        /// Averages needed.
+        /// Number of averages needed.
         needed: usize,
     },
     /// The forces do not determine a frequency response at a line.
@@ -111,16 +111,16 @@ pub enum SpectraError {
         row: usize,
         /// Channel, counted from 0, displacements first, then forces.
         column: usize,
-        /// The value given, in m² or N².
+        /// The given value, in m² or N².
         value: f64,
     },
-    /// A coherence outside (0, 1].
+    /// A coherence is outside (0, 1].
     #[error("a coherence lies above 0 and at most at 1, got {value}")]
     Coherence {
-        /// The value given, a pure number.
+        /// The given value, a pure number.
         value: f64,
     },
-    /// The motion has nothing in common with the force.
+    /// The response is not coherent with the force.
     #[error(
         "the motion at {frequency_hz} Hz has nothing in common with the force: H2 does not exist there"
     )]
@@ -131,10 +131,10 @@ pub enum SpectraError {
     /// A numerical method fails.
     #[error(transparent)]
     Numerics(#[from] mechid_numerics::NumericsError),
-    /// A system is unusable.
+    /// A system cannot be used.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),
-    /// A record is unusable.
+    /// A record cannot be used.
     #[error(transparent)]
     Signal(#[from] SignalError),
 }

@@ -1,4 +1,5 @@
-//! Forces and displacements at chosen frequencies: what every estimator of this module takes.
+//! Forces and displacements at chosen frequencies: the input of all estimators for systems in which
+//! every degree of freedom is measured.
 
 mod derived_data;
 
@@ -19,8 +20,8 @@ use crate::open_record::OpenRecord;
 
 /// Complex amplitudes of forces and displacements, one row per frequency and experiment.
 ///
-/// Motion measured as velocity or acceleration is kept as displacement, X = V/(iω) = −A/ω²;
-/// what was measured is remembered, because that is where the noise is white.
+/// Measured velocities and accelerations are stored as displacements, X = V/(iω) = −A/ω²; the
+/// measured quantity is stored too, because the noise is white in that quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyData {
     omega: Vec<f64>,
@@ -28,23 +29,24 @@ pub struct FrequencyData {
     displacement: DMatrix<Complex<f64>>,
     measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
-    /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
+    /// Variances of the force noise, rows × n, in N², for data whose displacement noise is not
+    /// known.
     force_variance: DMatrix<f64>,
-    /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
-    /// on the rows of others.
+    /// Displacements that correspond to 1 and s³ in the measured quantity: two columns for each
+    /// open record, zero on the rows of other records.
     transient: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
-    /// Noise of forces that act for a few samples only.
+    /// Noise of forces that act only for a few samples.
     pulses: Vec<PulseNoise>,
 }
 
 impl FrequencyData {
-    /// The chosen lines of one record of force (N) and motion, both over whole periods.
+    /// Reads the chosen lines of one record of force (N) and response, both over whole periods.
     ///
-    /// Channel j of either record belongs to degree of freedom j; a degree of freedom
-    /// without a force has a channel of zeros. To read many records with one prepared
-    /// transform use [`FrequencyData::read`].
+    /// Channel j of either record belongs to degree of freedom j; a degree of freedom without a
+    /// force has a channel of zeros. To read many records with one prepared transform use
+    /// [`FrequencyData::read`].
     ///
     /// # Errors
     /// As [`Lines::new`] and [`FrequencyData::read`].
@@ -57,11 +59,11 @@ impl FrequencyData {
         Self::read(&Lines::new(force.sampling(), lines)?, force, motion, measured)
     }
 
-    /// Force (N) and motion at prepared lines.
+    /// Reads force (N) and response at prepared lines.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if the records have not the same number of channels,
-    /// [`SpectraError::Signal`] if their time axes are not that of the lines.
+    /// [`NumericsError::Size`] if the records have different numbers of channels,
+    /// [`SpectraError::Signal`] if their time axes differ from the time axis of the lines.
     pub fn read(
         lines: &Lines,
         force: &Record,
@@ -71,11 +73,11 @@ impl FrequencyData {
         Self::from_amplitudes(lines.omega(), lines.read(force)?, lines.read(motion)?, measured)
     }
 
-    /// The chosen lines of two spectra over the same whole periods.
+    /// Reads the chosen lines of two spectra over the same whole periods.
     ///
     /// # Errors
-    /// [`NumericsError::Size`], [`SpectraError::LineOutOfRange`],
-    /// [`SpectraError::NoExcitedLine`] or [`SpectraError::Signal`], as for records.
+    /// [`NumericsError::Size`], [`SpectraError::LineOutOfRange`], [`SpectraError::NoExcitedLine`]
+    /// or [`SpectraError::Signal`], as for records.
     pub fn from_spectra(
         force: &Spectrum,
         motion: &Spectrum,
@@ -92,12 +94,12 @@ impl FrequencyData {
         Self::from_amplitudes(lines.omega(), rows(force), rows(motion), measured)
     }
 
-    /// Takes complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
+    /// Creates data from complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if the shapes differ, [`SpectraError::NoExcitedLine`]
-    /// if there is no row, [`NumericsError::NotFinite`] for a frequency that is not
-    /// positive or an amplitude that is not finite.
+    /// [`NumericsError::Size`] if the shapes differ, [`SpectraError::NoExcitedLine`] if there is no
+    /// row, [`NumericsError::NotFinite`] for a frequency that is not positive or an amplitude that
+    /// is not finite.
     pub fn from_amplitudes(
         omega: Vec<f64>,
         force: DMatrix<Complex<f64>>,
@@ -124,17 +126,19 @@ impl FrequencyData {
         })
     }
 
-    /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
-    /// for each of `omega` (rad/s): every force in turn is an experiment with unit force at its
-    /// degree of freedom (`force_dof`, one per column, counted from 0). `variance` is E|ΔH|² of every
-    /// entry, in the square of its unit, if it is known; errors of two entries are independent.
+    /// Creates data from frequency responses of the quantity `measured` per unit force, one matrix
+    /// responses × forces for each of `omega` (rad/s): each force is one experiment with unit force
+    /// at its degree of freedom (`force_dof`, one per column, counted from 0). `variance`, if it is
+    /// known, is E|ΔH|² of every entry, in the square of its unit; errors of different entries are
+    /// independent.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if the shapes differ or a degree of freedom does not exist, and what
-    /// [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`] refuse.
+    /// [`NumericsError::Size`] if the shapes differ or a degree of freedom does not exist, and the
+    /// errors of [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`].
     ///
     /// # Source
-    /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (frequency responses as amplitudes per unit force).
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (frequency responses as amplitudes per
+    /// unit force).
     pub fn from_responses(
         omega: &[f64],
         response: &[DMatrix<Complex<f64>>],
@@ -155,7 +159,7 @@ impl FrequencyData {
             let what = "driven degree of freedom, at most";
             return Err(NumericsError::Size { what, expected: n.saturating_sub(1), got }.into());
         }
-        let mut all: Option<Self> = None;
+        let mut combined: Option<Self> = None;
         for (input, &dof) in force_dof.iter().enumerate() {
             let mut force = DMatrix::zeros(lines, n);
             force.column_mut(dof).fill(Complex::new(1.0, 0.0));
@@ -169,19 +173,19 @@ impl FrequencyData {
                 });
                 one = one.with_noise(NoiseSpectrum::new(omega.to_vec(), covariance.collect())?)?;
             }
-            all = Some(match all {
+            combined = Some(match combined {
                 None => one,
                 Some(before) => before.and(&one)?,
             });
         }
-        all.ok_or(SpectraError::NoExcitedLine)
+        combined.ok_or(SpectraError::NoExcitedLine)
     }
 
-    /// The same data with what is known of their noise.
+    /// Returns the same data with a known noise covariance.
     ///
     /// # Errors
-    /// [`SpectraError::FrequencyMismatch`] or [`NumericsError::Size`] if the noise
-    /// belongs to other frequencies or another number of degrees of freedom.
+    /// [`SpectraError::FrequencyMismatch`] or [`NumericsError::Size`] if the noise belongs to other
+    /// frequencies or another number of degrees of freedom.
     pub fn with_noise(mut self, noise: NoiseSpectrum) -> Result<Self, SpectraError> {
         check_same_frequencies(&self.omega, noise.omega())?;
         if noise.dof() != self.dof() {
@@ -197,18 +201,18 @@ impl FrequencyData {
         Ok(self)
     }
 
-    /// The same data with white noise of known standard deviation (N) on the samples of each force channel, of
-    /// a record of so many samples that does not show its noise: of that on the response the spectrum is found
-    /// from the residual, and the force is no longer taken as exact. What [`FrequencyData::with_noise`] states
-    /// comes first.
+    /// Returns the same data with white noise of known standard deviation (N) on the samples of
+    /// each force channel, for a record of this many samples that does not show the noise. The
+    /// spectrum of the response noise is then estimated from the residual, and the force is no
+    /// longer taken as exact. Noise stated by [`FrequencyData::with_noise`] has priority.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,
     /// [`SpectraError::NoiseVariance`] if one is negative or not finite.
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
-    /// likelihood in errors-in-variables.
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+    /// maximum likelihood in errors-in-variables.
     pub fn with_force_noise(
         mut self,
         deviation: &[f64],
@@ -226,14 +230,16 @@ impl FrequencyData {
         Ok(self)
     }
 
-    /// The same data of one record with white noise of known standard deviation (N) on some samples of one force channel,
-    /// counted from 0, and none on the others: those of the pulse of a hit. The lines of such noise err together.
+    /// Returns the same data of one record with white noise of known standard deviation (N) on some
+    /// samples of one force channel, counted from 0, and none on the others: the samples of the
+    /// pulse of a hammer hit. Such noise is correlated between lines.
     ///
     /// # Errors
-    /// The errors of [`FrequencyData::with_force_noise`]; [`NumericsError::Size`] if there is no such channel or sample.
+    /// As [`FrequencyData::with_force_noise`]; [`NumericsError::Size`] if there is no such channel
+    /// or sample.
     ///
     /// # Source
-    /// The source of [`FrequencyData::with_force_noise`].
+    /// As [`FrequencyData::with_force_noise`].
     pub fn with_pulse_noise(
         mut self,
         channel: usize,
@@ -258,35 +264,38 @@ impl FrequencyData {
         Ok(self)
     }
 
-    /// Noise of forces that act for a few samples only.
+    /// Returns the noise of forces that act only for a few samples.
     pub fn pulses(&self) -> &[PulseNoise] {
         &self.pulses
     }
 
-    /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
+    /// Returns the variances of the force noise, rows × n, in N², for data whose displacement noise
+    /// is not known.
     pub fn force_variance(&self) -> &DMatrix<f64> {
         &self.force_variance
     }
 
-    /// The same data as those of a record with this time axis that is no period: begins and ends in motion that
-    /// differs.
+    /// Returns the same data, read from an open record with this time axis: its initial and final
+    /// states differ, so that it is not a whole period.
     ///
-    /// The difference acts on the lines like a force. For displacements it is M(iω Δx + Δv) + C Δx over the
-    /// duration, and the samples fold what it has above half their rate back into the band, which the higher
-    /// powers of s = iω describe:
+    /// The difference acts on the lines like a force, the transient. For displacements it is M(iω
+    /// Δx + Δv) + C Δx over the duration. Sampling folds its components above half the sampling
+    /// rate back into the band, which the higher powers of s = iω describe:
     ///
     /// ```text
     /// (K + s C + s² M) X + (τ₀ + τ₁ s + … + τ₅ s⁵) Z = F
     /// ```
     ///
-    /// with unknown real τ, of every degree of freedom, and Z = 1, 1/s or 1/s² as displacement, velocity or
-    /// acceleration was measured. the maximum-likelihood estimator finds them with the machine; the
-    /// rows are to be all lines of a band, for it is on neighbouring lines that the two differ, and not much
-    /// more than 0.4 of the sampling rate.
+    /// with unknown real τ for every degree of freedom, and Z = 1, 1/s or 1/s² if displacement,
+    /// velocity or acceleration was measured. The maximum-likelihood estimator estimates them
+    /// together with the system. The rows must be all lines of a band, because neighbouring lines
+    /// distinguish the transient from the force; the band should end at about 0.4 of the sampling
+    /// rate.
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on arbitrary
-    /// excitations (transient terms of a plant) and on continuous-time models of band-limited signals.
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
+    /// arbitrary excitations (transient terms of a plant) and on continuous-time models of
+    /// band-limited signals.
     #[must_use]
     pub fn of_open_record(mut self, sampling: Sampling) -> Self {
         self.open = vec![sampling];
@@ -298,14 +307,13 @@ impl FrequencyData {
         self
     }
 
-    /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
-    /// on the rows of others.
-    /// In m.
+    /// Returns the displacements that correspond to 1 and s³ in the measured quantity, in m: two
+    /// columns for each open record, zero on the rows of other records.
     pub fn transient(&self) -> &DMatrix<Complex<f64>> {
         &self.transient
     }
 
-    /// An open record, counted from 0, if there is one.
+    /// Returns an open record, counted from 0; `None` if there is no such record.
     pub fn open_record(&self, record: usize) -> Option<OpenRecord> {
         let sampling = *self.open.get(record)?;
         let of_record = |row: &usize| self.transient[(*row, 2 * record)] != Complex::ZERO;
@@ -314,13 +322,13 @@ impl FrequencyData {
         Some(OpenRecord { sampling, rows: first..last + 1 })
     }
 
-    /// The rows of both: several experiments on one system.
+    /// Returns the rows of both: several experiments on one system.
     ///
-    /// The noise is kept if it is known of both.
+    /// The noise is kept if it is known for both.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if the numbers of degrees of freedom differ,
-    /// [`SpectraError::MixedQuantities`] if the quantities measured do.
+    /// [`SpectraError::MixedQuantities`] if the measured quantities differ.
     pub fn and(&self, other: &Self) -> Result<Self, SpectraError> {
         if self.dof() != other.dof() {
             let (got, expected) = (other.dof(), self.dof());
@@ -367,44 +375,45 @@ impl FrequencyData {
         both
     }
 
-    /// Degrees of freedom n.
+    /// Returns the number of degrees of freedom n.
     pub fn dof(&self) -> usize {
         self.force.ncols()
     }
 
-    /// Number of rows: frequencies, summed over the experiments.
+    /// Returns the number of rows: frequencies, summed over the experiments.
     #[allow(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.omega.len()
     }
 
-    /// Angular frequency of every row, in rad/s.
+    /// Returns the angular frequency of every row, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega
     }
 
-    /// Force amplitudes, rows × n, in N.
+    /// Returns the force amplitudes, rows × n, in N.
     pub fn force(&self) -> &DMatrix<Complex<f64>> {
         &self.force
     }
 
-    /// Displacement amplitudes, rows × n, in m.
+    /// Returns the displacement amplitudes, rows × n, in m.
     pub fn displacement(&self) -> &DMatrix<Complex<f64>> {
         &self.displacement
     }
 
-    /// The quantity the motion was measured as.
+    /// Returns the measured quantity of the response.
     pub fn measured(&self) -> ResponseQuantity {
         self.measured
     }
 
-    /// Covariances of the noise: of displacement (m) and force (N) for every row.
+    /// Returns the covariances of the noise of displacement (m) and force (N) for every row.
     pub fn noise(&self) -> Option<&NoiseSpectrum> {
         self.noise.as_ref()
     }
 
-    /// Covariances of the noise as [`FrequencyData::noise`]; `None` also where it is only rounding, below
-    /// 10⁻¹⁰ of both the displacement and the force (RMS over lines and channels).
+    /// Returns the covariances of the noise as [`FrequencyData::noise`] does; `None` also if the
+    /// noise is only rounding, below 10⁻¹⁰ of both the displacement and the force (RMS over lines
+    /// and channels).
     pub fn noise_above_rounding(&self) -> Option<&NoiseSpectrum> {
         let noise = self.noise()?;
         let (n, mut scatter) = (self.dof(), [0.0; 2]);
@@ -419,7 +428,7 @@ impl FrequencyData {
     }
 }
 
-/// The rows of one matrix below those of another.
+/// Returns the rows of one matrix below those of another matrix.
 fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatrix<T> {
     let rows = upper.nrows();
     DMatrix::from_fn(rows + lower.nrows(), upper.ncols(), |row, column| {
@@ -428,8 +437,7 @@ fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatr
     })
 }
 
-/// Returns an error unless two sets of frequencies (rad/s) are the same up to rounding.
-/// One per line of each set.
+/// Returns an error unless two sets of frequencies (rad/s, one per line) are equal up to rounding.
 ///
 /// # Errors
 /// [`NumericsError::Size`], [`SpectraError::FrequencyMismatch`].

@@ -1,11 +1,11 @@
-//! Spectral lines of measured inputs and outputs: what every estimator in the frequency domain takes.
+//! Spectral lines of measured inputs and outputs: the data of all frequency-domain estimators.
 //!
 //! | Content | Module |
 //! |---|---|
-//! | inputs and outputs line by line, of any number of sensors and forces | [`line_data`] |
+//! | inputs and outputs line by line, for any number of sensors and forces | [`line_data`] |
 //! | forces and displacements of every degree of freedom | [`FrequencyData`] |
-//! | chosen lines, the transform prepared once | [`Lines`] |
-//! | repeated periods, whose scatter shows the noise | [`RepeatedPeriods`] |
+//! | chosen lines, with the transform prepared once | [`Lines`] |
+//! | repeated periods, whose scatter determines the noise | [`RepeatedPeriods`] |
 //! | the transient of an open record | [`transient`] |
 //! | sinusoids of unknown frequency | [`sinusoids`] |
 //! | noise: spectrum, pooling, smooth spectra, level, pulses | [`noise`] |

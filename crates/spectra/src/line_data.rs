@@ -8,12 +8,12 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::{LineNoise, SpectraError};
 
-/// Effect of the two ends of a record on its lines.
+/// Effect of the initial and final states of a record on its lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Transient {
-    /// The lines hold the steady state alone: whole periods, or a table of frequency responses.
+    /// No transient: whole periods, or measured frequency responses.
     None,
-    /// The record is open: its lines also hold the response to the difference between the initial and
+    /// Open record: its lines also contain the response to the difference between the initial and
     /// the final state.
     Open {
         /// Time between two samples, in s.
@@ -21,11 +21,11 @@ pub enum Transient {
     },
 }
 
-/// Complex amplitudes of inputs and outputs, one row per spectral line; the lines of several records
-/// stand one below the other.
+/// Complex amplitudes of inputs and outputs, one row per spectral line; the lines of several
+/// records follow one another.
 ///
-/// Amplitudes of records are unitary: Σ |X|² over all lines of both signs is Σ x² over all samples, so
-/// that white noise of variance σ² has E|X|² = σ² on every line, whatever the length of the record.
+/// Amplitudes of records are unitary: Σ |X|² over all lines of both signs is Σ x² over all samples,
+/// so that white noise of variance σ² has E|X|² = σ² on every line for any length of the record.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -40,12 +40,12 @@ pub struct LineData {
 }
 
 impl LineData {
-    /// Takes amplitudes of one record at `omega` (rad/s): `inputs` is lines × q (q may be 0), `outputs`
-    /// lines × p.
+    /// Creates data from amplitudes of one record at `omega` (rad/s): `inputs` is lines × q (q may
+    /// be 0), `outputs` is lines × p.
     ///
     /// # Errors
-    /// [`SpectraError::Size`] if the shapes differ, [`SpectraError::NotFinite`] for a frequency that
-    /// is not positive or an amplitude that is not finite.
+    /// [`SpectraError::Size`] if the shapes differ, [`SpectraError::NotFinite`] for a frequency
+    /// that is not positive or an amplitude that is not finite.
     pub fn new(
         omega: Vec<f64>,
         inputs: DMatrix<Complex<f64>>,
@@ -72,10 +72,11 @@ impl LineData {
         Ok(Self { omega, inputs, outputs, records, noise: None })
     }
 
-    /// Takes the lines of an open record that lie in `band_hz` (Hz), without a window; the lines at zero
-    /// and at half the sampling rate are left out.
+    /// Reads the lines of an open record in `band_hz` (Hz), without a window, and without the lines
+    /// at zero and at half the sampling rate.
     ///
-    /// `inputs` is samples × q, or `None` for a record without measured inputs; `outputs` is samples × p.
+    /// `inputs` is samples × q, or `None` for a record without measured inputs; `outputs` is
+    /// samples × p.
     ///
     /// # Errors
     /// [`SpectraError::Size`] if the records differ in length, [`SpectraError::NoLine`] if the band
@@ -99,7 +100,8 @@ impl LineData {
             return Err(SpectraError::NoLine { from_hz, to_hz, spacing_hz, highest_hz });
         }
         let lines = last - first + 1;
-        // A spectrum holds amplitudes, 2/N times the transform; unitary is 1/√N.
+        // The spectrum has amplitudes, 2/N times the transform; a unitary transform has the factor
+        // 1/√N.
         let scale = Complex::from((expected as f64).sqrt() / 2.0);
         let read = |record: &Record| Spectrum::of(record).lines().rows(first, lines) * scale;
         let omega = (first..=last).map(|line| TAU * line as f64 * spacing_hz).collect();
@@ -111,8 +113,8 @@ impl LineData {
     /// Returns the same lines with the covariance of their noise.
     ///
     /// # Errors
-    /// [`SpectraError::Size`] unless there is one covariance per line with one row and column per output
-    /// and input.
+    /// [`SpectraError::Size`] unless there is one covariance per line with one row and column per
+    /// output and input.
     pub fn with_noise(self, noise: LineNoise) -> Result<Self, SpectraError> {
         let channels = self.outputs.ncols() + self.inputs.ncols();
         let size = noise.covariance().first().map_or(channels, DMatrix::nrows);
@@ -128,7 +130,8 @@ impl LineData {
         Ok(Self { noise: Some(noise), ..self })
     }
 
-    /// Returns these lines followed by those of further records; the noise is kept if it is known of both.
+    /// Returns these lines followed by the lines of further records; the noise is kept if it is
+    /// known for both.
     ///
     /// # Errors
     /// [`SpectraError::Size`] if the number of inputs or outputs differs.
@@ -143,10 +146,10 @@ impl LineData {
             }
         }
         let before = self.omega.len();
-        let all = before + other.omega.len();
+        let total = before + other.omega.len();
         self.omega.extend_from_slice(&other.omega);
         for (to, from) in [(&mut self.inputs, &other.inputs), (&mut self.outputs, &other.outputs)] {
-            *to = std::mem::take(to).resize_vertically(all, Complex::default());
+            *to = std::mem::take(to).resize_vertically(total, Complex::default());
             to.rows_mut(before, from.nrows()).copy_from(from);
         }
         let moved = |(rows, transient): &(Range<usize>, Transient)| {
@@ -158,8 +161,8 @@ impl LineData {
         Ok(self)
     }
 
-    /// Returns the lines that `keep` accepts by their angular frequency (rad/s), record by record; `None` if
-    /// none is left.
+    /// Returns the lines that `keep` accepts by their angular frequency (rad/s), record by record;
+    /// `None` if it accepts none.
     pub fn retained(&self, keep: impl Fn(f64) -> bool) -> Option<Self> {
         let rows: Vec<usize> = (0..self.len()).filter(|row| keep(self.omega[*row])).collect();
         if rows.is_empty() {
@@ -168,9 +171,9 @@ impl LineData {
         let mut records = Vec::with_capacity(self.records.len());
         for (range, transient) in &self.records {
             let at = |row: usize| rows.partition_point(|kept| *kept < row);
-            let kept = at(range.start)..at(range.end);
-            if !kept.is_empty() {
-                records.push((kept, *transient));
+            let retained = at(range.start)..at(range.end);
+            if !retained.is_empty() {
+                records.push((retained, *transient));
             }
         }
         Some(Self {

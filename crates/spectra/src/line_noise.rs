@@ -4,14 +4,14 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::SpectraError;
 
-/// Covariance E[z zᴴ] of the noise z of outputs and inputs, outputs first, (p + q) × (p + q), one per row
-/// of line data and in the products of the units of its amplitudes.
+/// Covariance E[z zᴴ] of the noise z of outputs and inputs, outputs first, (p + q) × (p + q): one
+/// matrix per row of line data, in the products of the units of its amplitudes.
 ///
-/// The noise is circular: real and imaginary part are independent and equally large.
+/// The noise is circular: real and imaginary parts are independent and have equal variances.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section
-/// 12.2 (noise on input and output).
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// section 12.2 (noise on input and output).
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineNoise {
     covariance: Vec<DMatrix<Complex<f64>>>,
@@ -20,11 +20,11 @@ pub struct LineNoise {
 }
 
 impl LineNoise {
-    /// Takes known covariances.
+    /// Creates the noise from known covariances.
     ///
     /// # Errors
-    /// [`SpectraError::Size`] if they differ in size, [`SpectraError::NotFinite`] for an entry that is not
-    /// finite or a variance that is negative.
+    /// [`SpectraError::Size`] if they differ in size, [`SpectraError::NotFinite`] for an entry that
+    /// is not finite or a variance that is negative.
     pub fn new(covariance: Vec<DMatrix<Complex<f64>>>) -> Result<Self, SpectraError> {
         let expected = covariance.first().map_or(0, DMatrix::nrows);
         for (row, matrix) in covariance.iter().enumerate() {
@@ -42,8 +42,9 @@ impl LineNoise {
         Ok(Self { covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
     }
 
-    /// Returns the same as sample covariances, each the mean over `each` complex deviations; all of them
-    /// together are made of `total` deviations, fewer than of all rows where rows share them.
+    /// Returns the same noise as sample covariances, each averaged from `each` complex deviations;
+    /// all of them together come from `total` deviations, which is less than their sum if rows
+    /// share deviations.
     #[must_use]
     pub fn with_degrees_of_freedom(self, each: f64, total: f64) -> Self {
         Self { degrees_of_freedom: each, total_degrees_of_freedom: total, ..self }
@@ -54,17 +55,17 @@ impl LineNoise {
         &self.covariance
     }
 
-    /// Returns the degrees of freedom of each covariance; ∞ of known ones.
+    /// Returns the degrees of freedom of each covariance; ∞ if they are known.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom
     }
 
-    /// Returns the number of complex deviations that all covariances together are made of; ∞ of known ones.
+    /// Returns the total number of complex deviations behind all covariances; ∞ if they are known.
     pub fn total_degrees_of_freedom(&self) -> f64 {
         self.total_degrees_of_freedom
     }
 
-    /// Returns some of the rows; the deviations that they are made of are in proportion.
+    /// Returns some of the rows; the total number of deviations is reduced in proportion.
     pub(crate) fn rows(&self, rows: &[usize]) -> Self {
         let share = rows.len() as f64 / self.covariance.len().max(1) as f64;
         Self {
@@ -74,11 +75,11 @@ impl LineNoise {
         }
     }
 
-    /// Returns these rows followed by those of another record.
+    /// Returns these rows followed by the rows of another record.
     #[must_use]
     pub(crate) fn followed_by(mut self, other: &Self) -> Self {
         self.covariance.extend_from_slice(&other.covariance);
-        // The more uncertain of the two decides how far the weights can be trusted.
+        // The less certain covariance limits the accuracy of the weights.
         self.degrees_of_freedom = self.degrees_of_freedom.min(other.degrees_of_freedom);
         self.total_degrees_of_freedom += other.total_degrees_of_freedom;
         self

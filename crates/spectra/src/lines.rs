@@ -10,10 +10,10 @@ use nalgebra::{Complex, DMatrix};
 use crate::SpectraError;
 use crate::limits::LINE_ROUNDING;
 
-/// Spectral lines to be read from records of one sampling, the transform planned once.
+/// Spectral lines to be read from records with one time axis; the transform is planned once.
 ///
-/// Line n stands at n·ω0 of the record. Line 0 (the mean) and, for an even
-/// length, the line at half the sampling rate carry no phase and cannot be chosen.
+/// Line n is at n·ω0 of the record. Line 0 (the mean) and, for an even length, the line at half the
+/// sampling rate have no phase and cannot be chosen.
 #[derive(Clone)]
 pub struct Lines {
     sampling: Sampling,
@@ -31,11 +31,11 @@ impl fmt::Debug for Lines {
 }
 
 impl Lines {
-    /// The given lines of records of this sampling, in the given order.
+    /// Chooses lines of records with this time axis, in the given order.
     ///
     /// # Errors
-    /// [`SpectraError::NoExcitedLine`] if none is given, [`SpectraError::LineOutOfRange`]
-    /// for a line that does not exist or carries no phase.
+    /// [`SpectraError::NoExcitedLine`] if none is given, [`SpectraError::LineOutOfRange`] for a
+    /// line that does not exist or has no phase.
     pub fn new(
         sampling: Sampling,
         lines: impl IntoIterator<Item = usize>,
@@ -52,10 +52,10 @@ impl Lines {
         Ok(Self { sampling, lines, plan })
     }
 
-    /// The lines where at least one force channel has an amplitude of `threshold` (a pure number)
-    /// times its largest one or more.
+    /// Chooses the lines on which the amplitude of at least one force channel is at least
+    /// `threshold` (a pure number) times its largest amplitude.
     ///
-    /// A multisine stands far above the noise between its lines: 0.1 separates them.
+    /// The lines of a multisine are much stronger than the noise between them: 0.1 separates them.
     ///
     /// # Errors
     /// [`SpectraError::NoExcitedLine`] if the force is zero on all usable lines.
@@ -63,9 +63,9 @@ impl Lines {
     /// # Source
     /// Ours.
     pub fn excited(force: &Record, threshold: f64) -> Result<Self, SpectraError> {
-        let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
-        let amplitudes = all.read(force)?.map(|z| z.norm());
-        // A constant has a spectrum too: its rounding.
+        let candidates = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
+        let amplitudes = candidates.read(force)?.map(|z| z.norm());
+        // Rounding gives even a constant force small amplitudes on all lines.
         let rounding = |c: usize| LINE_ROUNDING * force.column(c).amax();
         let largest = amplitudes.column_iter().map(|c| c.max()).enumerate();
         let largest: Vec<f64> =
@@ -81,26 +81,26 @@ impl Lines {
         if lines.is_empty() {
             return Err(SpectraError::NoExcitedLine);
         }
-        Ok(Self { lines, ..all })
+        Ok(Self { lines, ..candidates })
     }
 
-    /// The time axis of the records these lines are read from.
+    /// Returns the time axis of the records that contain these lines.
     pub fn sampling(&self) -> Sampling {
         self.sampling
     }
 
-    /// The chosen lines, in the order they were chosen.
+    /// Returns the chosen lines, in their order.
     pub fn as_slice(&self) -> &[usize] {
         &self.lines
     }
 
-    /// Angular frequencies of the chosen lines, in rad/s.
+    /// Returns the angular frequencies of the chosen lines, in rad/s.
     pub fn omega(&self) -> Vec<f64> {
         let omega0 = self.sampling.omega0();
         self.lines.iter().map(|&n| n as f64 * omega0).collect()
     }
 
-    /// Complex amplitudes of a record at these lines, in its unit: lines × channels,
+    /// Returns the complex amplitudes of a record at these lines, in its unit: lines × channels,
     /// scaled as in [`mechid_signal::spectrum`].
     ///
     /// # Errors
@@ -121,7 +121,7 @@ impl Lines {
         amplitudes
     }
 
-    /// Returns what reads one window after the other with the same buffers.
+    /// Returns a reader with buffers that are used for one window after the other.
     pub(crate) fn reader(&self) -> LineReader<'_> {
         let plan = &self.plan;
         LineReader {
@@ -133,7 +133,7 @@ impl Lines {
     }
 }
 
-/// The transform of chosen lines with its buffers.
+/// Transform of chosen lines with its buffers.
 pub(crate) struct LineReader<'a> {
     lines: &'a Lines,
     input: Vec<f64>,
@@ -142,7 +142,7 @@ pub(crate) struct LineReader<'a> {
 }
 
 impl LineReader<'_> {
-    /// Reads the amplitudes of the samples that `fill` writes, into one place per line.
+    /// Reads the amplitudes of the samples that `fill` writes, one per line.
     pub(crate) fn read<'z>(
         &mut self,
         fill: impl FnOnce(&mut [f64]),
@@ -161,17 +161,17 @@ impl LineReader<'_> {
     }
 }
 
-/// The last line below half the sampling rate.
+/// Returns the last line below half the sampling rate.
 fn last_line(sampling: Sampling) -> usize {
     (sampling.len() - 1) / 2
 }
 
-/// Returns an error unless two time axes are the same up to rounding.
+/// Returns an error unless two time axes are equal up to rounding.
 ///
 /// # Errors
 /// [`SpectraError::Signal`].
 pub fn check_sampling(left: Sampling, right: Sampling) -> Result<(), SpectraError> {
-    // Steps read from files differ by rounding.
+    // Time steps that are read from files may differ by rounding.
     if left.len() == right.len() && (left.dt() - right.dt()).abs() <= 1e-9 * left.dt() {
         return Ok(());
     }

@@ -1,10 +1,10 @@
-//! Rows of data that belong to one open record.
+//! Rows of data from one open record.
 
 use std::ops::Range;
 
 use mechid_signal::Sampling;
 
-/// Open record among the rows of data.
+/// Open record and the rows of its lines in the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenRecord {
     /// Time axis of the record.

@@ -1,4 +1,4 @@
-//! Repeated periods of one experiment: their mean, their scatter, and independent halves.
+//! Repeated periods of one experiment: their mean, their scatter, and two independent halves.
 
 use std::f64::consts::PI;
 
@@ -15,45 +15,45 @@ use crate::noise::between_lines::{BetweenLines, periods_as_one};
 use crate::noise::pooling::Pooling;
 use crate::noise::spectrum::NoiseSpectrum;
 
-/// Forces and motions at chosen lines, period by period, of a steady periodic experiment.
+/// Forces and responses at chosen lines, period by period, in a periodic steady state.
 ///
-/// What repeats from period to period is the signal, what does not is noise: no
-/// model is needed to tell one from the other.
+/// The part that repeats in every period is the signal, and the rest is noise, so that no model is
+/// needed to separate them.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*,
-/// the chapters on nonparametric noise models and on periodic excitations.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
+/// nonparametric noise models and on periodic excitations.
 #[derive(Debug, Clone)]
 pub struct RepeatedPeriods {
     lines: Lines,
     measured: ResponseQuantity,
     dof: usize,
-    /// Periods to come, by which they are split into halves.
+    /// Expected number of periods, which determines the halves.
     expected: usize,
     count: usize,
-    /// Sums of all periods, and of the first and the second half of those expected: lines × 2n, first the
-    /// motions as measured, then the forces.
+    /// Sums of all periods, and of the first and the second half of the expected periods: lines ×
+    /// 2n, first the responses in the measured quantity, then the forces.
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
-    /// Per line Σ (z − z̄)(z − z̄)ᴴ over the periods so far, 2n×2n, or what is as large: from between the lines
-    /// of periods taken as one.
+    /// Sum Σ (z − z̄)(z − z̄)ᴴ over the periods so far, per line, 2n×2n; for periods whose spectrum
+    /// is taken together, an equivalent sum over the lines between them.
     scatter: Vec<DMatrix<Complex<f64>>>,
-    /// Periods whose scatter is still to come.
+    /// Periods that are not included in the scatter yet.
     together: BetweenLines,
-    /// Their sum.
+    /// Sum of these periods.
     together_sum: DMatrix<Complex<f64>>,
-    /// Steps in which the values of each channel come, 2n; zero where they do not.
+    /// Quantisation step of each channel, 2n; zero without quantisation.
     steps: Vec<f64>,
 }
 
 impl RepeatedPeriods {
-    /// Splits records of several whole periods; `lines` belong to one period, and the
-    /// incomplete period at the end, if there is one, is left out.
+    /// Splits records of several whole periods; `lines` belong to one period. An incomplete period
+    /// at the end is ignored.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if the records have not the same number of channels,
-    /// [`SpectraError::Signal`] if they have not the same time axis, not the time step
-    /// of the lines, or less than one period.
+    /// [`NumericsError::Size`] if the records have different numbers of channels,
+    /// [`SpectraError::Signal`] if their time axes differ, if their time step differs from the time
+    /// step of the lines, or if they are shorter than one period.
     pub fn new(
         lines: &Lines,
         force: &Record,
@@ -61,13 +61,13 @@ impl RepeatedPeriods {
         measured: ResponseQuantity,
     ) -> Result<Self, SpectraError> {
         let periods = force.len() / lines.sampling().len();
-        let mut all = Self::expecting(lines, force.channels(), measured, periods);
-        all.push(force, motion)?;
-        Ok(all)
+        let mut repeated = Self::expecting(lines, force.channels(), measured, periods);
+        repeated.push(force, motion)?;
+        Ok(repeated)
     }
 
-    /// No periods yet of a machine of `dof` degrees of freedom; `periods` are to come, a few at a time:
-    /// memory does not grow with their number.
+    /// Creates an empty set of periods of a system with `dof` degrees of freedom, to which
+    /// `periods` will be added a few at a time: the memory does not grow with their number.
     pub fn expecting(
         lines: &Lines,
         dof: usize,
@@ -90,23 +90,26 @@ impl RepeatedPeriods {
         }
     }
 
-    /// States the steps that the values of the channels come in, motions (in the unit measured) before forces (N),
-    /// zero where they are not rounded: an error of step/√12, which is the same in all periods of a channel
-    /// without other noise and so not part of their scatter.
+    /// Sets the quantisation steps of the channels, responses (in the measured quantity) before
+    /// forces (N), zero for channels without quantisation. The quantisation error of step/√12 is
+    /// equal in all periods of a channel without other noise, and then the scatter does not contain
+    /// it.
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one step per channel.
     ///
     /// # Source
-    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: beside noise of the standard deviation s steps q
-    /// leave Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the error alike from period to period.
+    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: with noise of standard
+    /// deviation s, the part Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the variance for steps q is equal in
+    /// all periods.
     pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, SpectraError> {
         check_size("quantisation steps", 2 * self.dof, steps.len())?;
         self.steps = steps;
         Ok(self)
     }
 
-    /// Variance on the samples of each channel, 2n, of the rounding that is alike in all periods.
+    /// Returns the variance per sample of each channel, 2n, of the quantisation error that is equal
+    /// in all periods.
     fn rounding(&self) -> Vec<f64> {
         let (samples, count) = (self.lines.sampling().len() as f64, self.count as f64);
         let of_channel = |(channel, step): (usize, &f64)| {
@@ -114,22 +117,23 @@ impl RepeatedPeriods {
             let of_noise =
                 powers.sum::<f64>() / self.scatter.len().max(1) as f64 / (count - 1.0).max(1.0);
             let scatter = of_noise * samples / 4.0;
-            if *step > 0.0 { step * step * alike(scatter / (step * step)) } else { 0.0 }
+            if *step > 0.0 { step * step * common_rounding(scatter / (step * step)) } else { 0.0 }
         };
         self.steps.iter().enumerate().map(of_channel).collect()
     }
 
-    /// No periods yet of those that are taken as one next, where `remaining` are to come.
+    /// Creates the buffer for the next periods whose spectrum is taken together, if `remaining` are
+    /// expected.
     fn together(lines: &Lines, dof: usize, remaining: usize) -> BetweenLines {
         let (period, channels) = (lines.sampling().len(), 2 * dof);
         BetweenLines::new(periods_as_one(remaining, period, channels), period, channels)
     }
 
-    /// Adds the whole periods of a stretch of force (N) and motion, one period or more; an incomplete
-    /// one at its end is left out.
+    /// Adds the whole periods of a part of the records of force (N) and response, at least one; an
+    /// incomplete period at its end is ignored.
     ///
     /// # Errors
-    /// As [`RepeatedPeriods::new`]; then nothing is added.
+    /// As [`RepeatedPeriods::new`]; the set is then unchanged.
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         let period = self.lines.sampling().len();
@@ -179,8 +183,8 @@ impl RepeatedPeriods {
         }
     }
 
-    /// Adds the scatter of the last `periods`: what is between their lines, and how far their mean is from that
-    /// of all before.
+    /// Adds the scatter of the last `periods`: the noise between their lines, and the deviation of
+    /// their mean from the mean of all before.
     ///
     /// # Source
     /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
@@ -201,17 +205,17 @@ impl RepeatedPeriods {
         }
     }
 
-    /// Number of whole periods.
+    /// Returns the number of whole periods.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The lines that are read of each.
+    /// Returns the lines that are read from each period.
     pub fn lines(&self) -> &Lines {
         &self.lines
     }
 
-    /// The mean over all periods, without a statement on its noise.
+    /// Returns the mean over all periods, without its noise.
     ///
     /// # Errors
     /// As [`FrequencyData::from_amplitudes`], and [`SpectraError::TooFewAverages`] if there is no
@@ -223,7 +227,7 @@ impl RepeatedPeriods {
         mean.with_force_noise(&deviations, self.lines.sampling().len())
     }
 
-    /// The mean over all periods with the noise that their scatter shows.
+    /// Returns the mean over all periods with the noise that follows from their scatter.
     ///
     /// # Errors
     /// As [`RepeatedPeriods::mean`] and [`RepeatedPeriods::noise`].
@@ -231,12 +235,11 @@ impl RepeatedPeriods {
         self.mean()?.with_noise(self.noise(pooling)?)
     }
 
-    /// The means over the first and the second half of the periods (the middle one of an
-    /// odd number is left out): two measurements of the same signal with independent noise.
+    /// Returns the means over the first and the second half of the periods (without the middle
+    /// period of an odd number): two measurements of the same signal with independent noise.
     ///
     /// # Errors
-    /// [`SpectraError::TooFewAverages`] if there is only one period, or not yet all of those
-    /// expected.
+    /// [`SpectraError::TooFewAverages`] if there is only one period, or fewer than expected.
     pub fn halves(&self) -> Result<(FrequencyData, FrequencyData), SpectraError> {
         self.at_least(self.expected.max(2))?;
         let count = (self.expected / 2) as f64;
@@ -244,32 +247,35 @@ impl RepeatedPeriods {
         Ok((self.data(first.unscale(count))?, self.data(second.unscale(count))?))
     }
 
-    /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
-    /// pooled over lines; [`NoiseSpectrum::models`] tells what was chosen.
+    /// Returns the covariance of the mean over the periods, of displacement (m) and force (N), line
+    /// by line or pooled over lines; [`NoiseSpectrum::models`] describes the choice.
     ///
-    /// Three to 16 periods in a row, as far as memory allows, are taken as one record, between whose lines of a
-    /// period there is noise only; for the rest their means scatter.
-    /// A force that is the same in every period to rounding is taken as exact.
+    /// The spectra of 3 to 16 consecutive periods, as far as memory allows, are taken as the
+    /// spectrum of one record, which has only noise between the lines of a period; the means of
+    /// such groups add their scatter. A force that is equal in every period up to rounding is taken
+    /// as exact.
     ///
     /// # Errors
-    /// [`SpectraError::TooFewAverages`] if there is only one period, or not yet all of those expected.
+    /// [`SpectraError::TooFewAverages`] if there is only one period, or fewer than expected.
     ///
     /// # Source
-    /// Pintelon & Schoukens, the chapters of above: noise on the lines that are not excited.
-    /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (smooth spectra: variances with
-    /// a logarithmic link); Schwarz (1978), Annals of Statistics 6, 461–464 (order and bands); Stone
+    /// Pintelon & Schoukens, as for the type: noise on the lines that are not excited. McCullagh &
+    /// Nelder, *Generalized Linear Models* (1989), chapter 8 (smooth spectra: variances with a
+    /// logarithmic link); Schwarz (1978), Annals of Statistics 6, 461–464 (order and bands); Stone
     /// (1974), Journal of the Royal Statistical Society B 36, 111–147 (choice by prediction).
     pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, SpectraError> {
         self.noise_relative_to(pooling, None)
     }
 
-    /// The same where a smooth spectrum may also be that of the response of a `machine` to unmeasured forces.
+    /// Returns the covariance as [`RepeatedPeriods::noise`] does, where a smooth spectrum may also
+    /// be the response of the system `machine` to unmeasured forces.
     ///
     /// # Errors
-    /// The errors of [`RepeatedPeriods::noise`]; [`NumericsError::Size`] for a machine of other degrees of freedom.
+    /// As [`RepeatedPeriods::noise`]; [`NumericsError::Size`] for a system with another number of
+    /// degrees of freedom.
     ///
     /// # Source
-    /// The sources of [`RepeatedPeriods::noise`].
+    /// As [`RepeatedPeriods::noise`].
     pub fn noise_beside(
         &self,
         pooling: Pooling,
@@ -280,7 +286,7 @@ impl RepeatedPeriods {
         if got != n {
             return Err(NumericsError::Size { what, got, expected: n }.into());
         }
-        // At a pole on a line the noise has no level to compare with.
+        // The receptance is infinite if a pole is on a line, and then gives no noise level.
         let Ok(receptances) = machine.receptances(&omega) else { return self.noise(pooling) };
         let of_forces = DMatrix::from_fn(omega.len(), 2 * n, |row, channel| {
             if channel >= n {
@@ -299,7 +305,8 @@ impl RepeatedPeriods {
     ) -> Result<NoiseSpectrum, SpectraError> {
         self.at_least(self.expected.max(2))?;
         let count = self.count;
-        // Of the mean: the scatter of one period, divided by their number once more.
+        // The covariance of the mean is the covariance of one period divided by the number of
+        // periods.
         let scale = Complex::from(1.0 / ((count - 1) * count) as f64);
         let (n, repeats) = (self.dof, self.force_repeats());
         let of_mean = |scatter: &DMatrix<Complex<f64>>| {
@@ -319,13 +326,15 @@ impl RepeatedPeriods {
             relative,
         )?;
         let rounding = self.rounding();
-        Ok(match rounding.iter().all(|variance| *variance == 0.0) {
-            true => noise,
-            false => noise.with_more(&rounding, self.measured, self.lines.sampling().len()),
+        Ok(if rounding.iter().all(|variance| *variance == 0.0) {
+            noise
+        } else {
+            noise.with_more(&rounding, self.measured, self.lines.sampling().len())
         })
     }
 
-    /// Returns whether the force is the same in every period, to rounding: a computed one, not measured.
+    /// Returns whether the force is equal in every period up to rounding: computed instead of
+    /// measured.
     fn force_repeats(&self) -> bool {
         let (n, count) = (self.dof, self.count as f64);
         let scatter = self.scatter.iter().map(|s| (n..2 * n).map(|i| s[(i, i)].re).sum::<f64>());
@@ -347,12 +356,13 @@ impl RepeatedPeriods {
     }
 }
 
-/// Variance of rounding to steps of 1 that is alike in all periods, beside noise of which values in steps scatter so much
-/// (variances, in squares of a step).
+/// Returns the part of the variance of rounding to steps of 1 that is equal in all periods, from
+/// the `scatter` of the quantised values between periods (variances, in squares of a step).
 ///
-/// With a uniform place between two steps the error of rounding and noise together has the variance s² + 1/12, of
-/// which the scatter has what is not alike.
-fn alike(scatter: f64) -> f64 {
+/// For a uniformly distributed position between two steps, the error of rounding and noise together
+/// has the variance s² + 1/12; the scatter is this variance minus the part that is equal in all
+/// periods.
+fn common_rounding(scatter: f64) -> f64 {
     let beside = |variance: f64| -> f64 {
         let term = |k: i32| {
             let k2 = f64::from(k * k);
@@ -363,10 +373,7 @@ fn alike(scatter: f64) -> f64 {
     let (mut low, mut high) = (0.0, scatter.max(0.0));
     for _ in 0..PERIODS_HALVINGS {
         let middle = 0.5 * (low + high);
-        match middle + 1.0 / 12.0 - beside(middle) < scatter {
-            true => low = middle,
-            false => high = middle,
-        }
+        if middle + 1.0 / 12.0 - beside(middle) < scatter { low = middle } else { high = middle }
     }
     beside(high)
 }
@@ -397,7 +404,7 @@ mod tests {
                 // The mean has the scatter of a period over their number beside what is alike.
                 together += ((mean - exact).powi(2) - own / PERIODS as f64) / SAMPLES as f64;
             }
-            let found = alike(scatter);
+            let found = common_rounding(scatter);
             assert!((found - together).abs() < 0.004, "{deviation}: {found} {together}");
         }
     }

@@ -1,8 +1,9 @@
-//! Sinusoids of unknown frequency in the responses of open records: what run-out, an unbalance or mains leave there.
+//! Sinusoids of unknown frequency in the responses of open records, caused by run-out, unbalance or
+//! mains.
 //!
-//! Between two lines a sinusoid leaks to all of them, with one phase: neither the spectrum of a noise nor leaving
-//! lines out describes that. It is fitted where it stands out, to the lines around it under Hann's window, and taken
-//! off all of them.
+//! A sinusoid between two lines leaks to all lines with a fixed phase, which neither a noise
+//! spectrum nor the exclusion of lines can describe. A conspicuous sinusoid is fitted to the lines
+//! around it under Hann's window, and subtracted from all lines.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -19,42 +20,44 @@ use crate::limits::{
 };
 use crate::open_record::OpenRecord;
 
-/// A sinusoid beside the response to the forces: Re(c e^{iωt}) in each channel, from the first sample on.
+/// Sinusoid in the response that is not caused by the forces: Re(c e^{iωt}) in each channel, from
+/// the first sample on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sinusoid {
-    /// Line that it stands at, or next to.
+    /// Nearest line.
     line: usize,
     omega: f64,
     amplitude: Vec<Complex<f64>>,
 }
 
 impl Sinusoid {
-    /// Angular frequency ω, in rad/s.
+    /// Returns the angular frequency ω, in rad/s.
     pub fn omega(&self) -> f64 {
         self.omega
     }
 
-    /// Complex amplitudes c of each channel, in the unit of the quantity measured.
+    /// Returns the complex amplitudes c of each channel, in the unit of the measured quantity.
     pub fn amplitude(&self) -> &[Complex<f64>] {
         &self.amplitude
     }
 
-    /// Number of real unknowns.
+    /// Returns the number of real unknowns.
     pub fn unknowns(&self) -> usize {
         2 * self.amplitude.len() + 1
     }
 
-    /// Amplitude that channel `channel` reads at a line, in the unit of the quantity measured.
+    /// Returns the amplitude of channel `channel` at a line, in the unit of the measured quantity.
     fn read(&self, sampling: Sampling, line: usize, channel: usize) -> Complex<f64> {
         let [before, after] = sides(sampling, self.omega, line);
         self.amplitude[channel] * before + self.amplitude[channel].conj() * after
     }
 }
 
-/// Amplitudes at a line of e^{iωt} and e^{−iωt}, each halved as in a cosine of amplitude 1.
+/// Returns the amplitudes at a line of e^{iωt} and e^{−iωt}, each halved as in a cosine of
+/// amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
-    // Sum of a geometric series over its number of terms.
+    // A geometric series, divided by its number of terms, has this sum.
     let mean = |turn: f64| {
         let half = 0.5 * turn;
         match half.sin() {
@@ -69,8 +72,8 @@ fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
 }
 
 impl FrequencyData {
-    /// The rows of open records with the sinusoids of each, as the maximum-likelihood estimator found them,
-    /// taken off the displacement.
+    /// Returns the rows of open records with the sinusoids of each, as the maximum-likelihood
+    /// estimator estimated them, subtracted from the displacement.
     #[must_use]
     pub fn without_sinusoids(&self, sinusoids: &[Vec<Sinusoid>]) -> Self {
         let mut displacement = self.displacement().clone();
@@ -94,16 +97,17 @@ impl FrequencyData {
     }
 }
 
-/// Finds the sinusoids that stand out of a residual (rows × n, in m), for each open record of the data; those `known`
-/// from a residual before are looked for first.
+/// Returns the sinusoids that are conspicuous in a residual (rows × n, in m), for each open record
+/// of the data; the sinusoids `known` from a previous residual are fitted first.
 ///
-/// None is looked for where a force has a line of its own: the residual may be that of the machine. At a resonance
-/// it has to stand out by as much more as the squared receptance of the `system`, if there is one, does: what disturbs
-/// a force looks like that.
+/// Lines with a peak of the force are excluded, because the residual there may come from the
+/// system. At a resonance, the threshold is higher by the ratio of the squared receptance of the
+/// `system`, if it is given, because a disturbance of the force has that shape.
 ///
 /// # Source
-/// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a sinusoid in
-/// noise); Harris (1978), Proceedings of the IEEE 66, 51–83 (Hann's window); the limits are ours.
+/// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a
+/// sinusoid in noise); Harris (1978), Proceedings of the IEEE 66, 51–83 (Hann's window); the limits
+/// are ours.
 pub fn find(
     data: &FrequencyData,
     residual: &DMatrix<Complex<f64>>,
@@ -111,28 +115,28 @@ pub fn find(
     known: &[Vec<Sinusoid>],
 ) -> Vec<Vec<Sinusoid>> {
     let records = (0..).map_while(|record| data.open_record(record));
-    let each = records.enumerate().map(|(at, record)| {
+    let sinusoids = records.enumerate().map(|(at, record)| {
         let known = known.get(at).map_or(&[][..], Vec::as_slice);
         Search::new(data, residual, system, record).sinusoids(known)
     });
-    each.collect()
+    sinusoids.collect()
 }
 
-/// The lines of one record, from the first to the last.
+/// Lines of one record, from the first to the last.
 struct Search<'a> {
     system: Option<&'a SecondOrderSystem>,
     measured: ResponseQuantity,
     sampling: Sampling,
     first: usize,
-    /// Flag for each line that its neighbours are there, too.
+    /// `true` for each line whose neighbours are in the data, too.
     whole: Vec<bool>,
-    /// Residual in the quantity measured, lines × channels.
+    /// Residual in the measured quantity, lines × channels.
     residual: DMatrix<Complex<f64>>,
-    /// Power around each line under Hann's window; infinite where there is none to tell.
+    /// Power around each line under Hann's window; infinite if there are too few lines.
     level: DMatrix<f64>,
-    /// Flag for each line that its level allows for the receptance there.
+    /// `true` for each line whose level includes the factor for the receptance.
     is_resonant: Vec<bool>,
-    /// Lines at which nothing more is looked for.
+    /// `true` for each line that is excluded from the search.
     done: Vec<bool>,
 }
 
@@ -175,10 +179,10 @@ impl<'a> Search<'a> {
     }
 
     fn sinusoids(mut self, known: &[Sinusoid]) -> Vec<Sinusoid> {
-        let mut found = known.to_vec();
-        found.iter().for_each(|sinusoid| self.put(sinusoid, -1.0));
-        self.refine(&mut found);
-        found.retain(|sinusoid| {
+        let mut sinusoids = known.to_vec();
+        sinusoids.iter().for_each(|sinusoid| self.put(sinusoid, -1.0));
+        self.refine(&mut sinusoids);
+        sinusoids.retain(|sinusoid| {
             self.put(sinusoid, 1.0);
             let at = sinusoid.line - self.first;
             self.allow_for_receptance(at);
@@ -192,7 +196,7 @@ impl<'a> Search<'a> {
         let mut least = SINUSOID_CONSPICUOUS;
         for _ in 0..LOOKED_AT {
             let Some((ratio, at)) = self.most_conspicuous(&windowed) else { break };
-            if ratio <= least || found.len() >= SINUSOID_MOST {
+            if ratio <= least || sinusoids.len() >= SINUSOID_MOST {
                 break;
             }
             if !self.is_resonant[at] {
@@ -205,7 +209,7 @@ impl<'a> Search<'a> {
             let [before, after] = [&windowed, &less].map(|of| self.excess(of, at));
             if after <= SINUSOID_LEFT * before {
                 least = least.max(SINUSOID_BESIDE * ratio);
-                found.push(sinusoid);
+                sinusoids.push(sinusoid);
                 windowed = less;
             } else {
                 self.put(&sinusoid, 1.0);
@@ -213,11 +217,11 @@ impl<'a> Search<'a> {
                 self.done[around(at, SINUSOID_EXPLAINED, count)].fill(true);
             }
         }
-        self.refine(&mut found);
-        found
+        self.refine(&mut sinusoids);
+        sinusoids
     }
 
-    /// Fits each sinusoid again, beside all others.
+    /// Fits each sinusoid again, with all others subtracted.
     fn refine(&mut self, found: &mut [Sinusoid]) {
         for _ in 0..SINUSOID_ROUNDS {
             for sinusoid in &mut *found {
@@ -228,8 +232,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Raises the level around a line by as much as the mean squared receptance near it is above that of the lines
-    /// around, once.
+    /// Raises the level around a line, once, by the ratio of the mean squared receptance near it
+    /// and around it.
     fn allow_for_receptance(&mut self, at: usize) {
         if std::mem::replace(&mut self.is_resonant[at], true) {
             return;
@@ -244,14 +248,14 @@ impl<'a> Search<'a> {
         let steps = 1..2 * GAINS_PER_LINE;
         let near = steps.map(|step| line - 1.0 + step as f64 / GAINS_PER_LINE as f64);
         let near: Vec<f64> = near.filter(|place| *place > 0.0).collect();
-        let others: Vec<f64> = around(at, SINUSOID_AROUND, self.done.len())
+        let around_it: Vec<f64> = around(at, SINUSOID_AROUND, self.done.len())
             .filter(|row| row.abs_diff(at) > SINUSOID_NEXT)
             .map(|row| (self.first + row) as f64)
             .collect();
         for channel in 0..self.level.ncols() {
             let here = near.iter().filter_map(|place| gain(*place, channel)).sum::<f64>();
             let mut there: Vec<f64> =
-                others.iter().filter_map(|place| gain(*place, channel)).collect();
+                around_it.iter().filter_map(|place| gain(*place, channel)).collect();
             there.sort_by(f64::total_cmp);
             if let Some(median) = there.get(there.len() / 2).filter(|median| **median > 0.0) {
                 let raised = here / (near.len() as f64 * median);
@@ -260,20 +264,21 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Power of a line over the level around it, of the channel where that is most.
+    /// Returns the power of a line relative to the level around it, in the channel with the largest
+    /// ratio.
     fn stands_out(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
         let of = |c: usize| windowed[(at, c)].norm_sqr() / self.level[(at, c)];
         (0..windowed.ncols()).map(of).fold(0.0, f64::max)
     }
 
-    /// The line that stands out most, and by how much.
+    /// Returns the most conspicuous line and its power ratio.
     fn most_conspicuous(&self, windowed: &DMatrix<Complex<f64>>) -> Option<(f64, usize)> {
         let open = (0..self.done.len()).filter(|at| !self.done[*at]);
         let ratios = open.map(|at| (self.stands_out(windowed, at), at));
         ratios.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Power above the level around a line, over the level.
+    /// Returns the power above the level around a line, relative to the level.
     fn excess(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
         let rows = around(at, SINUSOID_EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
         let of = |row: usize| -> f64 {
@@ -283,7 +288,7 @@ impl<'a> Search<'a> {
         rows.map(of).sum()
     }
 
-    /// The sinusoid between the neighbours of a line that leaves least around it.
+    /// Returns the sinusoid between the neighbours of a line with the smallest residual around it.
     fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
         let rows = around(at, SINUSOID_FITTED, self.done.len()).filter(|row| self.whole[*row]);
         let rows: Vec<usize> = rows.collect();
@@ -296,9 +301,10 @@ impl<'a> Search<'a> {
             let omega = place * self.sampling.omega0();
             let qr = self.waves(omega, &rows).qr();
             let along = qr.q().tr_mul(&parts);
-            let left = &parts - qr.q() * &along;
-            let cost: f64 =
-                (0..channels).map(|c| left.column(c).norm_squared() / self.level[(at, c)]).sum();
+            let residual = &parts - qr.q() * &along;
+            let cost: f64 = (0..channels)
+                .map(|c| residual.column(c).norm_squared() / self.level[(at, c)])
+                .sum();
             (cost, omega, qr.r().solve_upper_triangular(&along))
         };
         let cost = |place: f64| solved(place).0;
@@ -325,7 +331,8 @@ impl<'a> Search<'a> {
         Sinusoid { line, omega, amplitude: (0..channels).map(of).collect() }
     }
 
-    /// Cosine and negative sine of amplitude 1 at lines under Hann's window, real and imaginary parts in turn.
+    /// Returns cosine and negative sine of amplitude 1 at lines under Hann's window, real and
+    /// imaginary parts alternating.
     fn waves(&self, omega: f64, rows: &[usize]) -> DMatrix<f64> {
         let mut waves = DMatrix::zeros(2 * rows.len(), 2);
         for (at, row) in rows.iter().enumerate() {
@@ -343,7 +350,7 @@ impl<'a> Search<'a> {
         waves
     }
 
-    /// Adds a sinusoid to the residual, or takes it off.
+    /// Adds a sinusoid to the residual, or subtracts it.
     fn put(&mut self, sinusoid: &Sinusoid, sign: f64) {
         for row in 0..self.done.len() {
             for channel in 0..sinusoid.amplitude.len() {
@@ -358,7 +365,7 @@ fn around(at: usize, reach: usize, count: usize) -> Range<usize> {
     at.saturating_sub(reach)..(at + reach + 1).min(count)
 }
 
-/// Lines under Hann's window; those at the ends stay as they are.
+/// Returns the lines under Hann's window; the first and the last are unchanged.
 fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     let mut windowed = lines.clone();
     for row in 1..lines.nrows().saturating_sub(1) {
@@ -368,23 +375,23 @@ fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     windowed
 }
 
-/// The power around each line of each channel.
+/// Returns the power around each line of each channel.
 fn levels(windowed: &DMatrix<Complex<f64>>, whole: &[bool]) -> DMatrix<f64> {
     let mut powers = Vec::with_capacity(2 * SINUSOID_AROUND);
     DMatrix::from_fn(windowed.nrows(), windowed.ncols(), |at, channel| {
         if !whole[at] {
             return f64::INFINITY;
         }
-        let others = around(at, SINUSOID_AROUND, whole.len());
-        let others = others.filter(|row| whole[*row] && row.abs_diff(at) > SINUSOID_NEXT);
+        let neighbours = around(at, SINUSOID_AROUND, whole.len());
+        let neighbours = neighbours.filter(|row| whole[*row] && row.abs_diff(at) > SINUSOID_NEXT);
         powers.clear();
-        powers.extend(others.map(|row| windowed[(row, channel)].norm_sqr()));
+        powers.extend(neighbours.map(|row| windowed[(row, channel)].norm_sqr()));
         if powers.len() < SINUSOID_FEWEST {
             return f64::INFINITY;
         }
         let middle = powers.len() / 2;
         let (_, median, _) = powers.select_nth_unstable_by(middle, f64::total_cmp);
-        // Median of an exponential distribution.
+        // The median of an exponential distribution is ln 2 times its mean.
         if *median > 0.0 { *median / LN_2 } else { f64::INFINITY }
     })
 }

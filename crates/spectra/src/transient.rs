@@ -1,26 +1,28 @@
-//! Transient of an open record: the load that the difference of its final and initial state puts on its lines.
+//! Transient of an open record: the effect of the difference between its final and initial states
+//! on its lines, written as a load.
 
 use mechid_model::Matrix;
 use nalgebra::{Complex, DVector};
 
 use crate::frequency_data::FrequencyData;
 
-/// Unknown loads τ of the transients of open records: column by column of [`FrequencyData::transient`], power by
-/// power in the order of the matrices, one of each degree of freedom.
+/// Unknown loads τ of the transients of open records, ordered by columns of
+/// [`FrequencyData::transient`], then by powers in the order of the matrices, then by degrees of
+/// freedom.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 6.3.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// section 6.3.
 pub struct TransientLoad<'a> {
     data: &'a FrequencyData,
     tau: &'a [f64],
 }
 
 impl<'a> TransientLoad<'a> {
-    /// Returns the loads `tau` of the open records of `data`.
-    /// Loads are in N times powers of s.
+    /// Creates the loads `tau` of the open records of `data`, in N times powers of s.
     ///
     /// # Panics
-    /// If there are not as many loads as [`len`] says.
+    /// If the number of loads differs from [`len`].
     pub fn new(data: &'a FrequencyData, tau: &'a [f64]) -> Self {
         assert_eq!(tau.len(), len(data), "one load of every record, power and degree of freedom");
         Self { data, tau }
@@ -53,7 +55,8 @@ pub fn len(data: &FrequencyData) -> usize {
     Matrix::ALL.len() * data.dof() * data.transient().ncols()
 }
 
-/// Returns the index of a load among all: of a column of the transient, a power and a degree of freedom, of `n`.
+/// Returns the index of a load: for a column of the transient, a power and one of `n` degrees of
+/// freedom.
 pub fn index(n: usize, column: usize, matrix: Matrix, dof: usize) -> usize {
     (Matrix::ALL.len() * column + matrix as usize) * n + dof
 }
@@ -67,11 +70,11 @@ pub fn powers(omega: f64) -> [Complex<f64>; 3] {
 }
 
 impl FrequencyData {
-    /// Returns the lines as if all records were whole periods: the transients of open records, by their loads
-    /// `tau` in the order of [`TransientLoad`], are subtracted from the force (N).
+    /// Returns the lines as if all records were whole periods: the transients of open records, with
+    /// the loads `tau` in the order of [`TransientLoad`], are subtracted from the force (N).
     ///
     /// # Panics
-    /// If there are not as many loads as [`len`] says.
+    /// If the number of loads differs from [`len`].
     #[must_use]
     pub fn without_transient(&self, tau: &[f64]) -> Self {
         let transient = TransientLoad::new(self, tau);

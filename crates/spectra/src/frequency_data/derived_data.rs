@@ -1,4 +1,5 @@
-//! Data made of others: without the transients of open records, under a window, later, or of one load alone.
+//! Data derived from other data: without the transients of open records, under a window, with a
+//! delay, or of one load alone.
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
@@ -11,7 +12,7 @@ impl FrequencyData {
         self.open.clear();
     }
 
-    /// Returns the lines of whole periods with other forces (N), rows × n.
+    /// Returns lines of whole periods with other forces (N), rows × n.
     pub(crate) fn with_closed_force(&self, force: DMatrix<Complex<f64>>) -> Self {
         let mut closed = Self { force, ..self.clone() };
         closed.no_longer_open();
@@ -24,8 +25,9 @@ impl FrequencyData {
         Self { displacement, ..self.clone() }
     }
 
-    /// Returns the lines as if all records were whole periods: the response of `system` to the load of the
-    /// transients, the force less the `closed` one (N), is subtracted from the displacement (m).
+    /// Returns the lines as if all records were whole periods: the response of `system` to the load
+    /// of the transients, which is the force minus the `closed` force (N), is subtracted from the
+    /// displacement (m).
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (the response as receptance times force).
@@ -37,7 +39,8 @@ impl FrequencyData {
     ) -> Self {
         let mut alone = self.clone();
         for (row, omega) in self.omega.iter().enumerate() {
-            // At an undamped resonance the motion is that of rounding: it stays as it is.
+            // The receptance is infinite at an undamped resonance, so the displacement is not
+            // changed.
             if let Ok(receptance) = system.receptance(*omega) {
                 let load = (closed.row(row) - self.force.row(row)).transpose();
                 let displacement = self.displacement.row(row) - (receptance * load).transpose();
@@ -48,7 +51,8 @@ impl FrequencyData {
         alone
     }
 
-    /// Returns a jump between the ends of a record in what channel `channel` reads, without a force: its lines fall as 1/s.
+    /// Returns data of a step between the initial and final values of channel `channel`, without a
+    /// force: its lines decrease as 1/s.
     pub fn of_jump(&self, channel: usize) -> Self {
         let jump = |row: usize, column: usize| {
             let omega = self.omega[row];
@@ -62,14 +66,16 @@ impl FrequencyData {
         }
     }
 
-    /// Returns a load that the ends of a record put on degree of freedom `dof`, a polynomial's term s^`power`, without a motion.
+    /// Returns data of a transient load on degree of freedom `dof`, the polynomial term s^`power`,
+    /// without a response.
     pub fn of_load(&self, dof: usize, power: usize) -> Self {
         let load = |row: usize, column: usize| {
             let omega = self.omega[row];
             let unit = self.measured.per_displacement(omega).inv();
-            match column == dof {
-                true => unit * Complex::new(0.0, omega).powu(power as u32),
-                false => Complex::ZERO,
+            if column == dof {
+                unit * Complex::new(0.0, omega).powu(power as u32)
+            } else {
+                Complex::ZERO
             }
         };
         Self {
@@ -79,7 +85,7 @@ impl FrequencyData {
         }
     }
 
-    /// Returns a force of 1 N on degree of freedom `dof` at every line, without a response.
+    /// Returns data of a force of 1 N on degree of freedom `dof` at every line, without a response.
     #[must_use]
     pub fn of_force(&self, dof: usize) -> Self {
         let force = |_, column: usize| Complex::from(if column == dof { 1.0 } else { 0.0 });
@@ -90,8 +96,8 @@ impl FrequencyData {
         }
     }
 
-    /// Returns second differences of neighbouring lines of the same spacing, in which the ends of a record count little:
-    /// the spectra under a Hann window. Rows at the ends of a band stay as they are.
+    /// Returns second differences of neighbouring lines of equal spacing, in which transients have
+    /// little weight: the spectra under a Hann window. Rows at the ends of a band are unchanged.
     ///
     /// # Source
     /// Harris (1978), Proceedings of the IEEE 66, 51–83 (windows as convolutions of lines).
@@ -119,7 +125,7 @@ impl FrequencyData {
         }
     }
 
-    /// Returns the same data with the force `delay` seconds later.
+    /// Returns the same data with the force delayed by `delay` seconds.
     ///
     /// # Source
     /// The shift theorem of Fourier transforms.

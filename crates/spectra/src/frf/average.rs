@@ -1,4 +1,4 @@
-//! Cross-spectra of force and motion, averaged over pieces of records of any length.
+//! Cross-spectra of force and response, averaged over segments of records of any length.
 
 use mechid_model::ResponseQuantity;
 use mechid_numerics::{NumericsError, check_size};
@@ -15,8 +15,8 @@ use crate::limits::{
 };
 use crate::lines::{Lines, check_sampling};
 
-/// Sums from which frequency responses are estimated, gathered stretch by stretch; memory does not grow
-/// with the record.
+/// Sums for the estimation of frequency responses, added segment by segment; the memory does not
+/// grow with the record.
 #[derive(Debug, Clone)]
 pub struct FrfAverage {
     lines: Lines,
@@ -26,15 +26,17 @@ pub struct FrfAverage {
     segments: Segments,
     weights: Option<Vec<f64>>,
     pub(super) pieces: usize,
-    /// Per line.
+    /// One entry per line.
     pub(super) sums: Vec<CrossSpectra>,
 }
 
 impl FrfAverage {
-    /// No segments yet, of so many forces and motions; `lines` belong to one segment.
+    /// Creates an average without segments, for this many forces and responses; `lines` belong to
+    /// one segment.
     ///
     /// # Errors
-    /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines are not those of a segment.
+    /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines have another length than a
+    /// segment.
     pub fn new(
         lines: Lines,
         [inputs, outputs]: [usize; 2],
@@ -48,13 +50,13 @@ impl FrfAverage {
         Ok(Self { lines, inputs, outputs, measured, segments, weights, pieces: 0, sums })
     }
 
-    /// Adds every whole segment of a stretch of force (N) and motion, the first of which begins with
-    /// it. The stretch that follows begins where the next segment does: [`Segments::hop`] samples
-    /// after the last one that was whole.
+    /// Adds every whole segment of a part of the records of force (N) and response; the first
+    /// segment begins with it. The next part must begin where the next segment does:
+    /// [`Segments::hop`] samples after the beginning of the last whole segment.
     ///
     /// # Errors
-    /// [`SpectraError::Signal`] if the records have not the same time axis or not the time step of
-    /// the lines, [`NumericsError::Size`] for another number of channels.
+    /// [`SpectraError::Signal`] if the time axes of the records differ or their time step differs
+    /// from the time step of the lines, [`NumericsError::Size`] for another number of channels.
     ///
     /// # Source
     /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
@@ -87,14 +89,14 @@ impl FrfAverage {
         Ok(())
     }
 
-    /// Adds all segments of another average over the same lines, channels and segments, such as of another
-    /// record of the same machine.
+    /// Adds all segments of another average over the same lines, channels and segments, such as
+    /// from another record of the same system.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if it has other channels or lines.
     ///
     /// # Source
-    /// That of [`FrfAverage::push`].
+    /// As [`FrfAverage::push`].
     pub fn merge(&mut self, other: &Self) -> Result<(), SpectraError> {
         let size = check_size;
         size("channels of the force", self.inputs, other.inputs)?;
@@ -112,15 +114,15 @@ impl FrfAverage {
         self.pieces
     }
 
-    /// Returns the force channels, counted from 0, that show nothing but noise of their own: weaker than a
-    /// tenth of the strongest force, and on no line in common with another force or with a response. They
-    /// are of shakers or points where no force acts; as forces they would seem to do nothing, which biases
-    /// the responses to them towards zero.
+    /// Returns the force channels, counted from 0, that contain only noise: they are weaker than a
+    /// tenth of the strongest force, and coherent with no other force and no response on any line.
+    /// Such channels come from shakers or points without a force; as forces they would seem to have
+    /// no effect, which biases the responses to them towards zero.
     ///
     /// # Source
-    /// Goodman (1957), *On the joint estimation of the spectra, cospectrum and quadrature spectrum of a
-    /// two-dimensional stationary Gaussian process*, for the distribution of a coherence of no signal; the
-    /// limits are ours.
+    /// Goodman (1957), *On the joint estimation of the spectra, cospectrum and quadrature spectrum
+    /// of a two-dimensional stationary Gaussian process*, for the distribution of a coherence
+    /// without a signal; the limits are ours.
     pub fn idle_inputs(&self) -> Vec<usize> {
         let averages = self.averages();
         if self.inputs < 2 || averages <= self.inputs as f64 {
@@ -132,12 +134,13 @@ impl FrfAverage {
         (0..self.inputs).filter(is_weak).filter(|input| self.is_idle(*input, averages)).collect()
     }
 
-    /// Returns the force channels that follow a stronger one: what they have of their own is weaker than a tenth of
-    /// the strongest force, and no response has anything in common with that. These records cannot tell what they do
-    /// from what the stronger force does; the responses to them would be those to the noise of their channels.
+    /// Returns the force channels that are coherent with a stronger one: their independent part is
+    /// weaker than a tenth of the strongest force, and no response is coherent with it. The records
+    /// cannot separate their effect from the effect of the stronger force; the estimated responses
+    /// to them would be responses to the noise of their channels.
     ///
     /// # Source
-    /// The source of [`FrfAverage::idle_inputs`].
+    /// As [`FrfAverage::idle_inputs`].
     pub fn following_inputs(&self) -> Vec<Crosstalk> {
         let mut acting: Vec<usize> = (0..self.inputs).collect();
         let mut following = Vec::new();
@@ -150,7 +153,8 @@ impl FrfAverage {
         following
     }
 
-    /// The force of least power of its own, if it is weak and no response has anything in common with that.
+    /// Returns the force with the weakest independent part, if that part is weak and no response is
+    /// coherent with it.
     fn weakest_follower(&self) -> Option<usize> {
         let (averages, mut own) = (self.averages(), vec![0.0; self.inputs]);
         for sum in &self.sums {
@@ -164,7 +168,7 @@ impl FrfAverage {
         (is_weak && shows_nothing(self.sums.iter().map(evidence))).then_some(weakest)
     }
 
-    /// A force beside the one, of some others, that it has most in common with.
+    /// Returns the force among `others` with which a force is most coherent.
     fn crosstalk(&self, force: usize, others: &[usize]) -> Crosstalk {
         let shared = |driver: usize| -> f64 {
             let of_line = |sum: &CrossSpectra| {
@@ -181,30 +185,31 @@ impl FrfAverage {
         self.sums.iter().map(|sum| sum.force_power(input)).sum()
     }
 
-    /// Whether neither a response nor another force has anything in common with a force.
+    /// Returns whether a force is coherent with no response and no other force.
     fn is_idle(&self, input: usize, averages: f64) -> bool {
         shows_nothing(self.sums.iter().map(|sum| {
             let of_forces = sum.evidence_of_forces(input, averages)?;
-            let mut all = sum.evidence_of_motion(input, averages)?;
-            all.push(of_forces);
-            Some(all)
+            let mut evidence = sum.evidence_of_motion(input, averages)?;
+            evidence.push(of_forces);
+            Some(evidence)
         }))
     }
 
-    /// Returns the places of the lines, counted from 0, that a force drives.
+    /// Returns the indices of the excited lines, counted from 0.
     ///
-    /// A line is not driven where every force is weaker than a hundredth of its strongest line in power, and on
-    /// eight neighbouring lines no response has anything in common with it: the channel shows its noise, and the
-    /// responses to it would be those to noise. The weak lines around such a stretch, and as many lines as the peak
-    /// of a window reaches, carry what leaks from further away. All lines are driven if none is left otherwise.
+    /// A line is not excited if every force there has less than a hundredth of the power of its
+    /// strongest line, and if on eight neighbouring lines no response is coherent with it: the
+    /// channel contains noise, and the estimated responses would be responses to noise. The whole
+    /// range of weak lines around these eight, and as many lines as the peak of a window is wide,
+    /// are excluded too, because leakage reaches them. If no line remained, all are returned.
     ///
     /// # Source
-    /// The coherence is that of [`FrfAverage::idle_inputs`]; the limits are ours.
+    /// The coherence is that in [`FrfAverage::idle_inputs`]; the limits are ours.
     pub fn driven(&self) -> Vec<usize> {
         let (count, averages) = (self.sums.len(), self.averages());
-        let all = || (0..count).collect();
+        let all_lines = || (0..count).collect();
         if averages <= self.inputs as f64 {
-            return all();
+            return all_lines();
         }
         let strongest =
             |input: usize| self.sums.iter().map(|sum| sum.force_power(input)).fold(0.0, f64::max);
@@ -216,8 +221,8 @@ impl FrfAverage {
         let weak: Vec<bool> = self.sums.iter().map(is_weak).collect();
         let evidence = |place: usize| -> (f64, f64) {
             let of = |input| self.sums[place].evidence_of_motion(input, averages);
-            let each = (0..self.inputs).filter_map(of).flatten();
-            each.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0))
+            let values = (0..self.inputs).filter_map(of).flatten();
+            values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0))
         };
         let shown: Vec<(f64, f64)> =
             (0..count).map(|at| if weak[at] { evidence(at) } else { (0.0, 0.0) }).collect();
@@ -226,7 +231,7 @@ impl FrfAverage {
             let stretch = first..first + AVERAGE_STRETCH;
             let (sum, number) = shown[stretch.clone()]
                 .iter()
-                .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
+                .fold((0.0, 0.0), |total, one| (total.0 + one.0, total.1 + one.1));
             if weak[stretch.clone()].iter().all(|weak| *weak) && sum <= MEAN_EVIDENCE * number {
                 undriven[stretch].fill(true);
             }
@@ -243,13 +248,13 @@ impl FrfAverage {
             }
         }
         let driven: Vec<usize> = (0..count).filter(|at| !left_out[*at]).collect();
-        if driven.is_empty() { all() } else { driven }
+        if driven.is_empty() { all_lines() } else { driven }
     }
 
-    /// Returns the same average on some of the lines, by their places, counted from 0.
+    /// Returns the same average on some of the lines, by their indices, counted from 0.
     ///
     /// # Errors
-    /// What [`Lines::new`] refuses.
+    /// As [`Lines::new`].
     ///
     /// # Panics
     /// If there is no such line.
@@ -260,19 +265,19 @@ impl FrfAverage {
         Ok(Self { lines, sums, ..self.clone() })
     }
 
-    /// Lines of a segment.
+    /// Returns the lines of a segment.
     pub fn lines(&self) -> &Lines {
         &self.lines
     }
 
-    /// Returns whether a response has something in common with a force, from so many independent averages.
-    /// Averages are a pure number.
+    /// Returns whether a response is coherent with a force, for this number of independent averages
+    /// (a pure number).
     pub fn response_follows(&self, averages: f64) -> bool {
         let follows = |input: usize| {
-            let each =
+            let values =
                 self.sums.iter().filter_map(|s| s.evidence_of_motion(input, averages)).flatten();
             let (sum, count) =
-                each.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+                values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
             sum > MEAN_EVIDENCE * count
         };
         averages > self.inputs as f64 && (0..self.inputs).any(follows)
@@ -284,16 +289,16 @@ impl FrfAverage {
     /// If there is no such channel.
     #[must_use]
     pub fn of_inputs(&self, inputs: &[usize]) -> Self {
-        let sums = self.sums.iter().map(|sum| sum.of_inputs(inputs)).collect();
+        let sums = self.sums.iter().map(|sum| sum.select_inputs(inputs)).collect();
         Self { inputs: inputs.len(), sums, ..self.clone() }
     }
 
-    /// Equivalent number of independent segments.
+    /// Returns the equivalent number of independent segments.
     fn averages(&self) -> f64 {
         self.segments.averages_under(self.weights.as_deref(), self.pieces)
     }
 
-    /// The frequency responses from all segments so far.
+    /// Returns the frequency responses from all segments so far.
     ///
     /// # Errors
     /// As [`Frf::estimate`].
@@ -332,8 +337,8 @@ impl FrfAverage {
     }
 }
 
-/// Whether the mean and the largest of −ln p, of no signal an exponential variate each, are those of chance; not where
-/// they are unknown.
+/// Returns whether the mean and the largest of −ln p are plausible without coherence, when each is
+/// exponentially distributed; `false` if a value is unknown.
 fn shows_nothing(evidence: impl Iterator<Item = Option<Vec<f64>>>) -> bool {
     let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
     for of_line in evidence {

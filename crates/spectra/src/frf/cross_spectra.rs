@@ -1,4 +1,4 @@
-//! Averaged cross-spectra of forces and motions, and the responses they give.
+//! Averaged cross-spectra of forces and responses, and the frequency responses from them.
 
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{Complex, DMatrix, DVector, Dyn, MatrixView, U1};
@@ -11,7 +11,7 @@ use crate::limits::FORCE_TOLERANCE;
 /// Amplitudes of all channels at one line.
 type Amplitudes<'a> = MatrixView<'a, Complex<f64>, U1, Dyn, U1, Dyn>;
 
-/// Cross-spectra of one line: summed over pieces, then averaged.
+/// Cross-spectra of one line: summed over segments, then averaged.
 #[derive(Debug, Clone)]
 pub(super) struct CrossSpectra {
     force: ComplexMatrix,
@@ -19,7 +19,7 @@ pub(super) struct CrossSpectra {
     pub(super) motion: ComplexMatrix,
 }
 
-/// Adds a bᴴ, once per piece and line: nothing is allocated.
+/// Adds a bᴴ. This runs once per segment and line, so it does not allocate.
 fn accumulate(sum: &mut ComplexMatrix, a: &Amplitudes<'_>, b: &Amplitudes<'_>) {
     for (mut column, b) in sum.column_iter_mut().zip(b.iter()) {
         for (entry, a) in column.iter_mut().zip(a.iter()) {
@@ -37,14 +37,14 @@ impl CrossSpectra {
         }
     }
 
-    /// Adds the amplitudes of forces and motions in one piece.
+    /// Adds the amplitudes of forces and responses in one segment.
     pub(super) fn add(&mut self, f: &Amplitudes<'_>, x: &Amplitudes<'_>) {
         accumulate(&mut self.force, f, f);
         accumulate(&mut self.motion_force, x, f);
         accumulate(&mut self.motion, x, x);
     }
 
-    /// The mean over so many pieces.
+    /// Returns the mean over this many segments.
     pub(super) fn mean(&self, pieces: usize) -> Self {
         let count = Complex::new(pieces as f64, 0.0);
         Self {
@@ -54,26 +54,27 @@ impl CrossSpectra {
         }
     }
 
-    /// Adds the sums of other pieces.
+    /// Adds the sums over other segments.
     pub(super) fn merge(&mut self, other: &Self) {
         self.force += &other.force;
         self.motion_force += &other.motion_force;
         self.motion += &other.motion;
     }
 
-    /// Sum of |F|² of a force.
+    /// Returns the sum of |F|² of a force.
     pub(super) fn force_power(&self, input: usize) -> f64 {
         self.force[(input, input)].re
     }
 
-    /// Amplitude of a force over that of another one, as far as the two are in common; 0 where that one is.
+    /// Returns the amplitude of the coherent part of a force relative to another force; 0 if the
+    /// other one is zero.
     pub(super) fn force_ratio(&self, input: usize, driver: usize) -> Complex<f64> {
         let power = self.force_power(driver);
         if power > 0.0 { self.force[(input, driver)] / power } else { Complex::ZERO }
     }
 
-    /// The sums of some of the forces.
-    pub(super) fn of_inputs(&self, inputs: &[usize]) -> Self {
+    /// Returns the sums of some of the forces.
+    pub(super) fn select_inputs(&self, inputs: &[usize]) -> Self {
         Self {
             force: self.force.select_rows(inputs).select_columns(inputs),
             motion_force: self.motion_force.select_columns(inputs),
@@ -81,31 +82,33 @@ impl CrossSpectra {
         }
     }
 
-    /// −ln p of each motion, that it has nothing in common with a force beyond the others, from so many
-    /// independent averages; `None` if the forces are dependent.
+    /// Returns −ln p of each response, where p is the probability of its partial coherence with a
+    /// force, given the other forces, if there is no relation, for this many independent averages;
+    /// `None` if the forces are dependent.
     pub(super) fn evidence_of_motion(&self, input: usize, averages: f64) -> Option<Vec<f64>> {
         let inverse = self.inverse_force(0.0).ok()?;
         let h = &self.motion_force * &inverse;
         let explained = &h * self.motion_force.adjoint();
         let spare = averages - inverse.nrows() as f64;
         let of_motion = (0..h.nrows()).filter_map(|o| {
-            let left = (self.motion[(o, o)] - explained[(o, o)]).re;
+            let unexplained = (self.motion[(o, o)] - explained[(o, o)]).re;
             let share = h[(o, input)].norm_sqr() / inverse[(input, input)].re;
-            (left > 0.0).then(|| spare * (share / left).ln_1p())
+            (unexplained > 0.0).then(|| spare * (share / unexplained).ln_1p())
         });
         Some(of_motion.collect())
     }
 
-    /// −ln p that a force has nothing in common with the others, likewise: 1 − γ² is a beta variate then.
+    /// Returns −ln p of the coherence of a force with the other forces: without a relation, 1 − γ²
+    /// has a beta distribution.
     pub(super) fn evidence_of_forces(&self, input: usize, averages: f64) -> Option<f64> {
         let inverse = self.inverse_force(0.0).ok()?;
-        let others = inverse.nrows() as f64 - 1.0;
+        let other_forces = inverse.nrows() as f64 - 1.0;
         let apart = (1.0 / (self.force_power(input) * inverse[(input, input)].re)).clamp(0.0, 1.0);
-        let p = Beta::new(averages - others, others).ok()?.cdf(apart);
+        let p = Beta::new(averages - other_forces, other_forces).ok()?.cdf(apart);
         Some(-p.max(f64::MIN_POSITIVE).ln())
     }
 
-    /// S_FF⁻¹, refused where the forces do not act independently.
+    /// Returns S_FF⁻¹; an error if the forces are dependent.
     pub(super) fn inverse_force(&self, frequency_hz: f64) -> Result<ComplexMatrix, SpectraError> {
         let inputs = self.force.nrows();
         let size = self.force.diagonal().map(|s| s.re.sqrt());
@@ -133,12 +136,13 @@ impl CrossSpectra {
             });
             return h.iter().all(|z| z.is_finite()).then_some(h);
         }
-        // H S_FX = S_XX, transposed for a solution from the left.
+        // H S_FX = S_XX is transposed, so that the unknown is on the right.
         let solution = self.motion_force.map(|z| z.conj()).lu().solve(&self.motion.transpose());
         solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
     }
 
-    /// Per motion, the eigenvector of least power of the cross-spectra of forces and motion.
+    /// Returns, for each response, the ratio from the eigenvector of the smallest eigenvalue of the
+    /// cross-spectra of forces and response.
     pub(super) fn hv(&self) -> Result<ComplexMatrix, SpectraError> {
         let (outputs, inputs) = self.motion_force.shape();
         let mut h = DMatrix::zeros(outputs, inputs);
@@ -148,7 +152,7 @@ impl CrossSpectra {
                 continue;
             }
             let size = |i: usize| if i < inputs { self.force[(i, i)].re } else { power }.sqrt();
-            let all = DMatrix::from_fn(inputs + 1, inputs + 1, |i, j| {
+            let scaled = DMatrix::from_fn(inputs + 1, inputs + 1, |i, j| {
                 let s = match (i < inputs, j < inputs) {
                     (true, true) => self.force[(i, j)],
                     (false, true) => self.motion_force[(o, j)],
@@ -157,10 +161,10 @@ impl CrossSpectra {
                 };
                 s / (size(i) * size(j))
             });
-            let eigen = hermitian_eigen(all)?;
+            let eigen = hermitian_eigen(scaled)?;
             let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
             for i in 0..inputs {
-                // aᴴ z = 0 for the scaled z = (forces, motion).
+                // The eigenvector satisfies aᴴ z = 0 for the scaled z = (forces, response).
                 h[(o, i)] = -(least[i] / least[inputs]).conj() * size(inputs) / size(i);
             }
         }

@@ -1,4 +1,4 @@
-//! Responses to forces that have lines of their own, on which the others act a little.
+//! Responses to forces on interleaved lines, with crosstalk from the other forces.
 
 use mechid_numerics::check_size;
 use nalgebra::{Complex, DVector};
@@ -8,46 +8,50 @@ use super::{Frf, FrfAverage, FrfEstimator};
 use crate::SpectraError;
 use crate::limits::{INTERLEAVED_CHANCE, INTERLEAVED_ROUNDING, INTERLEAVED_ROUNDS};
 
-/// Frequency responses to forces each of which has lines of its own.
+/// Frequency responses to forces that are excited on interleaved lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnLines {
-    /// Responses to each force, motions × 1, on the lines that it drives.
+    /// Responses to each force, responses × 1, on the lines that it excites.
     pub responses: Vec<Frf>,
-    /// Crosstalk that was found, and taken off.
+    /// Crosstalk that was estimated and subtracted.
     pub crosstalk: Vec<Crosstalk>,
 }
 
-/// Amplitude of a force on the lines of another one.
+/// Amplitude of a force on the lines of another force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crosstalk {
-    /// Force that acts on lines of another one, counted from 0.
+    /// Force that acts on the lines of the other force, counted from 0.
     pub force: usize,
-    /// Force that drives these lines, counted from 0.
+    /// Force that excites these lines, counted from 0.
     pub driver: usize,
     /// Root mean square of the ratio of their amplitudes, a pure number.
     pub share: f64,
 }
 
 impl OwnLines {
-    /// Responses from averages of all forces, one average over the lines of each force in turn.
+    /// Estimates the responses from averages of all forces, one average over the lines of each
+    /// force in turn.
     ///
-    /// Another force that has more in common with the driver of a line than noise of its channel might acts on the
-    /// machine there: its part of the response is taken off, with the responses to it interpolated between its own
-    /// lines. The error that the interpolation may have is added to the variance.
+    /// If another force is more coherent with the force that excites the lines (the driver) than
+    /// channel noise can be, it acts on the system there. Its part of the response is subtracted,
+    /// by interpolation of the responses to it between its own lines. The possible interpolation
+    /// error is added to the variance.
     ///
     /// # Errors
-    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is an average of all forces for each of them, and as [`FrfAverage::frf`].
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one average of
+    /// all forces for each force, and as [`FrfAverage::frf`].
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 2.7
-    /// (multisines on interleaved lines); Goodman (1957) for the coherence of no signal; the limits are ours.
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+    /// section 2.7 (multisines on interleaved lines); Goodman (1957) for the coherence without a
+    /// signal; the limits are ours.
     pub fn of(own: &[FrfAverage], estimator: FrfEstimator) -> Result<Self, SpectraError> {
         let (mut raw, mut crosstalk, mut couplings) = (Vec::new(), Vec::new(), Vec::new());
         for (driver, average) in own.iter().enumerate() {
             check_size("channels of the force", own.len(), average.inputs)?;
             raw.push(average.of_inputs(&[driver]).frf(estimator)?);
             for force in (0..own.len()).filter(|force| *force != driver) {
-                if let Some(coupling) = Coupling::found(average, force, driver) {
+                if let Some(coupling) = Coupling::estimate(average, force, driver) {
                     crosstalk.push(Crosstalk { force, driver, share: coupling.share() });
                     couplings.push(coupling);
                 }
@@ -57,19 +61,20 @@ impl OwnLines {
         for _ in 0..INTERLEAVED_ROUNDS {
             let mut next = raw.clone();
             for coupling in &couplings {
-                coupling.take_off(&responses[coupling.force], &mut next[coupling.driver]);
+                coupling.subtract(&responses[coupling.force], &mut next[coupling.driver]);
             }
             responses = next;
         }
         if !couplings.is_empty() {
-            // The covariances of all lines together are those of the responses before.
+            // The covariances between lines are those before the subtraction, and are not valid any
+            // more.
             responses.iter_mut().for_each(|frf| frf.scatter = None);
         }
         Ok(Self { responses, crosstalk })
     }
 }
 
-/// A force on the lines of another one.
+/// Crosstalk of a force on the lines of another one.
 struct Coupling {
     force: usize,
     driver: usize,
@@ -78,22 +83,24 @@ struct Coupling {
 }
 
 impl Coupling {
-    /// Finds what a force has in common with the driver of the lines; `None` if it may be noise.
-    fn found(average: &FrfAverage, force: usize, driver: usize) -> Option<Self> {
+    /// Estimates the coherent part of a force on the lines of the driver; `None` if it may be
+    /// noise.
+    fn estimate(average: &FrfAverage, force: usize, driver: usize) -> Option<Self> {
         let (mut common, mut left) = (0.0, 0.0);
         let mut ratio = Vec::with_capacity(average.sums.len());
         for sum in &average.sums {
-            let of_line = sum.force_ratio(force, driver);
-            let shared = of_line.norm_sqr() * sum.force_power(driver);
+            let ratio_on_line = sum.force_ratio(force, driver);
+            let shared = ratio_on_line.norm_sqr() * sum.force_power(driver);
             common += shared;
             left += (sum.force_power(force) - shared).max(0.0);
-            ratio.push(of_line);
+            ratio.push(ratio_on_line);
         }
-        let found = Self { force, driver, ratio };
+        let coupling = Self { force, driver, ratio };
         let (lines, spare) = (average.sums.len() as f64, average.pieces.saturating_sub(1) as f64);
-        // The part that noise has in common with the driver is a beta variate.
+        // For noise, the coherent fraction has a beta distribution.
         let by_chance = Beta::new(lines, lines * spare).ok()?.sf(common / (common + left));
-        (by_chance < INTERLEAVED_CHANCE && found.share() > INTERLEAVED_ROUNDING).then_some(found)
+        (by_chance < INTERLEAVED_CHANCE && coupling.share() > INTERLEAVED_ROUNDING)
+            .then_some(coupling)
     }
 
     fn share(&self) -> f64 {
@@ -101,8 +108,8 @@ impl Coupling {
         (sum / self.ratio.len() as f64).sqrt()
     }
 
-    /// Takes the part of the force off the responses to the driver.
-    fn take_off(&self, of_force: &Frf, of_driver: &mut Frf) {
+    /// Subtracts the response to the force from the responses to the driver.
+    fn subtract(&self, of_force: &Frf, of_driver: &mut Frf) {
         for (at, ratio) in self.ratio.iter().enumerate() {
             let there = Between::at(of_force, of_driver.lines[at]);
             let response = &mut of_driver.response[at];
@@ -116,17 +123,18 @@ impl Coupling {
     }
 }
 
-/// Responses at a line between those of a force.
+/// Responses to a force, interpolated between its lines.
 struct Between {
     response: DVector<Complex<f64>>,
     variance: DVector<f64>,
-    /// Error that the interpolation may have: that of a line twice as long between neighbours of those here, which
-    /// is as large where the machine resonates between two lines, and four times as large elsewhere.
+    /// Possible interpolation error: the error of an interpolation over twice the distance, between
+    /// the neighbours of the two lines. It has the same size if there is a resonance between the
+    /// two lines, and is four times as large otherwise.
     missed: DVector<f64>,
 }
 
 impl Between {
-    /// A straight line between the neighbours; beyond the ends the nearest.
+    /// Interpolates linearly between the neighbours; outside, takes the nearest line.
     fn at(frf: &Frf, line: usize) -> Self {
         let (lines, value) = (&frf.lines, |at: usize| frf.response[at].column(0));
         let last = lines.len() - 1;

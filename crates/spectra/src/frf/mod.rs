@@ -1,4 +1,4 @@
-//! Frequency response functions and coherence from measured forces and motions.
+//! Frequency response functions and coherence from measured forces and responses.
 
 mod average;
 mod cross_spectra;
@@ -24,22 +24,22 @@ use crate::lines::Lines;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// Estimator of a frequency response, by the signal that is taken as free of noise.
+/// Estimator of a frequency response; the name says which signal is assumed free of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum FrfEstimator {
-    /// S_XF S_FF⁻¹: right when only the motion is noisy; noise on the force makes it too small.
+    /// S_XF S_FF⁻¹: unbiased if only the response is noisy; noise on the force makes it too small.
     H1,
-    /// S_XX S_FX⁻¹: right when only the force is noisy; noise on the motion makes it too large.
-    /// With several forces it needs as many motions.
+    /// S_XX S_FX⁻¹: unbiased if only the force is noisy; noise on the response makes it too large.
+    /// With several forces it needs as many responses.
     H2,
-    /// Total least squares, force and motion scaled to equal power; with one force the
+    /// Total least squares, with force and response scaled to equal power; for one force, the
     /// geometric mean of H1 and H2.
     Hv,
 }
 
-/// Motion per unit force at chosen frequencies, with the coherence.
+/// Response per unit force at chosen frequencies, with the coherence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frf {
     omega: Vec<f64>,
@@ -52,20 +52,21 @@ pub struct Frf {
     coherence: DMatrix<f64>,
     variance: Vec<DMatrix<f64>>,
     averages: f64,
-    /// What is known of the errors beyond those variances; `None` of responses measured elsewhere.
+    /// Covariances of the errors in addition to the variances; `None` for measured frequency
+    /// responses from elsewhere.
     scatter: Option<Scatter>,
 }
 
 impl Frf {
-    /// Frequency responses at some lines of the segments, from all segments of the records.
+    /// Estimates frequency responses at some lines, from all segments of the records.
     ///
-    /// Every force channel must carry force; select the channels that do.
+    /// Every force channel must have a force; select the channels that do.
     ///
     /// # Errors
     /// [`SpectraError::TooFewAverages`] unless there are more segments than forces,
-    /// [`SpectraError::Hop`], [`SpectraError::DependentForces`] at a line where the forces are zero or
-    /// proportional to one another in all segments, [`NumericsError::Size`] for H2 with
-    /// several forces and another number of motions, and what [`Lines::new`] refuses.
+    /// [`SpectraError::Hop`], [`SpectraError::DependentForces`] at a line where the forces are zero
+    /// or proportional to one another in all segments, [`NumericsError::Size`] for H2 with several
+    /// forces and another number of responses, and the errors of [`Lines::new`].
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapters 6, 7 and 9; Welch (1967).
@@ -84,19 +85,19 @@ impl Frf {
         average.frf(estimator)
     }
 
-    /// Measured elsewhere: per frequency a matrix motions × forces, and the coherence of every
-    /// motion (frequencies × motions) from so many independent averages.
+    /// Creates responses that were measured elsewhere: per frequency a matrix responses × forces,
+    /// and the coherence of every response (frequencies × responses) from this many independent
+    /// averages.
     ///
-    /// With several forces the coherence is the multiple one, and the forces are taken as
-    /// uncorrelated and equally large.
+    /// With several forces the coherence is the multiple one, and the forces are assumed
+    /// uncorrelated and of equal size.
     ///
     /// # Errors
     /// [`NumericsError::Size`], [`SpectraError::Coherence`] outside (0, 1\],
     /// [`SpectraError::TooFewAverages`] unless there are more averages than forces.
     ///
     /// # Source
-    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance that the coherence
-    /// gives).
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance from the coherence).
     pub fn new(
         omega: Vec<f64>,
         response: Vec<ComplexMatrix>,
@@ -144,9 +145,10 @@ impl Frf {
         })
     }
 
-    /// Measured elsewhere, as averages over so many segments: as [`Frf::new`], with the lines of a segment, and
-    /// the standard errors of real and imaginary part alike (motions × forces, in the unit of the responses) where
-    /// they are known. Forces, and what they leave of the motions, are taken as uncorrelated.
+    /// Creates responses that were measured elsewhere as averages over this many segments: as
+    /// [`Frf::new`], with the lines of a segment, and with the standard errors of real and
+    /// imaginary part (responses × forces, in the unit of the responses) if they are known. Forces,
+    /// and the unexplained parts of the responses, are assumed uncorrelated.
     ///
     /// # Errors
     /// As [`Frf::new`], and [`SpectraError::Hop`].
@@ -163,7 +165,7 @@ impl Frf {
     ) -> Result<Self, SpectraError> {
         let averages = segments.averages(count)?;
         let coherence = match standard_error {
-            // No error follows from it.
+            // The standard errors are given, so a coherence of zero is not an error.
             Some(_) => coherence.map(|c| c.max(f64::MIN_POSITIVE)),
             None => coherence,
         };
@@ -184,22 +186,22 @@ impl Frf {
             let values: Vec<Complex<f64>> = values.map(Complex::from).collect();
             ComplexMatrix::from_diagonal(&values.into())
         };
-        let left = |v: &DMatrix<f64>| diagonal(&mut v.column(0).iter().map(|v| v * averages));
+        let residual_variance =
+            |v: &DMatrix<f64>| diagonal(&mut v.column(0).iter().map(|v| v * averages));
         let of_force = |v: &DMatrix<f64>| {
             let power = v.column(0).norm_squared();
-            let share = |input: usize| match power > 0.0 {
-                true => v.column(input).dot(&v.column(0)) / power,
-                false => 1.0,
+            let share = |input: usize| {
+                if power > 0.0 { v.column(input).dot(&v.column(0)) / power } else { 1.0 }
             };
             diagonal(&mut (0..v.ncols()).map(share))
         };
-        let unexplained = frf.variance.iter().map(left).collect();
+        let unexplained = frf.variance.iter().map(residual_variance).collect();
         let inverse_force = frf.variance.iter().map(of_force).collect();
-        frf.scatter = Some(Scatter::of_table(&frf, unexplained, inverse_force, segments));
+        frf.scatter = Some(Scatter::for_table(&frf, unexplained, inverse_force, segments));
         Ok(frf)
     }
 
-    /// Adds a line; returns the covariance of what the forces leave of the motions, and S_FF⁻¹.
+    /// Adds a line; returns the covariance of the unexplained parts of the responses, and S_FF⁻¹.
     fn push_line(
         &mut self,
         line: usize,
@@ -230,7 +232,7 @@ impl Frf {
             }
             FrfEstimator::Hv => spectra.hv()?,
         };
-        // What one estimator is larger than another it scatters more.
+        // The standard deviation grows in proportion to the estimator.
         for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {
             if h1.norm_sqr() > 0.0 {
                 *v *= h.norm_sqr() / h1.norm_sqr();
@@ -243,13 +245,13 @@ impl Frf {
         Ok([unexplained, inverse])
     }
 
-    /// Returns data for the estimators: every force channel in turn is an experiment with unit
-    /// force at its degree of freedom (`force_dof`, one per channel, counted from 0), and
-    /// the coherence gives the noise of the motion, from few averages its mean over neighbouring lines.
+    /// Returns data for the estimators: each force channel is one experiment with unit force at its
+    /// degree of freedom (`force_dof`, one per channel, counted from 0). The coherence gives the
+    /// noise of the response, averaged over neighbouring lines if there are few averages.
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if there is not one degree of freedom per force or one of
-    /// them does not exist.
+    /// [`NumericsError::Size`] if there is not one degree of freedom per force or one of them does
+    /// not exist.
     pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, SpectraError> {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         if force_dof.len() != inputs {
@@ -271,7 +273,8 @@ impl Frf {
         )
     }
 
-    /// The same responses at some of the frequencies only, by their places, counted from 0.
+    /// Returns the same responses at some of the frequencies only, by their indices, counted from
+    /// 0.
     ///
     /// # Panics
     /// If there is no such frequency.
@@ -289,51 +292,53 @@ impl Frf {
         }
     }
 
-    /// Number of independent complex deviations behind the variances that weigh an estimate.
+    /// Returns the number of independent complex deviations behind the variances that weight an
+    /// estimate.
     pub fn deviations(&self) -> f64 {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
-        let own = self.averages - inputs as f64;
-        self.scatter.as_ref().map_or(own, |scatter| scatter.freedom)
+        let per_line = self.averages - inputs as f64;
+        self.scatter.as_ref().map_or(per_line, |scatter| scatter.freedom)
     }
 
-    /// Information of the responses on a machine: the sum over lines and motions of γ²/(1 − γ²), the power that the
-    /// forces explain over that they leave, without the bias of a sampled coherence, times the averages beyond
-    /// those that forces and weights take up (pure number). Longer segments have more lines and less leakage, but
-    /// fewer averages.
+    /// Returns the information of the responses about a system: the sum over lines and responses of
+    /// γ²/(1 − γ²), the explained over the unexplained power, without the bias of a sample
+    /// coherence, times the averages that remain after the forces and the weights are estimated
+    /// (pure number). Longer segments have more lines and less leakage, but fewer averages.
     ///
     /// # Source
-    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its coherence).
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its
+    /// coherence).
     pub fn information(&self) -> f64 {
         let inputs = self.response.first().map_or(0, |h| h.ncols()) as f64;
         let spare = self.averages - inputs;
         let of_one = |coherence: &f64| {
-            let left = (1.0 - coherence).max(COHERENCE_ROUNDING) * self.averages / spare;
-            (1.0 / left - 1.0).max(0.0)
+            let unexplained = (1.0 - coherence).max(COHERENCE_ROUNDING) * self.averages / spare;
+            (1.0 / unexplained - 1.0).max(0.0)
         };
         (spare - 1.0).max(0.0) * self.coherence.iter().map(of_one).sum::<f64>()
     }
 
-    /// Angular frequencies, in rad/s.
+    /// Returns the angular frequencies, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega
     }
 
-    /// Number of the line of each frequency; of responses measured elsewhere they are counted.
+    /// Returns the line number of each frequency; for responses measured elsewhere, its index.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
 
-    /// Correlation of the noise of two lines, by how many lines they are apart.
+    /// Returns the correlation of the noise of two lines, by their distance in lines.
     pub fn line_correlation(&self) -> &[f64] {
         &self.line_correlation
     }
 
-    /// The quantity measured: H is a receptance, a mobility or an accelerance.
+    /// Returns the measured quantity: H is a receptance, a mobility or an accelerance.
     pub fn measured(&self) -> ResponseQuantity {
         self.measured
     }
 
-    /// H at one of the frequencies, motions × forces: m/N, m/(s·N) or m/(s²·N).
+    /// Returns H at one of the frequencies, responses × forces: m/N, m/(s·N) or m/(s²·N).
     ///
     /// # Panics
     /// If there is no such frequency.
@@ -341,13 +346,14 @@ impl Frf {
         &self.response[at]
     }
 
-    /// Share of the power of a motion that is linear in the forces, frequencies × motions
-    /// (the multiple coherence γ², between 0 and 1).
+    /// Returns the fraction of the power of a response that depends linearly on the forces,
+    /// frequencies × responses (the multiple coherence γ², between 0 and 1).
     pub fn coherence(&self) -> &DMatrix<f64> {
         &self.coherence
     }
 
-    /// Variance E|ΔH|² at one of the frequencies, motions × forces, in the square of the unit of H.
+    /// Returns the variance E|ΔH|² at one of the frequencies, responses × forces, in the square of
+    /// the unit of H.
     ///
     /// # Panics
     /// If there is no such frequency.
@@ -355,7 +361,7 @@ impl Frf {
         &self.variance[at]
     }
 
-    /// Equivalent number of independent segments.
+    /// Returns the equivalent number of independent segments.
     pub fn averages(&self) -> f64 {
         self.averages
     }

@@ -1,4 +1,5 @@
-//! Errors of frequency responses from line to line, and between forces and motions.
+//! Errors of frequency responses: their correlation between lines, and between forces and
+//! responses.
 
 use std::collections::HashMap;
 
@@ -8,25 +9,25 @@ use nalgebra::{Complex, DMatrix};
 use super::{ComplexMatrix, Frf, Segments};
 use crate::limits::{COHERENCE_ROUNDING, SCATTER_DEVIATIONS, SCATTER_FEW, SMOOTHING_STEPS};
 
-/// What averages over segments tell of the errors of their responses.
+/// Covariances of the errors of averaged responses.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scatter {
-    /// Covariance of what the forces leave of the motions, at each line outputs × outputs.
+    /// Covariance of the unexplained parts of the responses at each line, outputs × outputs.
     unexplained: Vec<ComplexMatrix>,
     /// S_FF⁻¹ at each line.
     inverse_force: Vec<ComplexMatrix>,
-    /// Variances for weights, each of a mean over as many neighbouring lines as it takes.
+    /// Variances for weights, averaged over neighbouring lines.
     pub(super) pooled: Vec<DMatrix<f64>>,
-    /// Independent complex deviations behind them.
+    /// Number of independent complex deviations behind these variances.
     pub(super) freedom: f64,
     /// See [`Segments::smoothing`].
     smoothing: Vec<f64>,
-    /// Samples of a segment.
+    /// Number of samples in a segment.
     samples: usize,
 }
 
 impl Scatter {
-    /// `frf` has the lines already, with variances of their own.
+    /// Creates the covariances for `frf`, which has its lines with unpooled variances already.
     pub(super) fn new(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
@@ -34,7 +35,7 @@ impl Scatter {
         segments: Segments,
     ) -> Self {
         let lines = unexplained.len();
-        // The lines of periods are each measured by themselves, however far apart they are.
+        // Lines of whole periods are independent and may be far apart, so they are not pooled.
         let widest = match segments {
             Segments::Periods(_) => 0,
             Segments::Windowed { .. } => lines.saturating_sub(1) / 2,
@@ -42,8 +43,9 @@ impl Scatter {
         Self::pooled(frf, unexplained, inverse_force, segments, widest)
     }
 
-    /// The same of responses measured elsewhere: those of few periods have neighbouring lines in common, too.
-    pub(super) fn of_table(
+    /// Creates the covariances for responses that were measured elsewhere: with few averages over
+    /// periods, neighbouring lines are pooled, too.
+    pub(super) fn for_table(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
         inverse_force: Vec<ComplexMatrix>,
@@ -60,7 +62,7 @@ impl Scatter {
         }
     }
 
-    /// Variances are means over up to `widest` lines to either side.
+    /// Averages the variances over up to `widest` lines to either side.
     fn pooled(
         frf: &Frf,
         unexplained: Vec<ComplexMatrix>,
@@ -69,9 +71,9 @@ impl Scatter {
         widest: usize,
     ) -> Self {
         let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
-        let own = frf.averages - inputs as f64;
+        let per_line = frf.averages - inputs as f64;
         let lines = unexplained.len();
-        let freedom = |half: usize| own * independent(2 * half + 1, &frf.line_correlation);
+        let freedom = |half: usize| per_line * independent(2 * half + 1, &frf.line_correlation);
         let half = (0..=widest).find(|half| freedom(*half) >= SCATTER_DEVIATIONS).unwrap_or(widest);
         let pooled = (0..lines).map(|line| {
             let first = line.saturating_sub(half).min(lines - (2 * half + 1).min(lines));
@@ -80,7 +82,7 @@ impl Scatter {
             for (output, mut row) in variance.row_iter_mut().enumerate() {
                 let power = |at: usize| unexplained[at][(output, output)].re.max(0.0);
                 let mean = around.clone().map(power).sum::<f64>() / around.len() as f64;
-                // Of one line this is 1; of a line without any power the variance is rounding and stays.
+                // The variance without any power is only rounding and stays unchanged.
                 if half > 0 && power(line) > COHERENCE_ROUNDING * mean {
                     row *= mean / power(line);
                 }
@@ -93,7 +95,7 @@ impl Scatter {
         Self { unexplained, inverse_force, pooled, freedom, smoothing, samples }
     }
 
-    /// The same of some of the lines.
+    /// Returns the same covariances at some of the lines.
     pub(super) fn at(&self, places: &[usize]) -> Self {
         let of = |all: &[ComplexMatrix]| places.iter().map(|at| all[*at].clone()).collect();
         Self {
@@ -106,8 +108,8 @@ impl Scatter {
         }
     }
 
-    /// Covariance of the errors of two responses at a line, (output, input) each, over the standard deviations
-    /// that weigh them.
+    /// Returns the covariance of the errors of two responses at a line, (output, input) each,
+    /// divided by the standard deviations that weight them.
     pub(super) fn covariance(
         &self,
         line: usize,
@@ -120,20 +122,23 @@ impl Scatter {
     }
 }
 
-/// Number of independent ones among the powers of neighbouring lines of this correlation.
+/// Returns the equivalent number of independent lines among neighbouring lines with this
+/// correlation of their powers.
 fn independent(lines: usize, correlation: &[f64]) -> f64 {
-    let all = lines as f64;
+    let count = lines as f64;
     let pairs = correlation.iter().enumerate().skip(1).take(lines.saturating_sub(1));
-    let common: f64 = pairs.map(|(apart, c)| c * (1.0 - apart as f64 / all)).sum();
-    all / (1.0 + 2.0 * common)
+    let common: f64 = pairs.map(|(apart, c)| c * (1.0 - apart as f64 / count)).sum();
+    count / (1.0 + 2.0 * common)
 }
 
-/// Returns what averages over segments with these weights ([`Segments::smoothing`]) add to a frequency
-/// response, given as a function of ω (rad/s), on some of their lines, which are `spacing` (rad/s) apart:
-/// they smooth it, and blunt a resonance. `None` on a line without a finite response.
+/// Returns the bias that averaging over segments with these weights ([`Segments::smoothing`])
+/// causes in a frequency response, given as a function of ω (rad/s), on some of their lines, which
+/// are `spacing` (rad/s) apart: the window smooths the response and reduces a resonance. `None` on
+/// a line without a finite response.
 ///
 /// # Source
-/// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates).
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
+/// estimates).
 pub fn smoothing_bias(
     smoothing: &[f64],
     lines: &[usize],
@@ -144,15 +149,15 @@ pub fn smoothing_bias(
     let finite = |place: i64| {
         response(place as f64 * step).filter(|h| h.iter().all(|z: &Complex<f64>| z.is_finite()))
     };
-    // Neighbouring lines share most of the frequencies at which the system is asked.
+    // Neighbouring lines share most of the frequencies, so computed responses are stored.
     let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
     let bias_at = |line: &usize| {
-        let place = (line * SMOOTHING_STEPS) as i64;
-        let exact = known.entry(place).or_insert_with(|| finite(place)).clone()?;
+        let centre = (line * SMOOTHING_STEPS) as i64;
+        let exact = known.entry(centre).or_insert_with(|| finite(centre)).clone()?;
         let mut smooth = &exact * Complex::from(smoothing[0]);
         for (apart, weight) in smoothing.iter().enumerate().skip(1) {
-            for side in [place - apart as i64, place + apart as i64] {
-                // A free machine has no response at rest.
+            for side in [centre - apart as i64, centre + apart as i64] {
+                // A system with rigid-body modes has no static response.
                 let there = known.entry(side).or_insert_with(|| finite(side));
                 smooth += there.as_ref().unwrap_or(&exact) * Complex::from(*weight);
             }
@@ -168,8 +173,9 @@ impl Frf {
         self.scatter.as_ref().is_some_and(|scatter| scatter.smoothing.len() > 1)
     }
 
-    /// Returns the responses less what the window of the segments makes of those of `system`: averages over pieces
-    /// smooth a response, and blunt a resonance. Forces act at the degrees of freedom `force_dof`.
+    /// Returns the responses minus the bias from the window of the segments, which smooths a
+    /// response and reduces a resonance; the bias is computed for the responses of `system`. Forces
+    /// act at the degrees of freedom `force_dof`.
     #[must_use]
     pub fn sharpened(&self, system: &SecondOrderSystem, force_dof: &[usize]) -> Self {
         let Some(scatter) = self.scatter.as_ref().filter(|_| self.is_smoothed()) else {
@@ -189,24 +195,27 @@ impl Frf {
         sharp
     }
 
-    /// Distance of the lines, in rad/s, and samples of the segments, if their window blunts the responses.
+    /// Returns the line spacing, in rad/s, and the number of samples in a segment, if the window
+    /// smooths the responses.
     pub fn resolution(&self) -> Option<[f64; 2]> {
         let scatter = self.scatter.as_ref().filter(|_| self.is_smoothed())?;
         Some([self.line_spacing(), scatter.samples as f64])
     }
 
-    /// Returns whether the covariance of the errors of two responses of a line is known.
+    /// Returns whether the covariance of the errors of two responses at a line is known.
     pub fn has_error_covariance(&self) -> bool {
         self.scatter.is_some()
     }
 
-    /// Returns the covariance of the errors of two responses at a line, (output, input) each, over the standard
-    /// deviations that weigh them; `None` of responses measured elsewhere.
+    /// Returns the covariance of the errors of two responses at a line, (output, input) each,
+    /// divided by the standard deviations that weight them; `None` for responses measured
+    /// elsewhere.
     pub fn error_covariance(&self, line: usize, pair: [(usize, usize); 2]) -> Option<Complex<f64>> {
         Some(self.scatter.as_ref()?.covariance(line, self.averages, pair))
     }
 
-    /// Returns the lines whose errors are correlated with those of a line, itself among them, and by how much.
+    /// Returns the lines whose errors are correlated with those of a line, including the line
+    /// itself, and the correlations.
     pub fn correlated_lines(&self, line: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let reach = self.line_correlation.len() - 1;
         let around = line.saturating_sub(reach)..(line + reach + 1).min(self.lines.len());
@@ -216,7 +225,7 @@ impl Frf {
         })
     }
 
-    /// Distance of the lines of a segment, in rad/s.
+    /// Returns the line spacing of a segment, in rad/s.
     fn line_spacing(&self) -> f64 {
         self.omega[0] / self.lines[0].max(1) as f64
     }

@@ -1,4 +1,4 @@
-//! Records cut into pieces to average over.
+//! Segments of records for averaging.
 
 use std::f64::consts::TAU;
 
@@ -8,32 +8,33 @@ use nalgebra::{Complex, DVectorView};
 use crate::SpectraError;
 use crate::limits::{FARTHEST_LINES, SEGMENT_INDEPENDENT, SMOOTHED_LINES, SMOOTHING_STEPS};
 
-/// Segments of a record to average over.
+/// Segments of a record for averaging.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Segments {
-    /// Whole periods of so many samples, for a periodic excitation in steady state: no
-    /// window, no leakage.
+    /// Whole periods of this many samples, for a periodic excitation in steady state: no window, no
+    /// leakage.
     Periods(usize),
-    /// Pieces with their means removed under a window, for a random excitation (Welch's method).
+    /// Segments with their means removed and a window, for a random excitation (Welch's method).
     Windowed {
-        /// Samples of a piece.
+        /// Number of samples in a segment.
         len: usize,
-        /// Samples from the start of one piece to that of the next, 1 to `len`.
+        /// Number of samples from the start of one segment to the start of the next, 1 to `len`.
         hop: usize,
-        /// Window that the samples are weighted with.
+        /// Window that weights the samples.
         window: Window,
     },
 }
 
 impl Segments {
-    /// Half overlapping pieces of `len` samples under Hann's window.
+    /// Creates segments of `len` samples that overlap by half, under Hann's window.
     pub fn hann(len: usize) -> Self {
         Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann }
     }
 
-    /// Equivalent number of independent pieces among so many, a pure number: those that overlap share samples.
+    /// Returns the equivalent number of independent segments (a pure number), which is smaller than
+    /// their number if they overlap.
     ///
     /// # Errors
     /// [`SpectraError::Hop`].
@@ -44,28 +45,30 @@ impl Segments {
         Ok(self.averages_under(self.weights()?.as_deref(), pieces))
     }
 
-    /// The same with the weights of the window at hand.
+    /// Returns the same as [`Segments::averages`] for a computed window.
     pub(super) fn averages_under(self, weights: Option<&[f64]>, pieces: usize) -> f64 {
         let loss = weights.map(|weights| overlap_loss(weights, self.hop(), pieces));
         pieces as f64 / loss.unwrap_or(1.0)
     }
 
-    /// Samples of a piece.
+    /// Returns the number of samples in a segment.
     pub fn samples(self) -> usize {
         match self {
             Segments::Periods(len) | Segments::Windowed { len, .. } => len,
         }
     }
 
-    /// Correlation of the errors that noise makes of a frequency response on two lines, by how many
-    /// lines they are apart, 0 first, as far as it is worth speaking of; of so many pieces.
+    /// Returns the correlation of the errors of a frequency response on two lines, by their
+    /// distance in lines from 0 up to the last noticeable one (pure numbers); for this many
+    /// segments.
     ///
-    /// Noise and force leak by the window alike from a line to its neighbours, and so do pieces that
-    /// overlap: Σ_j |ρ_j(d)|² over pieces j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop)
-    /// exp(−2πi d k/len), over the same at d = 0; pure numbers.
+    /// The window leaks noise and force in the same way from a line to its neighbours, and
+    /// overlapping segments share samples: Σ_j |ρ_j(d)|² over segments j hops apart, with ρ_j(d) =
+    /// Σ w(k) w(k + j hop) exp(−2πi d k/len), relative to the value at d = 0.
     ///
     /// # Source
-    /// Welch (1967), IEEE Transactions on Audio and Electroacoustics 15, 70–73 (pieces that overlap).
+    /// Welch (1967), IEEE Transactions on Audio and Electroacoustics 15, 70–73 (segments that
+    /// overlap).
     pub fn line_correlation(self, pieces: usize) -> Vec<f64> {
         let Segments::Windowed { len, hop, window } = self else { return vec![1.0] };
         let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
@@ -87,14 +90,14 @@ impl Segments {
         correlation
     }
 
-    /// Weights by which averages over pieces smooth a frequency response under a random force, over the
-    /// distances of a line in steps of 1/`SMOOTHING_STEPS`, and symmetric: |W|² of the window, a
-    /// pure number. None where nothing is smoothed:
-    /// of periods, and of pieces that begin and end at rest, for which the rectangular window is.
+    /// Returns the weights with which averaging over segments smooths a frequency response under a
+    /// random force, at distances from a line in steps of 1/`SMOOTHING_STEPS`, symmetric: |W|² of
+    /// the window (pure numbers). Empty without smoothing: for periods, and for the rectangular
+    /// window, which is for segments that begin and end at rest.
     ///
     /// # Source
-    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates); the
-    /// response is that to what a window leaves of the past: h(τ) times the autocorrelation of the window.
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral
+    /// estimates): the impulse response h(τ) is multiplied by the autocorrelation of the window.
     pub fn smoothing(self) -> Vec<f64> {
         let Segments::Windowed { len, window, .. } = self else { return Vec::new() };
         if window == Window::Rectangular {
@@ -110,7 +113,7 @@ impl Segments {
         half.into_iter().map(|weight| weight / total).collect()
     }
 
-    /// Samples from the start of one piece to that of the next.
+    /// Returns the number of samples from the start of one segment to the start of the next.
     pub fn hop(self) -> usize {
         match self {
             Segments::Periods(len) => len,
@@ -118,7 +121,7 @@ impl Segments {
         }
     }
 
-    /// Returns the window over the samples of a piece; `None` for none.
+    /// Returns the window over the samples of a segment; `None` without a window.
     pub(super) fn weights(self) -> Result<Option<Vec<f64>>, SpectraError> {
         match self {
             Segments::Periods(_) => Ok(None),
@@ -132,7 +135,7 @@ impl Segments {
     }
 }
 
-/// Writes a piece with its mean removed under a window, or as it is without one.
+/// Writes a segment, with its mean removed and weighted if there is a window, otherwise unchanged.
 pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) {
     let Some(window) = window else { return weighed.copy_from_slice(piece) };
     let mean = DVectorView::from_slice(piece, piece.len()).mean();
@@ -141,8 +144,8 @@ pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) 
     }
 }
 
-/// Variance of an average of overlapping windowed pieces over that of independent ones:
-/// 1 + 2 Σ (1 − j/count) ρ_j², with ρ_j the share two pieces j apart have in common.
+/// Returns the variance of an average of overlapping windowed segments relative to independent
+/// ones: 1 + 2 Σ (1 − j/count) ρ_j², where ρ_j is the common fraction of two segments j apart.
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.

@@ -1,30 +1,31 @@
-//! Noise between the lines of several periods taken as one, where what repeats is zero.
+//! Noise between the lines of several periods taken as one record, where a periodic signal is zero.
 
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::limits::{MAX_HELD, MAX_PERIODS, MIN_PERIODS};
 
-/// Periods in a row, held until their spectrum can be taken as that of one record.
+/// Consecutive periods, buffered until their spectrum can be taken as the spectrum of one record.
 ///
-/// The spectrum of B periods has B − 1 lines between two of one period. A noise whose memory is not short
-/// against a period (an unmeasured force through a resonance) is there what it is on the lines of the mean; the
-/// scatter of the periods also has what their ends leave in each of them, most of which cancels in the mean.
+/// The spectrum of B periods has B − 1 lines between two lines of one period. A noise with a long
+/// correlation time (an unmeasured force through a resonance) has there the same level as on the
+/// lines of the mean, whereas the scatter of single periods also contains their transients, which
+/// nearly cancel in the mean.
 #[derive(Debug, Clone)]
 pub(crate) struct BetweenLines {
-    /// Samples of a period.
+    /// Number of samples in a period.
     period: usize,
-    /// Periods that are taken as one; where it is one period there is nothing between its lines.
+    /// Number of periods taken as one record; with one period there are no lines between.
     periods: usize,
-    /// Periods that are held.
+    /// Number of buffered periods.
     held: usize,
-    /// Samples × channels; none where there is nothing between lines.
+    /// Samples × channels; empty without lines between.
     samples: DMatrix<f64>,
 }
 
-/// Periods that are to be taken as one where `remaining` are to come.
+/// Returns the number of periods to be taken as one record, if `remaining` are expected.
 ///
-/// Parts hardly differ, and are as large as may be held.
+/// The groups have nearly equal sizes, as large as the buffer allows.
 pub(crate) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
     let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
     if most.min(remaining) < MIN_PERIODS {
@@ -43,7 +44,7 @@ impl BetweenLines {
         Self { period, periods, held: 0, samples: DMatrix::zeros(samples, channels) }
     }
 
-    /// Holds the next period, its channels in their order.
+    /// Buffers the next period, its channels in their order.
     pub(crate) fn hold<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
         let start = self.held * self.period;
         self.held += 1;
@@ -55,16 +56,16 @@ impl BetweenLines {
         }
     }
 
-    /// Number of periods where all that are taken as one are held.
+    /// Returns the number of buffered periods, once it is complete.
     pub(crate) fn complete(&self) -> Option<usize> {
         (self.held == self.periods).then_some(self.periods)
     }
 
-    /// Adds B Σ z zᴴ, z the amplitudes between lines, to the scatter of each line of a period: as much as
-    /// B − 1 periods scatter about their mean.
+    /// Adds B Σ z zᴴ, where z are the amplitudes between lines, to the scatter of each line of a
+    /// period: the expectation is the same as for the scatter of B periods about their mean.
     ///
-    /// Each line has those nearer to it than to another line of a period, and the one in the middle above it, so that
-    /// no two share any.
+    /// Each line uses the lines nearer to it than to another line of a period, and the one in the
+    /// middle above it, so that each is used once.
     pub(crate) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
         if self.periods == 1 {
             return;
@@ -79,18 +80,19 @@ impl BetweenLines {
         };
         let spectra: Vec<Vec<Complex<f64>>> =
             self.samples.column_iter().map(|column| spectrum(column.as_slice())).collect();
-        let all = self.periods;
+        let periods = self.periods;
         let scale = 2.0 / self.samples.nrows() as f64;
         let mut z = DVector::zeros(spectra.len());
         for (&line, scatter) in lines.iter().zip(scatter) {
-            for away in 1..=all / 2 {
-                // No line of a period is at zero or at half the sampling rate, so that both exist.
-                let below = (2 * away != all).then_some(all * line - away);
-                for at in below.into_iter().chain([all * line + away]) {
+            for away in 1..=periods / 2 {
+                // A line of a period is neither at zero nor at half the sampling rate, so that both
+                // lines exist.
+                let below = (2 * away != periods).then_some(periods * line - away);
+                for at in below.into_iter().chain([periods * line + away]) {
                     for (z, spectrum) in z.iter_mut().zip(&spectra) {
                         *z = spectrum[at] * scale;
                     }
-                    scatter.gerc(Complex::from(all as f64), &z, &z, Complex::from(1.0));
+                    scatter.gerc(Complex::from(periods as f64), &z, &z, Complex::from(1.0));
                 }
             }
         }

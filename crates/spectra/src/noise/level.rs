@@ -1,10 +1,10 @@
-//! The level of white noise beside noise that is known.
+//! Level of white noise in addition to known noise.
 
 use crate::limits::{LEVEL_LEAST, LEVEL_ROUNDS, LEVEL_SETTLED};
 
-/// Standard deviation s for which residuals of the powers |e|² and known variances g, in pairs (|e|², g) of one
-/// unit, are most likely as circular Gaussian numbers of the variances s² + g; next to nothing where g alone
-/// explains them.
+/// Returns the standard deviation s with which residuals of powers |e|² and known variances g, in
+/// pairs (|e|², g) of one unit, are most likely as circular Gaussian numbers of variances s² + g;
+/// almost zero if g alone explains them.
 ///
 /// # Source
 /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring).
@@ -25,7 +25,8 @@ pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
         if !next.is_finite() || (next - variance).abs() <= LEVEL_SETTLED * variance {
             break;
         }
-        // From a variance far too small the weights of few lines would throw it to and fro.
+        // The decrease per step is limited, because after too small a variance a few lines get all
+        // the weight and the search oscillates.
         variance = next.max(0.1 * variance);
     }
     variance.sqrt().max(f64::MIN_POSITIVE)

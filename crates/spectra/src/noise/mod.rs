@@ -1,4 +1,5 @@
-//! Noise of measured lines: its spectrum, how it is pooled and smoothed, and its level beside a known part.
+//! Noise of measured lines: its spectrum, pooling and smoothing over lines, and its level in
+//! addition to a known part.
 
 pub(crate) mod between_lines;
 pub mod level;

@@ -1,4 +1,4 @@
-//! Sample covariances of single lines made into one noise spectrum.
+//! Noise spectrum from sample covariances of single lines.
 
 mod neighbours;
 
@@ -17,28 +17,28 @@ use crate::noise::smooth::{Form, Smooth};
 
 type Covariances = Vec<DMatrix<Complex<f64>>>;
 
-/// Choice of the lines that share a covariance of the noise.
+/// Choice of the lines that share a noise covariance.
 ///
-/// A covariance of few periods is itself uncertain, and an estimator weighted with it
-/// loses by that. Noise spectra are smooth, so lines may share theirs. As text: `auto`, `white`, `smooth`,
-/// `neighbours:N` or `per-line`.
+/// A covariance from few periods is uncertain, and estimates weighted with it are less accurate.
+/// Noise spectra are smooth, so lines may share their covariances. As text: `auto`, `white`,
+/// `smooth`, `neighbours:N` or `per-line`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum Pooling {
-    /// The one of the others that predicts the samples best.
+    /// The one of the other choices that predicts the samples best.
     #[default]
     Automatic,
     /// One covariance for all lines: white noise in the quantity measured.
     AllLines,
-    /// A spectrum of each channel whose logarithm is a polynomial in that of the frequency, with levels of
-    /// their own in some bands; correlations of channels are the same on all lines. Order and bands are
-    /// chosen from the samples, so that white noise is found to be white.
+    /// A spectrum of each channel whose logarithm is a polynomial in the logarithm of the
+    /// frequency, with other levels in some bands; the correlations of channels are equal on all
+    /// lines. Order and bands are chosen from the samples, so that white noise is recognised.
     Smooth,
-    /// Every line takes the mean of the covariances of this many chosen lines to either side; at the
-    /// ends of the band, of as many lines altogether.
+    /// Mean of the covariances of this many chosen lines to either side; at the ends of the band,
+    /// of the same total number of lines.
     Neighbours(usize),
-    /// Every line has its own covariance: of many periods.
+    /// A separate covariance for every line: for many periods.
     PerLine,
 }
 
@@ -85,7 +85,7 @@ impl TryFrom<String> for Pooling {
     }
 }
 
-/// Spectrum that was made of the samples of a noise.
+/// Form of a noise spectrum that was estimated from samples.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(tag = "kind", rename_all = "snake_case"))]
@@ -96,14 +96,15 @@ pub enum NoiseModel {
     Smooth {
         /// Order of the polynomial of log power in log frequency.
         order: usize,
-        /// Bands with levels of their own, such as those of a disturbance: lowest and highest line, in Hz.
+        /// Bands with other levels, such as those of a disturbance: lowest and highest line, in Hz.
         bands_hz: Vec<[f64; 2]>,
     },
-    /// Response of the machine to unmeasured forces of one smooth spectrum, at all degrees of freedom.
+    /// Response of the system to unmeasured forces with one smooth spectrum, at all degrees of
+    /// freedom.
     UnmeasuredForce {
         /// Order of the polynomial of log power of the forces in log frequency.
         order: usize,
-        /// Bands in which the forces have levels of their own: lowest and highest line, in Hz.
+        /// Bands in which the forces have other levels: lowest and highest line, in Hz.
         bands_hz: Vec<[f64; 2]>,
     },
     /// Means over neighbouring lines.
@@ -111,7 +112,7 @@ pub enum NoiseModel {
         /// Number of lines to either side.
         half_width: usize,
     },
-    /// A level at every line.
+    /// A separate level at every line.
     PerLine,
 }
 
@@ -145,18 +146,18 @@ impl fmt::Display for NoiseModel {
     }
 }
 
-/// A noise spectrum made of samples.
+/// Noise spectrum estimated from samples.
 pub(crate) struct Pooled {
     pub(crate) covariance: Covariances,
     pub(crate) model: NoiseModel,
-    /// Complex deviations that each covariance is made of.
+    /// Number of complex deviations behind each covariance.
     pub(crate) freedom: f64,
-    /// Orthonormal columns that span the log powers, lines × terms, of a smooth spectrum.
+    /// Orthonormal columns that span the log powers of a smooth spectrum, lines × terms.
     pub(crate) basis: Option<DMatrix<f64>>,
 }
 
-/// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled; a smooth spectrum may be one
-/// times `relative` powers (lines × channels) where these are given.
+/// Pools sample covariances at `omega` (rad/s), each of `nu` complex deviations; a smooth spectrum
+/// may be a smooth factor times `relative` powers (lines × channels), if these are given.
 pub(crate) fn pooled(
     omega: &[f64],
     covariance: Covariances,
@@ -170,8 +171,8 @@ pub(crate) fn pooled(
             Pooled { covariance, model: NoiseModel::PerLine, freedom: nu, basis: None }
         }
         Pooling::AllLines => {
-            let all = mean(&covariance, 0..lines);
-            white(all, nu, lines)
+            let mean_covariance = mean(&covariance, 0..lines);
+            white(mean_covariance, nu, lines)
         }
         Pooling::Neighbours(half_width) => {
             let places = Places::new(omega);
@@ -185,7 +186,7 @@ pub(crate) fn pooled(
     }
 }
 
-/// One covariance for all lines.
+/// Returns one covariance for all lines.
 fn white(covariance: DMatrix<Complex<f64>>, nu: f64, lines: usize) -> Pooled {
     let level = DMatrix::from_element(lines, 1, (lines as f64).sqrt().recip());
     Pooled {
@@ -196,7 +197,7 @@ fn white(covariance: DMatrix<Complex<f64>>, nu: f64, lines: usize) -> Pooled {
     }
 }
 
-/// Places of lines by rising frequency.
+/// Indices of lines in rising order of frequency.
 struct Places(Vec<usize>);
 
 impl Places {
@@ -211,24 +212,24 @@ impl Places {
     }
 
     fn unsorted<T: Clone>(&self, sorted: Vec<T>) -> Vec<T> {
-        let mut all = sorted.clone();
+        let mut unsorted = sorted.clone();
         for (value, at) in sorted.into_iter().zip(&self.0) {
-            all[*at] = value;
+            unsorted[*at] = value;
         }
-        all
+        unsorted
     }
 }
 
-/// Sample covariances by rising frequency, and what a smooth spectrum makes of them.
+/// Sample covariances in rising order of frequency, and the smooth spectrum fitted to them.
 struct Candidate {
     places: Places,
     omega: Vec<f64>,
     covariance: Covariances,
     nu: f64,
-    /// Channels that have noise.
+    /// Channels with noise.
     noisy: Vec<usize>,
     smooth: Option<Smooth>,
-    /// Whether it is smooth over the relative powers only.
+    /// `true` if the ratio to the relative powers is smooth rather than the power itself.
     is_relative: bool,
 }
 
@@ -246,7 +247,7 @@ impl Candidate {
         let noisy: Vec<usize> = channels
             .filter(|channel| {
                 let sum = power(*channel).sum::<f64>();
-                // Squares that overflow or vanish have no logarithm.
+                // The logarithm needs squares that neither overflow nor vanish.
                 sum.is_finite() && sum > f64::MIN_POSITIVE / f64::EPSILON
             })
             .collect();
@@ -269,7 +270,7 @@ impl Candidate {
         Self { places, omega, covariance, nu, noisy, smooth, is_relative }
     }
 
-    /// The smooth spectrum, with the mean correlation of the channels.
+    /// Returns the smooth spectrum, with the mean correlation of the channels.
     fn smooth(&self) -> Pooled {
         let lines = self.covariance.len();
         let Some(smooth) =
@@ -298,17 +299,17 @@ impl Candidate {
         Pooled { covariance, model, freedom, basis: Some(basis) }
     }
 
-    /// The smooth spectrum, or the means over lines that predict better than it does.
+    /// Returns the smooth spectrum, or the means over lines if they predict better.
     fn best(self) -> Pooled {
         let smooth = self.smooth();
         let channels = self.noisy.len() as f64;
         let Some(Smooth { form, .. }) = &self.smooth else { return smooth };
         let covariance = self.noisy_part(&self.covariance);
         let modelled = self.noisy_part(&self.places.sorted(&smooth.covariance));
-        let each = modelled.iter().zip(&covariance).map(|(s, sample)| misfit(s, sample));
-        let Some(misfit) = each.sum::<Option<f64>>() else { return smooth };
+        let costs = modelled.iter().zip(&covariance).map(|(s, sample)| sample_cost(s, sample));
+        let Some(smooth_cost) = costs.sum::<Option<f64>>() else { return smooth };
         let unknowns = channels * form.terms() as f64 + channels * (channels - 1.0);
-        let to_beat = misfit + (unknowns - POOLING_MARGIN) / self.nu;
+        let to_beat = smooth_cost + (unknowns - POOLING_MARGIN) / self.nu;
         let half_widths = (0..usize::BITS).map(|power| (1usize << power) - 1);
         let half_widths = half_widths.take_while(|half| 4 * half + 2 <= covariance.len());
         let enough = half_widths.filter(|half| {
@@ -317,8 +318,8 @@ impl Candidate {
         let neighbours = Neighbours::new(&covariance);
         let scored = enough.filter_map(|half_width| {
             let score = match half_width {
-                0 => of_single_lines(&covariance, self.nu),
-                _ => neighbours.misfit(half_width),
+                0 => single_line_cost(&covariance, self.nu),
+                _ => neighbours.cost(half_width),
             };
             Some((score?, half_width))
         });
@@ -335,14 +336,16 @@ impl Candidate {
         Pooled { covariance: places.unsorted(means.covariance), ..means }
     }
 
-    /// Standard deviations of a smooth spectrum, lines × all channels; 1 where there is no noise.
+    /// Returns the standard deviations of a smooth spectrum, lines × all channels; 1 for channels
+    /// without noise.
     fn deviations(&self, smooth: &Smooth) -> DMatrix<f64> {
-        let mut all = DMatrix::from_element(self.omega.len(), self.covariance[0].nrows(), 1.0);
+        let mut all_deviations =
+            DMatrix::from_element(self.omega.len(), self.covariance[0].nrows(), 1.0);
         for (at, channel) in self.noisy.iter().enumerate() {
             let deviations = smooth.log_power.column(at).map(|log| (0.5 * log).exp());
-            all.set_column(*channel, &deviations);
+            all_deviations.set_column(*channel, &deviations);
         }
-        all
+        all_deviations
     }
 
     fn noisy_part(&self, all: &[DMatrix<Complex<f64>>]) -> Covariances {
@@ -350,16 +353,16 @@ impl Candidate {
     }
 }
 
-/// Complex deviations n/ν of which a covariance of n displacements would have the relative uncertainty that
-/// a smooth spectrum has on average over the lines.
+/// Returns the number of complex deviations n/ν at which a sample covariance of n displacements has
+/// the same relative uncertainty as a smooth spectrum on average over the lines.
 ///
-/// A level that is one of `terms` fitted to `lines` has the leverage `terms/lines`; correlations are those
-/// of all lines.
+/// A level from `terms` fitted to `lines` has the leverage `terms/lines`; correlations are
+/// estimated from all lines.
 pub(crate) fn freedom(form: &Form, nu: f64, lines: usize, n: usize) -> f64 {
     (n * lines) as f64 * nu / (form.terms() + n - 1) as f64
 }
 
-/// Returns the model of the noise that a form stands for.
+/// Returns the noise model with this form.
 pub(crate) fn model_of(form: &Form, omega: &[f64]) -> NoiseModel {
     if form.terms() == 1 {
         return NoiseModel::White;
@@ -377,15 +380,15 @@ fn mean(covariance: &[DMatrix<Complex<f64>>], range: Range<usize>) -> DMatrix<Co
     sum.unscale(count)
 }
 
-/// `2 half_width + 1` lines around one, as far as there are so many; all of one width, so that one number of
-/// degrees of freedom holds for all.
+/// Returns the `2 half_width + 1` lines around a line, or all if there are fewer. The width is
+/// equal for all lines, so that one number of degrees of freedom holds for all.
 fn window(line: usize, half_width: usize, lines: usize) -> Range<usize> {
     let width = half_width.saturating_mul(2).saturating_add(1).min(lines);
     let first = line.saturating_sub(half_width).min(lines - width);
     first..first + width
 }
 
-/// Covariances with the deviations of both their channels, lines × channels, put in or out.
+/// Multiplies or divides covariances by the deviations of both their channels, lines × channels.
 fn scaled(
     covariance: &[DMatrix<Complex<f64>>],
     deviations: &DMatrix<f64>,
@@ -399,31 +402,32 @@ fn scaled(
     covariance.iter().enumerate().map(one).collect()
 }
 
-/// log det S + tr(S⁻¹Ŝ): minus the log likelihood of a sample Ŝ, per complex deviation. `None` for a singular
-/// S.
-fn misfit(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
+/// Returns log det S + tr(S⁻¹Ŝ): minus the log likelihood of a sample Ŝ, per complex deviation.
+/// `None` for a singular S.
+fn sample_cost(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
     let factor = s.clone().cholesky()?;
     Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
 }
 
-/// Twice the sum of the logarithms of a triangle's diagonal, `None` unless it is positive.
+/// Returns twice the sum of the logarithms of a triangle's diagonal; `None` unless it is positive.
 fn log_determinant(lower: &DMatrix<Complex<f64>>) -> Option<f64> {
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
     let diagonal = lower.diagonal();
     diagonal.iter().all(positive).then(|| diagonal.iter().map(|z| 2.0 * z.re.ln()).sum())
 }
 
-/// Sum of what every line costs ([`misfit`]) whose covariance is used for other samples of the same line: expectation
-/// of the logarithm and the inverse of a sample of `nu` complex deviations.
+/// Returns the sum over lines of the expected [`sample_cost`] when each sample covariance predicts
+/// other samples of the same line: the expectation of the logarithm and the inverse of a sample of
+/// `nu` complex deviations.
 ///
 /// # Source
 /// Goodman (1963), Annals of Mathematical Statistics 34, 152–177 (complex Wishart distribution).
-fn of_single_lines(covariance: &[DMatrix<Complex<f64>>], nu: f64) -> Option<f64> {
+fn single_line_cost(covariance: &[DMatrix<Complex<f64>>], nu: f64) -> Option<f64> {
     let channels = covariance.first()?.nrows() as f64;
     if nu <= channels {
         return None;
     }
     let inverse = channels * nu / (nu - channels);
-    let each = covariance.iter();
-    each.map(|c| Some(log_determinant(c.clone().cholesky()?.l_dirty())? + inverse)).sum()
+    let samples = covariance.iter();
+    samples.map(|c| Some(log_determinant(c.clone().cholesky()?.l_dirty())? + inverse)).sum()
 }

@@ -1,18 +1,18 @@
-//! Noise of forces that act for a few samples only.
+//! Noise of forces that act only for a few samples.
 
 use std::ops::Range;
 
 use mechid_signal::Sampling;
 use nalgebra::Complex;
 
-/// Noise on the samples of a pulse, and none on the others of its record.
+/// Noise on the samples of a pulse; the other samples of its record have none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseNoise {
     /// Rows of the record.
     pub rows: Range<usize>,
     /// Time axis of the record.
     pub sampling: Sampling,
-    /// Degree of freedom that the force acts on, counted from 0.
+    /// Degree of freedom on which the force acts, counted from 0.
     pub channel: usize,
     /// Standard deviation, in N.
     pub deviation: f64,
@@ -21,7 +21,7 @@ pub struct PulseNoise {
 }
 
 impl PulseNoise {
-    /// Returns the amplitude that a force of 1 N on a sample has on a line at `omega` (rad/s), in N.
+    /// Returns the amplitude, on a line at `omega` (rad/s), of a force of 1 N on one sample, in N.
     ///
     /// # Source
     /// The shift theorem of Fourier transforms.

@@ -1,4 +1,4 @@
-//! The spectrum of noise of which few periods are known: smooth, with bumps.
+//! Noise spectrum from few periods: smooth, with bumps.
 
 mod bump;
 
@@ -13,28 +13,29 @@ use crate::limits::{
     SMOOTH_FLOOR, SMOOTH_SEARCHED, SMOOTH_STEPS, SMOOTH_TOLERANCE,
 };
 
-/// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the frequency,
-/// with bumps on it.
+/// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the
+/// frequency, plus bumps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Form {
     /// Order of the polynomial.
     pub(crate) order: usize,
-    /// Bumps, by places of lines by rising frequency; they may overlap.
+    /// Bumps, by indices of lines in rising order of frequency; they may overlap.
     pub(crate) bumps: Vec<Bump>,
 }
 
 impl Form {
-    /// The same form on `times` as many lines.
+    /// Returns the same form on `times` as many lines.
     fn finer(&self, times: f64) -> Self {
         Self { order: self.order, bumps: self.bumps.iter().map(|bump| bump.finer(times)).collect() }
     }
 
-    /// Number of unknowns of each channel.
+    /// Returns the number of unknowns of each channel.
     pub(crate) fn terms(&self) -> usize {
         self.order + 1 + self.bumps.len()
     }
 
-    /// Bands of the bumps, those that overlap or touch as one, as places of `lines` lines.
+    /// Returns the bands of the bumps, by indices of `lines` lines; bands that overlap or touch are
+    /// joined.
     pub(crate) fn bands(&self, lines: usize) -> Vec<Range<usize>> {
         let mut bands: Vec<Range<usize>> = self.bumps.iter().map(|b| b.band(lines)).collect();
         bands.sort_by_key(|band| band.start);
@@ -48,7 +49,7 @@ impl Form {
         joined
     }
 
-    /// Orthonormal columns that span all log powers of this form.
+    /// Returns orthonormal columns that span all log powers of this form.
     fn basis(&self, omega: &[f64]) -> DMatrix<f64> {
         let ends = (omega.first().copied(), omega.last().copied());
         let (least, most) = (ends.0.unwrap_or(1.0), ends.1.unwrap_or(1.0));
@@ -56,7 +57,7 @@ impl Form {
         let columns = DMatrix::from_fn(omega.len(), self.terms(), |line, column| {
             match column.checked_sub(self.order + 1) {
                 None => {
-                    // Chebyshev polynomials.
+                    // The columns of the polynomial are Chebyshev polynomials.
                     let t = 2.0 * (omega[line] / least).ln() / span - 1.0;
                     (column as f64 * t.clamp(-1.0, 1.0).acos()).cos()
                 }
@@ -67,7 +68,8 @@ impl Form {
     }
 }
 
-/// Raises a spectrum where it is lower than within fewer lines to both sides: morphological closing.
+/// Raises a spectrum where it is lower than on both sides within this many lines: morphological
+/// closing.
 fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
     let half = lines / 2;
     let around = |at: usize| at.saturating_sub(half)..(at + half + 1).min(log_power.len());
@@ -80,7 +82,7 @@ fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
     *log_power = closed;
 }
 
-/// A spectrum of a form that was fitted to sample variances.
+/// Spectrum of a form that was fitted to sample variances.
 #[derive(Debug, Clone)]
 pub struct Smooth {
     pub(crate) form: Form,
@@ -90,28 +92,30 @@ pub struct Smooth {
     pub log_power: DMatrix<f64>,
     /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
     pub(crate) misfit: f64,
-    /// Bayesian information criterion of the choice, where there was one.
+    /// Bayesian information criterion of the chosen form.
     pub(crate) cost: f64,
 }
 
-/// The spectrum that makes sample variances (lines × channels, positive) most likely, by rising `omega`
-/// (rad/s), each variance a mean of `nu` squares of complex numbers.
+/// Returns the spectrum with the highest likelihood of sample variances (lines × channels,
+/// positive), in rising order of `omega` (rad/s), where each variance is the mean of `nu` squared
+/// magnitudes.
 ///
-/// Order and bumps are those of least Bayesian information criterion; bumps are added one by one, each the
-/// one that gains most, and their places count as unknowns, too. Of more than 4,096 lines the means of neighbours show
-/// the form, which is then fitted to all of them.
+/// Order and bumps minimise the Bayesian information criterion; bumps are added one by one, each
+/// with the largest gain, and their positions count as unknowns, too. With more than 4,096 lines,
+/// the form is chosen from means of neighbours, and then fitted to all lines.
 ///
 /// # Source
-/// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic link);
-/// Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995), Journal of Time
-/// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
+/// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic
+/// link); Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995),
+/// Journal of Time Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen
+/// one by one).
 pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let group = omega.len().div_ceil(SMOOTH_SEARCHED);
     if group <= 1 {
         return searched(omega, variances, nu);
     }
     let groups = omega.len() / group;
-    // The last few are left out, so that all are alike.
+    // Groups have equal sizes, so the last lines that do not fill a group are ignored.
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / group as f64;
     let few: Vec<f64> = (0..groups)
         .map(|at| mean(&mut omega[group * at..group * (at + 1)].iter().copied()))
@@ -119,41 +123,42 @@ pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let means = DMatrix::from_fn(groups, variances.ncols(), |at, channel| {
         mean(&mut variances.column(channel).rows(group * at, group).iter().copied())
     });
-    let found = searched(&few, &means, nu * group as f64);
-    let all = fit(found.form.finer(group as f64), omega, variances, nu);
-    Smooth { cost: found.cost, ..all }
+    let coarse = searched(&few, &means, nu * group as f64);
+    let fitted = fit(coarse.form.finer(group as f64), omega, variances, nu);
+    Smooth { cost: coarse.cost, ..fitted }
 }
 
-/// The better of this spectrum and one of which the powers over `relative` ones (lines × channels) are smooth,
-/// and whether that is the second.
+/// Returns the better of this spectrum and one whose ratio to the `relative` powers (lines ×
+/// channels) is smooth, and whether it is the second.
 pub(crate) fn choose_beside(
     omega: &[f64],
     variances: &DMatrix<f64>,
     nu: f64,
     relative: &DMatrix<f64>,
 ) -> (Smooth, bool) {
-    let own = choose(omega, variances, nu);
+    let smooth = choose(omega, variances, nu);
     let log = relative.map(f64::ln);
     if !log.iter().all(|log| log.is_finite()) {
-        return (own, false);
+        return (smooth, false);
     }
-    // A common factor says nothing; without it the numbers are those of the variances.
+    // A common factor has no effect; without it the numbers have the size of the variances.
     let mean = log.row_mean();
     let log = DMatrix::from_fn(log.nrows(), log.ncols(), |line, at| log[(line, at)] - mean[at]);
-    let mut other = choose(omega, &variances.zip_map(&log, |v, log| v * (-log).exp()), nu);
-    // The sum of the logarithms is zero, and so the likelihoods compare as they are.
-    if other.cost >= own.cost {
-        return (own, false);
+    let mut relative_smooth =
+        choose(omega, &variances.zip_map(&log, |v, log| v * (-log).exp()), nu);
+    // The logarithms of the factors have the sum zero, so that the likelihoods can be compared.
+    if relative_smooth.cost >= smooth.cost {
+        return (smooth, false);
     }
-    other.log_power += log;
-    (other, true)
+    relative_smooth.log_power += log;
+    (relative_smooth, true)
 }
 
-/// The same, looked for on all lines.
+/// Chooses the form with a search over all lines.
 fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let (lines, channels) = (omega.len(), variances.ncols() as f64);
     let per_term = (nu * lines as f64).max(2.0).ln();
-    // Intervals that are looked at.
+    // This is the number of intervals that are tried.
     let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
     let cost = |smooth: &Smooth| {
         2.0 * nu * smooth.misfit
@@ -185,12 +190,12 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     Smooth { cost, ..fit(form, omega, variances, nu) }
 }
 
-/// The spectrum of a given form.
+/// Returns the spectrum of a given form.
 pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     fit_within(SMOOTH_TOLERANCE, form, omega, variances, nu)
 }
 
-/// The same, found within a `tolerance` of the log power (RMS).
+/// Returns the spectrum of a given form, to within a `tolerance` of the log power (RMS).
 fn fit_within(
     tolerance: f64,
     form: Form,
@@ -229,7 +234,7 @@ fn fit_within(
     Smooth { form, basis, log_power, misfit, cost: f64::INFINITY }
 }
 
-/// The log power within a basis of which the variances of a channel are samples, by maximum likelihood, and
+/// Returns the maximum-likelihood log power in a basis, for the sample variances of a channel, and
 /// Σ log p + v/p.
 fn most_likely(
     basis: &DMatrix<f64>,
@@ -239,7 +244,7 @@ fn most_likely(
     let floor = (SMOOTH_FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
     let logarithms = variances.map(|v| v.max(floor).ln());
     let mut log_power = basis * basis.tr_mul(&logarithms);
-    // The level follows from the sum of the likelihood.
+    // The likelihood determines the level directly.
     let level = variances.zip_map(&log_power, |v, log| v * (-log).exp()).mean();
     log_power.add_scalar_mut(level.max(f64::MIN_POSITIVE).ln());
     let mut ratio = DVector::zeros(variances.len());
@@ -256,7 +261,8 @@ fn most_likely(
                 (information[(i, j)], information[(j, i)]) = (information_of, information_of);
             }
         }
-        // Newton's step; that of the expected information, the identity, where there is none.
+        // The expected information, which is the identity, replaces a Hessian that is not positive
+        // definite in Newton's step.
         let mut step = match information.clone().cholesky() {
             Some(factors) => factors.solve(&slope),
             None => slope,
@@ -278,7 +284,7 @@ fn most_likely(
     (log_power, misfit)
 }
 
-/// Σ log p + v/p; writes each v/p.
+/// Returns Σ log p + v/p and writes each v/p.
 fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>, ratio: &mut DVector<f64>) -> f64 {
     let lines = ratio.iter_mut().zip(log_power.iter().zip(variances.iter()));
     let terms = lines.map(|(ratio, (log, v))| {

@@ -1,4 +1,4 @@
-//! The covariance of measurement noise, frequency by frequency.
+//! Covariance of measurement noise, frequency by frequency.
 
 use mechid_model::ResponseQuantity;
 use mechid_numerics::NumericsError;
@@ -10,9 +10,9 @@ use crate::noise::pooling::{NoiseModel, Pooled, Pooling, pooled};
 
 /// Covariance of the measured displacement and force amplitudes, one matrix per row of data.
 ///
-/// For every row the Hermitian 2n×2n matrix E[z zᴴ] with z = (ΔX₁ … ΔXₙ, ΔF₁ … ΔFₙ),
-/// in m², m·N and N², of one-sided amplitudes scaled as in [`mechid_signal::spectrum`].
-/// The noise is circular: real and imaginary part are independent and equally large.
+/// Each row has the Hermitian 2n×2n matrix E[z zᴴ] with z = (ΔX₁ … ΔXₙ, ΔF₁ … ΔFₙ), in m², m·N and
+/// N², for one-sided amplitudes scaled as in [`mechid_signal::spectrum`]. The noise is circular:
+/// real and imaginary parts are independent and have equal variances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseSpectrum {
     omega: Vec<f64>,
@@ -20,28 +20,27 @@ pub struct NoiseSpectrum {
     degrees_of_freedom: f64,
     total_degrees_of_freedom: f64,
     models: Vec<NoiseModel>,
-    /// Functions that each of the models was fitted with, if it is a smooth spectrum or white.
+    /// Functions with which each model was fitted, if it is a smooth spectrum or white.
     parts: Vec<Option<SmoothPart>>,
 }
 
-/// Functions that the log powers of an experiment were fitted with.
+/// Functions with which the log powers of an experiment were fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothPart {
     /// Orthonormal columns, rows × terms.
     /// Dimensionless.
     pub basis: DMatrix<f64>,
-    /// Complex deviations that each sample covariance was made of.
-    /// A pure number.
+    /// Number of complex deviations behind each sample covariance, a pure number.
     pub nu: f64,
 }
 
 impl NoiseSpectrum {
-    /// A known covariance per row, at `omega` (rad/s).
+    /// Creates a spectrum from a known covariance per row, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if there is not one matrix per frequency,
-    /// [`NumericsError::Size`] if they are not square of one even size,
-    /// [`SpectraError::NoiseVariance`] if a variance is negative or not finite.
+    /// [`NumericsError::Size`] if there is not one matrix per frequency, [`NumericsError::Size`] if
+    /// they are not square and of one even size, [`SpectraError::NoiseVariance`] if a variance is
+    /// negative or not finite.
     pub fn new(
         omega: Vec<f64>,
         covariance: Vec<DMatrix<Complex<f64>>>,
@@ -78,9 +77,9 @@ impl NoiseSpectrum {
         })
     }
 
-    /// White noise of known standard deviation on the samples of every motion channel (in
-    /// the unit measured) and force channel (N), as it stands on spectral lines of one
-    /// period: E|X_n|² = 4 s²/N. For the mean of P periods divide both by √P.
+    /// Creates white noise of known standard deviation on the samples of every response channel (in
+    /// the measured unit) and force channel (N), on the spectral lines of one period: E|X_n|² = 4
+    /// s²/N. For the mean of P periods divide both by √P.
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
@@ -107,8 +106,9 @@ impl NoiseSpectrum {
         Self::new(omega, covariance)
     }
 
-    /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`; it may
-    /// be smooth over the `relative` powers of the channels (rows × 2n) instead of being smooth itself.
+    /// Estimates the spectrum from sample covariances of the measured quantity, each of
+    /// `degrees_of_freedom`; its ratio to the `relative` powers of the channels (rows × 2n) may be
+    /// smooth instead of the spectrum itself.
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
@@ -133,8 +133,8 @@ impl NoiseSpectrum {
         })
     }
 
-    /// The same noise and beside it white noise of these variances on the samples of each channel, 2n: motions in
-    /// the square of the unit measured, forces in N².
+    /// Returns the noise plus white noise of these variances on the samples of each channel, 2n:
+    /// responses in the square of the measured unit, forces in N².
     ///
     /// # Source
     /// As [`NoiseSpectrum::white`].
@@ -156,7 +156,7 @@ impl NoiseSpectrum {
         self
     }
 
-    /// The same noise with the force taken as known exactly.
+    /// Returns the same noise with an exactly known force.
     pub fn with_exact_force(mut self) -> Self {
         let n = self.dof();
         for c in &mut self.covariance {
@@ -166,7 +166,8 @@ impl NoiseSpectrum {
         self
     }
 
-    /// The same noise with these variances of the forces, rows × n, in N², independent of all others.
+    /// Returns the same noise with these variances of the forces, rows × n, in N², independent of
+    /// all other noise.
     pub fn with_force_variance(mut self, variance: &DMatrix<f64>) -> Self {
         let n = self.dof();
         for (c, variance) in self.covariance.iter_mut().zip(variance.row_iter()) {
@@ -177,7 +178,7 @@ impl NoiseSpectrum {
         self
     }
 
-    /// The noise of data whose force is `delay` seconds later.
+    /// Returns the noise of data whose force is delayed by `delay` seconds.
     ///
     /// # Source
     /// The shift theorem of Fourier transforms.
@@ -191,17 +192,17 @@ impl NoiseSpectrum {
         later
     }
 
-    /// Degrees of freedom n of the system; the matrices are 2n×2n.
+    /// Returns the number of degrees of freedom n of the system; the matrices are 2n×2n.
     pub fn dof(&self) -> usize {
         self.covariance[0].nrows() / 2
     }
 
-    /// Angular frequency of every row, in rad/s.
+    /// Returns the angular frequency of every row, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega
     }
 
-    /// E[z zᴴ] of a row, 2n×2n: displacements (m) first, then forces (N).
+    /// Returns E[z zᴴ] of a row, 2n×2n: displacements (m) first, then forces (N).
     ///
     /// # Panics
     /// If there is no such row.
@@ -209,32 +210,31 @@ impl NoiseSpectrum {
         &self.covariance[row]
     }
 
-    /// Number of independent complex deviations that each covariance was averaged from;
-    /// infinite for known noise.
+    /// Returns the number of independent complex deviations behind each covariance; infinite for
+    /// known noise.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom
     }
 
-    /// Returns the number of independent complex deviations that all covariances together are made of;
-    /// infinite for known noise.
+    /// Returns the total number of independent complex deviations behind all covariances; infinite
+    /// for known noise.
     pub fn deviations(&self) -> f64 {
         self.total_degrees_of_freedom
     }
 
-    /// Spectra that were made of samples, one of each experiment; none of known noise.
+    /// Returns the forms of the estimated spectra, one for each experiment; empty for known noise.
     pub fn models(&self) -> &[NoiseModel] {
         &self.models
     }
 
-    /// Returns the functions that the log powers were fitted with, experiment by experiment; `None` unless each
-    /// of them is smooth or white, and at least one is not white.
+    /// Returns the functions with which the log powers were fitted, experiment by experiment;
+    /// `None` unless each is smooth or white, and at least one is not white.
     pub fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
         let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
         parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
     }
 
-    /// Returns the number of covariances independent of one another; infinite or undefined for known
-    /// noise.
+    /// Returns the number of independent covariances; infinite or undefined for known noise.
     pub fn groups(&self) -> f64 {
         self.total_degrees_of_freedom / self.degrees_of_freedom
     }
@@ -245,25 +245,25 @@ impl NoiseSpectrum {
         self.covariance.iter().any(|c| (n..2 * n).any(|i| c[(i, i)].re > 0.0))
     }
 
-    /// Degrees of freedom of a variance averaged over all rows, for Student's t; known noise
-    /// has as many as make it the normal distribution.
+    /// Returns the degrees of freedom of a variance averaged over all rows, for Student's t; for
+    /// known noise it is a large number, with which that is the normal distribution.
     pub fn total_degrees_of_freedom(&self) -> usize {
         // Real and imaginary deviations both count.
         (2.0 * self.total_degrees_of_freedom).min(1e6) as usize
     }
 
-    /// E[Ŝ⁻¹] S of a sample covariance Ŝ of `channels` channels: ν/(ν − n).
+    /// Returns E[Ŝ⁻¹] S of a sample covariance Ŝ of `channels` channels: ν/(ν − n).
     pub fn mean_inverse_ratio(&self, channels: usize) -> f64 {
         let nu = self.degrees_of_freedom;
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
     }
 
-    /// Rows of `self`, then those of `other`: the noise of two experiments.
+    /// Returns the rows of `self`, then those of `other`: the noise of two experiments.
     pub fn chain(&self, other: &Self) -> Self {
         Self {
             omega: [&self.omega[..], &other.omega].concat(),
             covariance: [&self.covariance[..], &other.covariance].concat(),
-            // The more uncertain of the two decides how far the weights can be trusted.
+            // The less certain covariance limits the accuracy of the weights.
             degrees_of_freedom: self.degrees_of_freedom.min(other.degrees_of_freedom),
             total_degrees_of_freedom: self.total_degrees_of_freedom
                 + other.total_degrees_of_freedom,
@@ -273,12 +273,12 @@ impl NoiseSpectrum {
     }
 }
 
-/// E|X_n|² = 4 s²/N of a line of N samples that have white noise of the standard deviation s.
+/// Returns E|X_n|² = 4 s²/N of a line from N samples with white noise of standard deviation s.
 pub fn variance_on_lines(deviation: f64, samples: usize) -> f64 {
     4.0 * deviation * deviation / samples as f64
 }
 
-/// Turns covariances of the quantity measured into covariances of displacement.
+/// Converts covariances of the measured quantity to covariances of displacement.
 fn to_displacement(
     omega: &[f64],
     covariance: &mut [DMatrix<Complex<f64>>],

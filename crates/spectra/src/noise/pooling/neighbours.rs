@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::{Covariances, misfit, window};
+use super::{Covariances, sample_cost, window};
 
-/// Covariances of lines by rising frequency, of which neighbours are added.
+/// Covariances of lines in rising order of frequency, whose neighbours are summed.
 pub(super) struct Neighbours {
     /// Entries of each covariance, entries × lines.
     samples: DMatrix<Complex<f64>>,
@@ -23,27 +23,29 @@ impl Neighbours {
         Self { samples, channels }
     }
 
-    /// Sums of `count` covariances in a row, from each line on that has so many: of one, two, four … lines, as
-    /// many as `count` is made of, so that nothing is taken away again.
+    /// Returns the sum of `count` consecutive covariances from each line on. The sums are combined
+    /// from sums of 1, 2, 4 … lines according to the binary digits of `count`: subtraction of
+    /// running sums would lose digits.
     fn sums(&self, count: usize) -> DMatrix<Complex<f64>> {
         let lines = self.samples.ncols();
-        let mut all = DMatrix::zeros(self.samples.nrows(), lines + 1 - count);
+        let mut total = DMatrix::zeros(self.samples.nrows(), lines + 1 - count);
         let (mut some, mut width, mut from) = (self.samples.clone(), 1, 0);
         while width <= count {
             if count & width != 0 {
-                all += some.columns(from, all.ncols());
+                total += some.columns(from, total.ncols());
                 from += width;
             }
             if 2 * width <= count {
-                let left = some.ncols() - width;
-                some = some.columns(0, left) + some.columns(width, left);
+                let lines_with_next = some.ncols() - width;
+                some = some.columns(0, lines_with_next) + some.columns(width, lines_with_next);
             }
             width *= 2;
         }
-        all
+        total
     }
 
-    /// Means over each line and `half_width` lines to either side, in a window as [`window`] has it.
+    /// Returns the means over each line and `half_width` lines to either side, in the [`window`] of
+    /// the line.
     pub(super) fn means(&self, half_width: usize) -> Covariances {
         let lines = self.samples.ncols();
         let windows = (0..lines).map(|line| window(line, half_width, lines));
@@ -54,11 +56,12 @@ impl Neighbours {
         windows.map(mean).collect()
     }
 
-    /// Sum of what every line costs when the mean of the others around it predicts it.
+    /// Returns the sum over lines of the cost when the mean of the other lines in the window
+    /// predicts a line.
     ///
     /// # Source
     /// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147.
-    pub(super) fn misfit(&self, half_width: usize) -> Option<f64> {
+    pub(super) fn cost(&self, half_width: usize) -> Option<f64> {
         let lines = self.samples.ncols();
         let width = window(0, half_width, lines).len();
         let (sums, first) = (self.sums(half_width), self.ends(0..width));
@@ -66,18 +69,19 @@ impl Neighbours {
         let mut cost = 0.0;
         for line in 0..lines {
             let window = window(line, half_width, lines);
-            let others = match window.start {
+            let other_lines = match window.start {
                 start if start + half_width == line => sums.column(start) + sums.column(line + 1),
                 0 => first[0].column(line) + first[1].column(line + 1),
                 start => last[0].column(line - start) + last[1].column(line + 1 - start),
             };
-            let mean = self.matrix(others.unscale((window.len() - 1) as f64));
-            cost += misfit(&mean, &self.matrix(self.samples.column(line).into_owned()))?;
+            let mean = self.matrix(other_lines.unscale((window.len() - 1) as f64));
+            cost += sample_cost(&mean, &self.matrix(self.samples.column(line).into_owned()))?;
         }
         Some(cost)
     }
 
-    /// Sums of the covariances of some lines before each of them, and from each of them on.
+    /// Returns the sums of the covariances before each line of a range, and from each line of the
+    /// range on.
     fn ends(&self, range: Range<usize>) -> [DMatrix<Complex<f64>>; 2] {
         let (count, samples) = (range.len(), self.samples.columns_range(range));
         let [mut before, mut from] = [(); 2].map(|()| DMatrix::zeros(samples.nrows(), count + 1));
@@ -127,9 +131,9 @@ mod tests {
                 let others = window.clone().filter(|other| *other != line);
                 let sum = others.fold(DMatrix::zeros(4, 4), |sum, other| sum + &covariance[other]);
                 let predicted = sum.unscale((window.len() - 1) as f64);
-                cost += misfit(&predicted, &covariance[line]).unwrap();
+                cost += sample_cost(&predicted, &covariance[line]).unwrap();
             }
-            let found = neighbours.misfit(half_width).unwrap();
+            let found = neighbours.cost(half_width).unwrap();
             assert!(near(found, cost), "{half_width}: {found} {cost}");
         }
     }

@@ -1,4 +1,4 @@
-//! Bumps on a smooth spectrum, and the search for the one that gains most.
+//! Bumps on a smooth spectrum, and the search for the one with the largest gain.
 
 use std::ops::Range;
 
@@ -9,13 +9,13 @@ use crate::limits::{
     HEIGHT_TOLERANCE, PEAK_REACH, QUIET_DEVIATIONS, SMOOTH_FLOOR,
 };
 
-/// Shape that is added to the log powers about a line, times an unknown.
+/// Shape that is added to the log powers around a line, times an unknown height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
     shape: Shape,
-    /// Middle, in places of lines.
+    /// Middle, as an index of lines.
     middle: f64,
-    /// Lines to either side within which it is not zero.
+    /// Distance, in lines, from the middle to the ends.
     reach: f64,
 }
 
@@ -23,9 +23,9 @@ pub(crate) struct Bump {
 enum Shape {
     /// Equal on all lines.
     Flat,
-    /// Straight from the middle to both ends.
+    /// Linear from the middle to both ends.
     Tent,
-    /// ln(1 + A/(1 + x²)), x = 1 at a distance of `half_width` lines: a resonance over a floor.
+    /// ln(1 + A/(1 + x²)), with x = 1 at a distance of `half_width` lines: a resonance on a floor.
     Peak { above_floor: f64, half_width: f64 },
 }
 
@@ -44,7 +44,7 @@ impl Bump {
         Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
     }
 
-    /// The same bump where there are `times` as many lines.
+    /// Returns the same bump for `times` as many lines.
     pub(super) fn finer(&self, times: f64) -> Self {
         let shape = match self.shape {
             Shape::Peak { above_floor, half_width } => {
@@ -56,7 +56,7 @@ impl Bump {
         Self { shape, middle, reach: times * self.reach }
     }
 
-    /// Others that might do better than the flat one of a band.
+    /// Returns other shapes that may fit better than the flat bump of a band.
     fn about(band: &Range<usize>) -> [Self; 3] {
         let Self { middle, reach, .. } = Self::flat(band);
         [
@@ -66,8 +66,8 @@ impl Bump {
         ]
     }
 
-    /// The same a little moved, wider, narrower, higher or lower; none of a flat one, whose places are all
-    /// looked at.
+    /// Returns variations: a little moved, wider, narrower, higher or lower. A flat bump has none,
+    /// because all its positions are tried.
     fn varied(&self) -> Vec<Self> {
         let middle = self.middle;
         match self.shape {
@@ -104,36 +104,38 @@ impl Bump {
         }
     }
 
-    /// Lines within which it is half its height or more.
+    /// Returns the lines on which it has at least half its height.
     pub(super) fn band(&self, lines: usize) -> Range<usize> {
         let half = match self.shape {
             Shape::Flat => self.reach - 0.5,
             Shape::Tent => 0.5 * self.reach,
-            // Half of the logarithm of the peak.
+            // The height is half the logarithm of the peak at this distance.
             Shape::Peak { above_floor, half_width } => half_width * above_floor.powf(0.25),
         };
-        // The line nearest to the middle, at least.
+        // The band has at least the line nearest to the middle.
         let nearest = (self.middle.round().max(0.0) as usize).min(lines.saturating_sub(1));
         let first = (self.middle - half).ceil().max(0.0) as usize;
         let last = (self.middle + half).floor().max(0.0) as usize;
         first.min(nearest)..(last.max(nearest) + 1).min(lines)
     }
 
-    /// Lines within which it is not zero.
+    /// Returns the lines on which it is not zero.
     fn support(&self, lines: usize) -> Range<usize> {
         let first = (self.middle - self.reach).ceil().max(0.0) as usize;
         first..((self.middle + self.reach).floor() as usize + 1).min(lines)
     }
 }
 
-/// Widths of the bands that are looked at: 1, 2, 3, 4, 6, 8, 12 …, to a third of the lines.
+/// Returns the widths of the bands that are tried: 1, 2, 3, 4, 6, 8, 12 …, up to a third of the
+/// lines.
 pub(super) fn widths(lines: usize) -> impl Iterator<Item = usize> {
     let powers = (0..usize::BITS).map(|power| 1usize << power);
-    let all = powers.flat_map(|p| if p == 1 { vec![1] } else { vec![p, p + p / 2] });
-    all.take_while(move |width| *width <= (lines / 3).max(1))
+    let all_widths = powers.flat_map(|p| if p == 1 { vec![1] } else { vec![p, p + p / 2] });
+    all_widths.take_while(move |width| *width <= (lines / 3).max(1))
 }
 
-/// The bump that makes the variances most likely, of all flat ones and of tents about the best of them.
+/// Returns the bump with the highest likelihood of the variances, from all flat bumps and from
+/// other shapes around the best of them.
 pub(super) fn most_conspicuous(
     variances: &DMatrix<f64>,
     log_power: &DMatrix<f64>,
@@ -141,7 +143,7 @@ pub(super) fn most_conspicuous(
 ) -> Option<Bump> {
     let (lines, channels) = variances.shape();
     let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
-    // Sums of the levels below each line.
+    // Cumulative sums of the levels give the mean of any band.
     let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
     for channel in 0..channels {
         for line in 0..lines {
@@ -152,13 +154,14 @@ pub(super) fn most_conspicuous(
         let (count, others) = (width as f64, (lines - width) as f64);
         let of_channel = |channel: usize| {
             let inside = below[(start + width, channel)] - below[(start, channel)];
-            let all = below[(lines, channel)];
+            let total = below[(lines, channel)];
             let [mean, inside, other] =
-                [all / (count + others), inside / count, (all - inside) / others]
+                [total / (count + others), inside / count, (total - inside) / others]
                     .map(|level: f64| level.max(SMOOTH_FLOOR));
-            match inside > other || count * nu >= QUIET_DEVIATIONS {
-                true => count * (mean / inside).ln() + others * (mean / other).ln(),
-                false => 0.0,
+            if inside > other || count * nu >= QUIET_DEVIATIONS {
+                count * (mean / inside).ln() + others * (mean / other).ln()
+            } else {
+                0.0
             }
         };
         (0..channels).map(of_channel).sum::<f64>()
@@ -174,37 +177,37 @@ pub(super) fn most_conspicuous(
     let best = |of: &mut dyn Iterator<Item = Gained>| of.max_by(|a, b| a.gain.total_cmp(&b.gain));
     let (of_flat, band) = flat.first()?;
     let none = vec![0.0; channels];
-    let others = flat.iter().flat_map(|(_, band)| Bump::about(band));
-    let mut other = best(&mut others.map(|bump| Gained::of(bump, &none, &levels, nu)))?;
+    let shapes = flat.iter().flat_map(|(_, band)| Bump::about(band));
+    let mut fitted = best(&mut shapes.map(|bump| Gained::fit(bump, &none, &levels, nu)))?;
     for _ in 0..BUMP_VARIATIONS {
-        let varied = other.bump.varied().into_iter();
+        let varied = fitted.bump.varied().into_iter();
         let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
-        let with_gain = |bump: Bump| Gained::of(bump, &other.heights, &levels, nu);
-        match best(&mut inside.map(with_gain)).filter(|varied| varied.gain > other.gain) {
-            Some(varied) => other = varied,
+        let with_gain = |bump: Bump| Gained::fit(bump, &fitted.heights, &levels, nu);
+        match best(&mut inside.map(with_gain)).filter(|varied| varied.gain > fitted.gain) {
+            Some(varied) => fitted = varied,
             None => break,
         }
     }
-    let best = if *of_flat >= other.gain {
+    let best = if *of_flat >= fitted.gain {
         (*of_flat, Bump::flat(band))
     } else {
-        (other.gain, other.bump)
+        (fitted.gain, fitted.bump)
     };
     Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
 }
 
-/// A bump of the best height on the best level.
+/// Bump with its most likely heights.
 struct Gained {
     bump: Bump,
-    /// Amount by which it lowers Σ log p + v/p.
+    /// Reduction of Σ log p + v/p.
     gain: f64,
     /// Height for each channel, in the logarithm of the power.
     heights: Vec<f64>,
 }
 
 impl Gained {
-    /// Finds the heights from those of a bump like it, and from the levels v/p.
-    fn of(bump: Bump, start: &[f64], levels: &DMatrix<f64>, nu: f64) -> Self {
+    /// Fits the heights, beginning with `start`, to the levels v/p.
+    fn fit(bump: Bump, start: &[f64], levels: &DMatrix<f64>, nu: f64) -> Self {
         let support = bump.support(levels.nrows());
         let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
         let mut heights = start.to_vec();
@@ -219,8 +222,8 @@ impl Gained {
     }
 }
 
-/// Finds the height of a bump whose parts stand over the levels v/p `inside`, and returns by how much it lowers
-/// Σ log p + v/p; the levels of all other lines have the sum `outside`.
+/// Fits the height of a bump with the shape `parts` on the levels v/p `inside`, and returns the
+/// reduction of Σ log p + v/p; the levels of all other lines have the sum `outside`.
 fn raised(
     parts: &[f64],
     inside: &[f64],
@@ -237,12 +240,13 @@ fn raised(
         let (mut first, mut second) = (0.0, 0.0);
         sum = outside;
         for (part, level) in parts.iter().zip(inside) {
-            let left = level * f64::exp(-*height * part);
-            sum += left;
-            first += part * left;
-            second += part * part * left;
+            let scaled_level = level * f64::exp(-*height * part);
+            sum += scaled_level;
+            first += part * scaled_level;
+            second += part * part * scaled_level;
         }
-        // Derivatives of L log Σ v/p + height Σ part, which is convex.
+        // The cost L log Σ v/p + height Σ part is convex, so Newton's method with bisection finds
+        // its minimum.
         let slope = area - lines * first / sum;
         let curvature = lines * (second / sum - (first / sum).powi(2));
         if slope < 0.0 {
@@ -252,7 +256,7 @@ fn raised(
         }
         let next = *height - slope / curvature;
         let next = if next > least && next < most { next } else { 0.5 * (least + most) };
-        // The sum is that of the height before.
+        // The sum was computed for the previous height, which is accurate enough.
         if (next - *height).abs() <= HEIGHT_TOLERANCE {
             break;
         }
