@@ -1,22 +1,22 @@
-//! Errors between a result and its figure or page.
+//! Errors of figures and pages.
 
-/// A failure to draw or to describe a result.
+/// Error in drawing or describing a result.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// A record without numbers but those of time.
+    /// A record has no columns of numbers except the time.
     #[error("{file}: nothing to plot: no column other than time holds numbers")]
     NoColumnToDraw {
         /// The record.
         file: String,
     },
-    /// A mass without a spring.
+    /// A system has mass but no stiffness, and therefore no resonance.
     #[error("{file}: nothing to plot: the machine has no natural frequency other than zero")]
     NothingResonates {
-        /// The machine.
+        /// File of the system.
         file: String,
     },
-    /// The analysis cannot compute what is shown.
+    /// An analysis of what is shown fails.
     #[error(transparent)]
     Analysis(#[from] mechid_analysis::AnalysisError),
     /// A figure cannot be drawn.
@@ -25,7 +25,7 @@ pub enum ReportError {
     /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
-    /// Spectral lines are unusable.
+    /// Spectral lines cannot be used.
     #[error(transparent)]
     Spectra(#[from] mechid_spectra::SpectraError),
     /// A numerical method fails.

@@ -1,4 +1,4 @@
-//! Figures and HTML pages of the results of an analysis; prints nothing and writes no file.
+//! Figures and HTML pages of the results of an analysis; prints no text and writes no file.
 //!
 //! ```
 //! use mechid_analysis::{Channels, Identify, Measurement, ResponseQuantity, identify};
@@ -7,9 +7,9 @@
 //! let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
 //! let channels = Channels::new("force", ResponseQuantity::Displacement, "displacement");
 //! let test = Measurement::open(rig, &channels)?.period(256)?;
-//! let found = identify(&[test], &Identify::default())?;
+//! let identified = identify(&[test], &Identify::default())?;
 //! // Measured and identified receptance over frequency.
-//! let svg = found.figure()?.to_svg()?;
+//! let svg = identified.figure()?.to_svg()?;
 //! assert!(svg.starts_with("<svg") && svg.contains("Hz"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use mechid_analysis::reconstruct::numbered;
 use mechid_force::IdentifiedForce;
 
-/// Number of lines whose text is gathered at a time.
+/// Number of lines whose text is collected before it is returned.
 const GATHERED: usize = 1024;
 
 /// Returns the rows of a table in pieces of text: frequency in Hz, then amplitude in N and phase in
-/// degrees of each force, of the lines asked for (`None`: all).
+/// degrees of each force, for the requested lines (`None`: all).
 pub fn spectrum_csv<'a>(
     force: &'a IdentifiedForce,
     lines: Option<&'a [usize]>,

@@ -1,11 +1,11 @@
-//! Frequency of the modes of a nonlinear machine over their amplitude.
+//! Frequency of the modes of a nonlinear system as a function of their amplitude.
 
 use mechid_analysis::identify::rows::CONFIDENCE;
 use mechid_analysis::modal::BackboneRow;
 use mechid_analysis::text::compact;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 
-/// A panel for each mode: its frequency with the confidence interval.
+/// Returns a panel for each mode: its frequency with the confidence interval.
 pub fn figure(file: &str, rows: &[BackboneRow]) -> Figure {
     let modes = rows.last().map_or(0, |row| row.mode);
     let panels = (1..=modes).map(|mode| {

@@ -1,21 +1,21 @@
-//! Dynamic stiffness of a bearing, and its coefficients over speed.
+//! Dynamic stiffness of a bearing, and its coefficients as functions of speed.
 
 use std::f64::consts::TAU;
 
 use mechid_analysis::bearing::{BearingSummary, BearingTable};
 use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
 
-/// Standard errors of a 95 % interval.
+/// Half-width of a 95 % interval, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// N/m in a MN/m.
+/// Number of N/m in 1 MN/m.
 const MEGA: f64 = 1e6;
 
 /// Names of the entries of a 2×2 matrix.
 const ENTRIES: [&str; 4] = ["xx", "xy", "yx", "yy"];
 
-/// Re H over ω² and Im H over ω, direct and cross-coupled: measured line by line with 95 % intervals,
-/// and as fitted.
+/// Returns Re H over ω² and Im H over ω, direct and cross-coupled: measured line by line with 95 %
+/// intervals, and fitted.
 pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
     let omega: Vec<f64> =
         bearing.dynamic_stiffness.iter().map(|line| TAU * line.frequency_hz).collect();
@@ -37,9 +37,10 @@ pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
                     .collect();
                 let errors: Option<Vec<f64>> = lines()
                     .map(|line| {
-                        let of = match is_real {
-                            true => line.standard_error_real,
-                            false => line.standard_error_imaginary,
+                        let of = if is_real {
+                            line.standard_error_real
+                        } else {
+                            line.standard_error_imaginary
                         };
                         of.map(|errors| NORMAL * errors[entry] / MEGA)
                     })
@@ -53,9 +54,10 @@ pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
                 let fit: Vec<f64> = omega
                     .iter()
                     .map(|w| {
-                        let value = match is_real {
-                            true => coefficient(0, entry) - w * w * coefficient(2, entry),
-                            false => w * coefficient(1, entry),
+                        let value = if is_real {
+                            coefficient(0, entry) - w * w * coefficient(2, entry)
+                        } else {
+                            w * coefficient(1, entry)
                         };
                         value / MEGA
                     })
@@ -72,7 +74,7 @@ pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
     panels.into_iter().fold(Figure::new(title).columns(2), Figure::panel)
 }
 
-/// Stiffness, damping and, where it was identified, mass over the speed of rotation, with 95 %
+/// Returns stiffness, damping and, if it was identified, mass over the speed of rotation, with 95 %
 /// intervals.
 pub fn over_speed(table: &BearingTable) -> Figure {
     let speed = |row: &BearingSummary| row.rotation_hz.unwrap_or(0.0);

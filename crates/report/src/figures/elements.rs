@@ -1,4 +1,4 @@
-//! Responses of the sensors over frequency, measured and of the identified machine.
+//! Responses of the sensors over frequency, measured and of the identified system.
 
 use mechid_analysis::IdentifiedElements;
 use mechid_analysis::elements::SensorSpectrum;
@@ -7,10 +7,10 @@ use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 /// Maximum number of sensors that are drawn, one panel each.
 const SENSORS: usize = 6;
 
-/// Maximum number of points of a curve: more than a panel has dots.
+/// Maximum number of points of a curve; a panel cannot show more.
 const POINTS: usize = 4000;
 
-/// Amplitudes of the first sensors: measured, of the model, and their difference.
+/// Returns the amplitudes of the first sensors: measured, of the model, and their difference.
 pub fn figure(identified: &IdentifiedElements) -> Figure {
     let tests = &identified.summary().tests;
     let files: Vec<&str> = tests.iter().map(|test| test.file.as_str()).collect();

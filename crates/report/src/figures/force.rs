@@ -4,7 +4,7 @@ use mechid_analysis::Reconstructed;
 use mechid_analysis::reconstruct::numbered;
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
-/// Every sought force against time, with twice its standard error, above its spectrum.
+/// Returns every reconstructed force over time, with twice its standard error, above its spectrum.
 pub fn figure(reconstructed: &Reconstructed) -> Figure {
     let (summary, force, sought) =
         (reconstructed.summary(), reconstructed.force(), reconstructed.forced());

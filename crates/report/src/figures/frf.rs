@@ -1,4 +1,4 @@
-//! Magnitude, phase and coherence.
+//! Magnitude, phase and coherence of frequency responses.
 
 use std::f64::consts::TAU;
 
@@ -11,12 +11,13 @@ use nalgebra::Complex;
 use super::style::{FigureStyle, FrequencyScale, derivative, per_force};
 use super::trace::Trace;
 
-/// Title of the figure.
+/// Returns the title of the figure.
 pub fn title(report: &FrfTable) -> String {
     format!("{}, {}", report.file, report.estimator)
 }
 
-/// Magnitude above phase above coherence, one curve for every pair of motion and force.
+/// Returns magnitude above phase above coherence, with one curve for every pair of response and
+/// force.
 pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     let alone = report.responses.len() == 1;
     let name = |response: &Response| if alone { String::new() } else { report.pair(response) };
@@ -36,7 +37,7 @@ pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     chart(report, &title(report), &traces, style).panel(panel)
 }
 
-/// The same as a figure for each pair, by its name, with the coherence of its motion.
+/// Returns a separate figure for each pair, by its name, with the coherence of its response.
 pub fn figures(report: &FrfTable, style: FigureStyle) -> Vec<(String, Figure)> {
     let of_pair = |response: &Response| {
         let trace = trace(report, response, String::new(), style);
@@ -65,7 +66,7 @@ fn trace(report: &FrfTable, response: &Response, name: String, style: FigureStyl
         .zip(values)
         .map(|(omega, (re, im))| {
             let h = Complex::new(*re, *im);
-            // As it was measured, to the last digit.
+            // Measured values are not converted, so that all digits stay.
             (omega, if shown == measured(report) { h } else { h * turned(omega) })
         })
         .collect();
@@ -95,7 +96,7 @@ fn coherence_panel(style: FigureStyle) -> Panel {
 }
 
 fn coherence_curve(report: &FrfTable, coherence: &Coherence, name: String) -> Curve {
-    // 0 Hz has no place on a logarithmic axis.
+    // A logarithmic axis cannot show 0 Hz.
     let hidden = report.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
     Curve::line(name, &report.frequency_hz[hidden..], &coherence.values[hidden..])
 }

@@ -39,20 +39,20 @@ pub trait ToFigure {
     /// Returns the usual figure of the result.
     ///
     /// # Errors
-    /// [`ReportError::NoColumnToDraw`] or [`ReportError::NothingResonates`] if the result has nothing to draw,
-    /// [`ReportError::Analysis`] if a curve cannot be computed.
+    /// [`ReportError::NoColumnToDraw`] or [`ReportError::NothingResonates`] if the result has no
+    /// content for a figure, [`ReportError::Analysis`] if a curve cannot be computed.
     fn figure(&self) -> Result<Figure, ReportError> {
         self.styled_figure(FigureStyle::default())
     }
 
-    /// Returns the usual figure of the result, its frequency responses in a given style.
+    /// Returns the usual figure of the result, with its frequency responses in the given style.
     ///
     /// # Errors
     /// As [`ToFigure::figure`].
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError>;
 
-    /// Returns an HTML page of the figure, which zooms and has a cursor and loads nothing; of several responses one is
-    /// shown large and all small.
+    /// Returns an HTML page of the figure, which has zoom and cursor and loads no other file; of
+    /// several responses, it shows one large and all small.
     ///
     /// # Errors
     /// As [`ToFigure::figure`].
@@ -79,7 +79,8 @@ fn receptance_or_responses(
     }
 }
 
-/// Name of a displacement by the channel that shows it, such as `x at a1` of an accelerometer.
+/// Returns the name of a displacement, from the channel that measures it, such as `x at a1` for an
+/// accelerometer.
 pub(crate) fn displacement_name(channels: &Channels, kind: ResponseQuantity, dof: usize) -> String {
     let name = channels.response_name(kind, dof);
     match kind {
@@ -96,7 +97,8 @@ fn motion_letter(quantity: ResponseQuantity) -> &'static str {
     }
 }
 
-/// Name of a motion as it is drawn: that of its channel where this is what is drawn, or of the place.
+/// Returns the name of a response in the figure: the name of its channel if the measured quantity
+/// is drawn, otherwise of its point.
 pub(crate) fn motion_name(
     channels: &Channels,
     measured: ResponseQuantity,
@@ -113,9 +115,10 @@ pub(crate) fn motion_name(
 }
 
 impl ToFigure for Identified {
-    /// Draws measured and identified receptance, or, where no line separates the forces, the amplitudes of
-    /// the response, measured and predicted, and the coherence of random and hammer tests; for a fit in the time
-    /// domain measured and predicted response of the first record; with nonlinear terms the restoring force.
+    /// Draws measured and identified receptance; if no line separates the forces, the measured and
+    /// predicted amplitudes of the responses; for random and hammer tests, the coherence too. For a
+    /// fit in the time domain, draws measured and predicted response of the first record; with
+    /// nonlinear terms, the restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
         if let Some(fitted) = &self.fitted().nonlinear {
@@ -146,7 +149,8 @@ impl ToFigure for Identified {
 }
 
 impl ToFigure for IdentifiedResponses {
-    /// Draws measured and identified receptance, both under the exponential window of the table if it has one.
+    /// Draws measured and identified receptance, both with the exponential window of the table if
+    /// it has one.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
         let system = self.fitted().system().map_err(AnalysisError::from)?;
@@ -182,7 +186,7 @@ impl ToFigure for FrfTable {
 }
 
 impl ToFigure for Decayed {
-    /// Draws the response from the beginning of the decay on, measured and fitted, and what is left.
+    /// Draws the response from the beginning of the decay, measured and fitted, and the residual.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         let title = format!("{}: free decay", self.summary().file);
         Ok(motion::motion(&title, self.compared(), "fitted"))
@@ -190,15 +194,16 @@ impl ToFigure for Decayed {
 }
 
 impl ToFigure for Modes {
-    /// Draws the responses of the first record over frequency, measured and explained by the modes, the
-    /// stabilisation diagram and the mode indicator.
+    /// Draws the responses of the first record over frequency, measured and explained by the modes,
+    /// with the stabilisation diagram and the mode indicator.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         modes::figure(self)
     }
 }
 
 impl ToFigure for IdentifiedElements {
-    /// Draws the responses of the first sensors over frequency, measured and of the identified machine.
+    /// Draws the responses of the first sensors over frequency, measured and of the identified
+    /// system.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(elements::figure(self))
     }
@@ -219,7 +224,7 @@ impl ToFigure for SweepSummary {
 }
 
 impl ToFigure for Inspected {
-    /// Draws columns over time beside their spectra.
+    /// Draws columns over time, with their spectra.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         record::figure(self)
     }
@@ -227,15 +232,16 @@ impl ToFigure for Inspected {
 
 #[cfg(feature = "parquet")]
 impl ToFigure for Trends {
-    /// Draws every parameter, natural frequency and damping ratio over the records, with 95 % intervals.
+    /// Draws every parameter, natural frequency and damping ratio over the records, with 95 %
+    /// intervals.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(trends::figure(self))
     }
 }
 
 impl ToFigure for Machine {
-    /// Draws the receptance around the natural frequencies; of a machine whose nonlinear terms were
-    /// identified, to which no receptance belongs, the frequency of each mode over its amplitude.
+    /// Draws the receptance around the natural frequencies; for a system with identified nonlinear
+    /// terms, which has no receptance, the frequency of each mode over its amplitude.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let backbone = self.backbone()?;
         if !backbone.is_empty() {
@@ -251,9 +257,12 @@ impl ToFigure for Machine {
             Some(kind) => motion_name(&self.names, kind, dof, Some(drawn)),
             None => format!("{}{}", motion_letter(drawn), dof + 1),
         };
-        let force = |dof: usize| match self.names.force.is_empty() {
-            true => format!("F{}", dof + 1),
-            false => self.names.force_name(dof),
+        let force = |dof: usize| {
+            if self.names.force.is_empty() {
+                format!("F{}", dof + 1)
+            } else {
+                self.names.force_name(dof)
+            }
         };
         let names = Names { displacement: &displacement, force: &force };
         modal::figure(&self.name, self.system(), names, &resonances, style)

@@ -1,4 +1,4 @@
-//! The receptance of a machine around its modes.
+//! Receptance of a system around its modes.
 
 use std::f64::consts::TAU;
 
@@ -11,44 +11,45 @@ use super::style::{FigureStyle, FrequencyScale, derivative, per_force};
 use super::trace::Trace;
 use crate::ReportError;
 
-/// Number of degrees of freedom up to which every pair of motion and force is drawn, of more the driving
-/// points.
+/// Maximum number of degrees of freedom for which every pair of response and force is drawn; with
+/// more, only the driving points are.
 const PAIRS: usize = 2;
 
-/// Driving points drawn at most: curves have so many colours.
+/// Maximum number of driving points that are drawn: the number of colours of curves.
 const DRIVING_POINTS: usize = 6;
 
-/// The picture reaches from the lowest natural frequency over this to the highest times this.
+/// Ratio of the ends of the frequency range to the lowest and the highest natural frequency.
 const BEYOND: f64 = 5.0;
 
-/// Points on the whole axis.
+/// Number of points on the whole axis.
 const COARSE: usize = 600;
 
-/// Points on either side of a mode.
+/// Number of additional points on either side of a mode.
 const BESIDE: u32 = 40;
 
-/// Widths of a resonance from its middle that the points beside it begin and end at. At the middle
-/// itself a machine without damping has no receptance.
+/// Distances from a resonance, in widths of its peak, at which the additional points begin and end.
+/// At the resonance itself, an undamped system has no receptance.
 const BESIDE_WIDTHS: (f64, f64) = (0.05, 20.0);
 
-/// Damping ratio that a resonance counts as having at least: one still sharper is cut off at 1e5
-/// times what it would be without resonance.
+/// Minimum damping ratio for the width of a peak: a sharper resonance is truncated at 1e5 times the
+/// response without resonance.
 const SHARPEST: f64 = 1e-4;
 
-/// A natural frequency below this part of the highest is zero.
+/// Maximum ratio, to the highest natural frequency, of a natural frequency that counts as zero.
 const ROUNDING: f64 = 1e-7;
 
-/// Natural frequencies that a legend tells of by their values.
+/// Maximum number of natural frequencies whose values are listed in the legend.
 const LISTED: usize = 3;
 
 /// A natural frequency, in Hz, with its damping ratio.
 pub type Resonance = (f64, f64);
 
-/// Magnitude above phase, a curve for each pair of motion and force, with the natural frequencies.
+/// Returns magnitude above phase, with a curve for each pair of response and force, and the natural
+/// frequencies.
 ///
 /// # Errors
-/// [`ReportError::NothingResonates`] if the machine has no natural frequency other than zero, and what
-/// makes a receptance impossible.
+/// [`ReportError::NothingResonates`] if all natural frequencies of the system are zero, and errors
+/// of the receptance.
 pub fn figure(
     file: &str,
     system: &SecondOrderSystem,
@@ -56,7 +57,7 @@ pub fn figure(
     modes: &[Resonance],
     style: FigureStyle,
 ) -> Result<Figure, ReportError> {
-    // A free machine moves at 0 Hz, too, to rounding, where no logarithmic axis reaches.
+    // Rigid-body modes are at 0 Hz up to rounding, and a logarithmic axis cannot show them.
     let highest = modes.iter().map(|(hz, _)| *hz).fold(0.0, f64::max);
     let resonates = |(hz, _): &Resonance| *hz > ROUNDING * highest;
     let modes: Vec<Resonance> = modes.iter().copied().filter(resonates).collect();
@@ -74,7 +75,7 @@ pub fn figure(
         let responses = omega.iter().zip(&receptances);
         Trace::line(style, name, responses.map(|(w, h)| (*w, h[(i, j)] * derivative(shown, *w))))
     });
-    // What no force moves has nothing that a logarithmic axis could show.
+    // A response that no force excites is zero, and a logarithmic axis cannot show it.
     let traces: Vec<Trace> = traces.filter(|trace| !trace.is_empty()).collect();
     let title = match system.dof() {
         dof if dof > DRIVING_POINTS => {
@@ -87,22 +88,26 @@ pub fn figure(
     Ok(drawn.mark_x(&label(&natural), &natural))
 }
 
-/// Returns motion, force, and the name of each curve.
+/// Returns response, force, and name of each curve.
 fn pairs(system: &SecondOrderSystem, names: Names<'_>) -> Vec<(usize, usize, String)> {
     let dof = system.dof();
     let name = |i: usize, j: usize| names.pair(i, j);
     if dof > PAIRS {
         return (0..dof.min(DRIVING_POINTS)).map(|i| (i, i, name(i, i))).collect();
     }
-    // By reciprocity motion and place of the force can be exchanged.
+    // Response and force can be exchanged by reciprocity.
     let reciprocal = [system.mass(), system.damping(), system.stiffness()]
         .into_iter()
         .all(|matrix| *matrix == matrix.transpose());
-    let all = (0..dof).flat_map(|i| (0..dof).map(move |j| (i, j)));
-    all.filter(|(i, j)| !reciprocal || i <= j)
-        .map(|(i, j)| match reciprocal && i != j {
-            true => (i, j, format!("{} = {}", name(i, j), name(j, i))),
-            false => (i, j, name(i, j)),
+    let all_pairs = (0..dof).flat_map(|i| (0..dof).map(move |j| (i, j)));
+    all_pairs
+        .filter(|(i, j)| !reciprocal || i <= j)
+        .map(|(i, j)| {
+            if reciprocal && i != j {
+                (i, j, format!("{} = {}", name(i, j), name(j, i)))
+            } else {
+                (i, j, name(i, j))
+            }
         })
         .collect()
 }
@@ -116,7 +121,8 @@ fn label(natural: &[f64]) -> String {
     }
 }
 
-/// Frequencies, in Hz, from below the modes to above them, closer together at a resonance.
+/// Returns frequencies, in Hz, from below to above the modes, with smaller distances near a
+/// resonance.
 fn grid(modes: &[Resonance]) -> Vec<f64> {
     let lowest = modes.iter().map(|(hz, _)| *hz).fold(f64::INFINITY, f64::min) / BEYOND;
     let highest = modes.iter().map(|(hz, _)| *hz).fold(0.0, f64::max) * BEYOND;

@@ -1,4 +1,5 @@
-//! Responses over frequency, measured and explained by modes, stabilisation and mode indicator.
+//! Responses over frequency, measured and explained by modes, stabilisation diagram and mode
+//! indicator.
 
 use mechid_analysis::Modes;
 use mechid_analysis::modes::{ModeIndicator, StabilisationRows};
@@ -7,11 +8,11 @@ use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 use crate::ReportError;
 
-/// Points that a curve shows at most: more than it has dots.
+/// Maximum number of points of a curve; a panel cannot show more.
 const SHOWN: usize = 4000;
 
-/// Draws the root of the sum over all responses, each over its RMS in the band: measured, explained,
-/// and the difference; below it the stabilisation diagram and the mode indicator.
+/// Draws the root of the sum over all responses, each divided by its RMS in the band: measured,
+/// explained, and the difference; below it the stabilisation diagram and the mode indicator.
 ///
 /// # Errors
 /// [`ReportError`] if the diagrams cannot be computed or drawn.
@@ -32,7 +33,7 @@ pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
     Ok(figure.share_x().mark_x("natural frequencies", &natural))
 }
 
-/// Returns every value that is shown of many.
+/// Returns every k-th value, so that few enough remain to be shown.
 fn thinned(values: &[f64]) -> Vec<f64> {
     values.iter().copied().step_by(values.len().div_ceil(SHOWN).max(1)).collect()
 }
@@ -52,8 +53,8 @@ fn responses(modes: &Modes) -> Panel {
         .curve(curve("difference", &spectrum.residual))
 }
 
-/// Draws the poles of models of rising order over the sum of the responses (frequencies, in Hz, and
-/// magnitudes), whose logarithm is scaled to the height of the diagram; `None` without poles.
+/// Draws the poles of models of increasing order over the sum of the responses (frequencies, in Hz,
+/// and magnitudes), whose logarithm is scaled to the height of the diagram; `None` without poles.
 ///
 /// # Source
 /// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal

@@ -1,21 +1,22 @@
-//! Measured and computed motion over time, and what is left.
+//! Measured and computed responses over time, and their difference.
 
 use mechid_analysis::identify::prediction::Compared;
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
-/// Samples that a picture shows at most: more than it has dots.
+/// Maximum number of samples that are drawn; a panel cannot show more.
 const SHOWN: usize = 4000;
 
-/// The first kind of motion, measured and computed, above the residual, for every degree of freedom;
-/// `computed` says how, such as predicted.
+/// Returns the responses of the first kind, measured and computed, above the residual, for every
+/// degree of freedom; `computed` is a word for the computed response, such as predicted.
 pub fn motion(title: &str, compared: &Compared, computed: &str) -> Figure {
     let (measured, predicted) = (&compared.measured, &compared.predicted);
     let shown = measured.len().min(SHOWN);
     let time: Vec<f64> = measured.sampling().times().take(shown).collect();
     let unit = compared.kind.unit();
-    let mut figure = Figure::new(match shown < measured.len() {
-        true => format!("{title}; the first {shown} samples"),
-        false => title.to_owned(),
+    let mut figure = Figure::new(if shown < measured.len() {
+        format!("{title}; the first {shown} samples")
+    } else {
+        title.to_owned()
     });
     for channel in 0..measured.channels() {
         let name = &compared.names[channel];

@@ -18,14 +18,14 @@ use crate::ReportError;
 /// Names of displacements and forces, by their degree of freedom counted from 0.
 #[derive(Clone, Copy)]
 pub struct Names<'a> {
-    /// Name of a displacement.
+    /// Returns the name of a displacement.
     pub displacement: &'a dyn Fn(usize) -> String,
-    /// Name of a force.
+    /// Returns the name of a force.
     pub force: &'a dyn Fn(usize) -> String,
 }
 
 impl Names<'_> {
-    /// Name of a receptance.
+    /// Returns the name of a receptance.
     pub(super) fn pair(&self, motion: usize, force: usize) -> String {
         format!("{} / {}", (self.displacement)(motion), (self.force)(force))
     }
@@ -34,21 +34,24 @@ impl Names<'_> {
 /// Number of points of a fitted curve.
 const FINE: usize = 800;
 
-/// Largest condition number of the forces of several experiments by which their responses are separated.
+/// Maximum condition number of the forces of several experiments at which their responses are
+/// separated.
 const SEPARABLE: f64 = 100.0;
 
-/// Relative difference of frequencies that are the same line of several records.
+/// Maximum relative difference of frequencies that are the same line of several records.
 const SAME_LINE: f64 = 1e-9;
 
-/// Number of degrees of freedom up to which each pair of motion and force has panels of its own.
+/// Maximum number of degrees of freedom for which each pair of response and force has separate
+/// panels.
 const GRID: usize = 8;
 
-/// Magnitude and phase of the response per unit force, x_i / F_j in the quantity that was measured or in that of the style, measured and fitted, for every pair of degrees of freedom that the
-/// records show: on the lines where F_j acts alone, and where as many records as degrees of freedom have
-/// independent forces. `None` where no line separates the forces.
+/// Returns magnitude and phase of the response per unit force, x_i / F_j in the measured quantity
+/// or in that of the style, measured and fitted, for every pair of degrees of freedom that the
+/// records determine: on the lines where F_j acts alone, and where as many records as degrees of
+/// freedom have independent forces. `None` if no line separates the forces.
 ///
-/// The panels are those of a matrix, a row for each motion and a column for each force; with more than eight
-/// degrees of freedom all pairs are drawn together.
+/// The panels form a matrix, with a row for each response and a column for each force; with more
+/// than eight degrees of freedom all pairs are drawn together.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if the system has no receptance at a line.
@@ -90,11 +93,11 @@ pub fn receptance(
     Ok(Some(figure.columns(columns).share_x().shared_legend()))
 }
 
-/// Largest number of pairs of motion and force that a page draws.
+/// Maximum number of pairs of response and force that a page draws.
 pub const DRAWN_PAIRS: usize = 128;
 
-/// The same as a figure for each pair, at most [`DRAWN_PAIRS`] of them, with the coherence of its motion below if
-/// there is one. `None` where no line separates the forces.
+/// Returns a separate figure for each pair, at most [`DRAWN_PAIRS`] of them, with the coherence of
+/// its response below if there is one. `None` if no line separates the forces.
 ///
 /// # Errors
 /// As [`receptance`].
@@ -120,7 +123,7 @@ pub fn receptance_set(
     Ok(Some(pairs.into_iter().take(DRAWN_PAIRS).map(draw).collect()))
 }
 
-/// A response, measured and fitted.
+/// Response per unit force, measured and fitted.
 struct Pair {
     motion: usize,
     name: String,
@@ -128,7 +131,8 @@ struct Pair {
     fitted: Trace,
 }
 
-/// Pairs of motion and force that the records show, motion by motion; `None` if there are none.
+/// Returns the pairs of response and force that the records determine, sorted by response; `None`
+/// if there are none.
 fn pairs(
     data: &FrequencyData,
     system: &SecondOrderSystem,
@@ -157,12 +161,12 @@ fn pairs(
             pairs.push(Pair { motion: i, name: names.pair(i, j), measured, fitted });
         }
     }
-    // Stable: the forces of a motion keep their order.
+    // The sort is stable: the forces of a response keep their order.
     pairs.sort_by_key(|pair| pair.motion);
     Ok(Some(pairs))
 }
 
-/// Measured columns of H for each force, by rising frequency.
+/// Returns the measured columns of H for each force, in rising order of frequency.
 fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
     let acting = ActingAlone::of(data);
     let separated = separated(data, &acting);
@@ -180,11 +184,11 @@ fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
     (0..data.dof()).map(of_force).collect()
 }
 
-/// One column of H at an angular frequency.
+/// One column of H, with its angular frequency.
 type Column = (f64, DVector<Complex<f64>>);
 
-/// H = X F⁻¹ at the frequencies at which as many rows as degrees of freedom have independent forces, of
-/// which not each acts alone.
+/// Returns H = X F⁻¹ at the frequencies at which as many rows as degrees of freedom have
+/// independent forces, unless each force acts alone.
 fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatrix<Complex<f64>>)> {
     let dof = data.dof();
     let mut rows: Vec<usize> = (0..data.len()).collect();
@@ -199,7 +203,7 @@ fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatri
         if group.iter().all(is_alone) {
             continue;
         }
-        // Rows are experiments: F Hᵀ = X.
+        // Rows are experiments, so the equation is F Hᵀ = X.
         let force = data.force().select_rows(group);
         let singular = singular_values(force.clone());
         if singular.is_ok_and(|s| s.max() <= SEPARABLE * s.min())
@@ -211,7 +215,7 @@ fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatri
     receptances
 }
 
-/// Amplitude of each displacement, measured and predicted from the measured forces.
+/// Returns the amplitude of each displacement, measured and predicted from the measured forces.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if the system has no receptance at a line.
@@ -232,7 +236,7 @@ pub fn responses(
     }
     let mut figure = Figure::new(title);
     for channel in 0..data.dof() {
-        // A logarithmic axis shows nothing of no magnitude.
+        // A logarithmic axis cannot show zero.
         let points = |label: &str, size: &dyn Fn(usize) -> f64| {
             let shown: Vec<usize> = (0..data.len()).filter(|row| size(*row) > 0.0).collect();
             let x: Vec<f64> = shown.iter().map(|row| frequency_hz[*row]).collect();
@@ -254,7 +258,7 @@ pub fn responses(
     Ok(figure.share_x())
 }
 
-/// Coherence of each motion, of the name that `name` has for it, with all forces.
+/// Returns the coherence of each response with all forces; `name` returns the name of a response.
 pub fn coherence(
     measured: &ResponseCoherence,
     name: &dyn Fn(usize) -> String,
@@ -262,7 +266,7 @@ pub fn coherence(
 ) -> Panel {
     let axis = style.frequency_axis(FrequencyScale::Linear);
     let mut panel = Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0));
-    // 0 Hz has no place on a logarithmic axis.
+    // A logarithmic axis cannot show 0 Hz.
     let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
     let motions = measured.values.ncols();
     for (at, values) in measured.values.column_iter().enumerate() {
@@ -273,7 +277,7 @@ pub fn coherence(
     panel
 }
 
-/// Coherence of one motion with all forces.
+/// Returns the coherence of one response with all forces.
 fn coherence_of(measured: &ResponseCoherence, motion: usize, style: FigureStyle) -> Panel {
     let axis = style.frequency_axis(FrequencyScale::Linear);
     let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
@@ -286,10 +290,10 @@ fn coherence_of(measured: &ResponseCoherence, motion: usize, style: FigureStyle)
     ))
 }
 
-/// Reason for a figure of responses instead of receptances.
+/// Note on a figure that shows responses instead of receptances.
 pub const WHY: &str = "one record does not separate forces that act at once";
 
-/// Frequencies of a fitted curve, fewer of them where there are many curves.
+/// Returns the frequencies of a fitted curve, fewer of them if there are many curves.
 fn fine_grid(omega: &[f64], curves: usize) -> Vec<f64> {
     let points = (FINE * 16 / curves.max(16)).max(FINE / 4);
     let low = omega.iter().copied().fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Columns over time beside their spectra.
+//! Columns over time, with their spectra.
 
 use mechid_analysis::Inspected;
 use mechid_analysis::inspect::Drawn;
@@ -7,17 +7,16 @@ use mechid_signal::message;
 
 use crate::ReportError;
 
-/// The axis of the amplitudes reaches down to no less than this part of the strongest: below it is
-/// rounding.
+/// Smallest amplitude on the axis, relative to the largest: below it is rounding.
 const FAINTEST: f64 = 1e-5;
 
-/// It reaches down to at least this part.
+/// Largest lower end of the axis, relative to the largest amplitude.
 const REACH: f64 = 1e-2;
 
-/// Characters of a title that have room above a panel.
+/// Maximum number of characters of a title above a panel.
 const ROOM: usize = 40;
 
-/// Returns a row of panels for each column: all of the window on the left, amplitudes on the right.
+/// Returns a row of panels for each column: the whole window on the left, amplitudes on the right.
 ///
 /// # Errors
 /// [`ReportError::NoColumnToDraw`].
@@ -69,7 +68,7 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     };
     let period = column.lines.period();
     if period.is_some() {
-        // A stem of rounding has no length; a line goes on below the axis.
+        // A stem below the axis is not visible, whereas a line continues below it.
         points.retain(|(_, amplitude)| *amplitude > low);
     }
     let (hz, amplitude): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
@@ -97,8 +96,9 @@ fn unit(column: &Drawn) -> &str {
 }
 
 fn shortened(name: &str) -> String {
-    match name.chars().count() <= ROOM {
-        true => name.to_owned(),
-        false => name.chars().take(ROOM - 1).chain(['…']).collect(),
+    if name.chars().count() <= ROOM {
+        name.to_owned()
+    } else {
+        name.chars().take(ROOM - 1).chain(['…']).collect()
     }
 }

@@ -1,5 +1,5 @@
-//! Restoring force of a machine with nonlinear terms: its surface, its springs and dampers, and what they
-//! leave.
+//! Restoring force of a system with nonlinear terms: its surface, its springs and dampers, and the
+//! residual.
 
 use mechid_analysis::identify::WithTerms;
 use mechid_analysis::identify::rows::CONFIDENCE;
@@ -8,21 +8,21 @@ use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 use crate::ReportError;
 
-/// Points of the surface that a picture shows at most.
+/// Maximum number of points of the surface that are drawn.
 const SHOWN: usize = 2000;
 
-/// Ranges of force that the points of a surface are told apart by.
+/// Number of ranges of force, each with its own colour.
 const LEVELS: usize = 6;
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 81;
 
-/// Multiple of the largest displacement and velocity in the data that curves reach to.
+/// Range of the curves, as a multiple of the largest displacement and velocity in the data.
 const REACH: f64 = 1.2;
 
-/// Returns four panels for each degree of freedom: the measured points of the surface over displacement and
-/// velocity; spring and damper with their confidence intervals, beside the points less the rest of
-/// the model; the residual over the displacement.
+/// Returns four panels for each degree of freedom: the measured points of the surface over
+/// displacement and velocity; spring and damper with their confidence intervals, and the measured
+/// points minus the rest of the model; the residual over the displacement.
 ///
 /// # Errors
 /// [`ReportError::Estimate`] if an interval cannot be computed.
@@ -58,7 +58,7 @@ pub fn figure(title: &str, fitted: &WithTerms) -> Result<Figure, ReportError> {
     Ok(figure)
 }
 
-/// Points over displacement and velocity, by the range their force lies in.
+/// Returns the points over displacement and velocity, grouped by ranges of force.
 fn levels(x: &[f64], v: &[f64], force: &[f64]) -> Vec<Curve> {
     let low = force.iter().copied().fold(f64::INFINITY, f64::min);
     let step = (force.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low) / LEVELS as f64;
@@ -73,8 +73,9 @@ fn levels(x: &[f64], v: &[f64], force: &[f64]) -> Vec<Curve> {
     (0..LEVELS).filter_map(of_level).collect()
 }
 
-/// Force of the springs over the displacement, or of the dampers over the velocity, of one degree of
-/// freedom with the others at rest; points are the model and its residual at each sample.
+/// Returns the force of the springs over the displacement, or of the dampers over the velocity, for
+/// one degree of freedom while the others are at rest; points are the model plus its residual at
+/// each sample.
 fn side(
     fitted: &WithTerms,
     dof: usize,
@@ -86,18 +87,19 @@ fn side(
     let force = |value: f64| {
         let mut moved = vec![0.0; dofs];
         moved[dof] = value;
-        let rest = vec![0.0; dofs];
-        let [x, v] = if spring { [&moved, &rest] } else { [&rest, &moved] };
-        let found = fitted.estimate.restoring_force(x, v)?[dof];
-        Ok::<_, ReportError>((found.value, found.interval(CONFIDENCE)?))
+        let at_rest = vec![0.0; dofs];
+        let [x, v] = if spring { [&moved, &at_rest] } else { [&at_rest, &moved] };
+        let fitted_force = fitted.estimate.restoring_force(x, v)?[dof];
+        Ok::<_, ReportError>((fitted_force.value, fitted_force.interval(CONFIDENCE)?))
     };
     let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let grid: Vec<f64> = (0..POINTS)
         .map(|k| REACH * largest * (2.0 * k as f64 / (POINTS - 1) as f64 - 1.0))
         .collect();
-    let found: Vec<(f64, [f64; 2])> = grid.iter().map(|at| force(*at)).collect::<Result<_, _>>()?;
-    let curve: Vec<f64> = found.iter().map(|(value, _)| *value).collect();
-    let bound = |end: usize| found.iter().map(|(_, interval)| interval[end]).collect::<Vec<_>>();
+    let forces: Vec<(f64, [f64; 2])> =
+        grid.iter().map(|at| force(*at)).collect::<Result<_, _>>()?;
+    let curve: Vec<f64> = forces.iter().map(|(value, _)| *value).collect();
+    let bound = |end: usize| forces.iter().map(|(_, interval)| interval[end]).collect::<Vec<_>>();
     let measured: Vec<f64> = values
         .iter()
         .zip(residual)

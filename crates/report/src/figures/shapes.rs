@@ -1,4 +1,4 @@
-//! Shapes of modes on the points of a structure: deflected lines and likeness of the shapes.
+//! Mode shapes on the points of a structure: deflected lines and the modal assurance criterion.
 
 use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::text::{compact, significant};
@@ -9,16 +9,16 @@ use nalgebra::Complex;
 /// Modes with their shapes at the points of a structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeShapes {
-    /// The points, and the lines between them.
+    /// Points and the lines between them.
     pub geometry: Geometry,
-    /// The modes, by rising frequency; each with a displacement for every point.
+    /// Modes in rising order of frequency; each has a displacement for every point.
     pub modes: Vec<PointShape>,
 }
 
 impl ModeShapes {
-    /// Gathers identified modes whose entries have these names, such as `1+Z`, on a geometry; without one, on a
-    /// row or a grid of points by their names. `None` without modes that oscillate, for fewer than two entries, and
-    /// where an entry has no point.
+    /// Combines identified modes whose entries have these names, such as `1+Z`, with a geometry;
+    /// without a geometry, with a row or a grid of points from their names. `None` without
+    /// oscillating modes, with fewer than two entries, and if an entry has no point.
     pub fn from_modes(
         modes: &[ShapedMode],
         names: &[String],
@@ -41,7 +41,8 @@ impl ModeShapes {
         (!modes.is_empty() && names.len() > 1).then_some(Self { geometry, modes })
     }
 
-    /// Draws the first mode over the undeformed lines, and every mode small, for the script that animates them.
+    /// Draws the first mode on the undeformed lines, and small drawings of all modes, for the
+    /// script that animates them.
     pub fn draw(&self, label: &str) -> DrawnSet {
         let points = self.geometry.points.iter();
         let mode = |(number, mode): (usize, &PointShape)| DrawnMode {
@@ -62,10 +63,11 @@ impl ModeShapes {
     }
 
     /// Returns the modal assurance criterion of each pair of modes, a square matrix of pure
-    /// numbers: 1 for the same shape, 0 for orthogonal ones.
+    /// numbers: 1 for the same shape, 0 for orthogonal shapes.
     ///
     /// # Source
-    /// R. J. Allemang and D. L. Brown, "A correlation coefficient for modal vector analysis", IMAC 1 (1982).
+    /// R. J. Allemang and D. L. Brown, "A correlation coefficient for modal vector analysis", IMAC
+    /// 1 (1982).
     pub fn assurance(&self) -> Vec<Vec<f64>> {
         let entries = |mode: &PointShape| -> Vec<Complex<f64>> {
             mode.displacement.iter().flatten().map(|[re, im]| Complex::new(*re, *im)).collect()

@@ -1,11 +1,11 @@
-//! Look of frequency responses.
+//! Style of frequency responses.
 
 use mechid_model::ResponseQuantity;
 use mechid_plot::Axis;
 use mechid_plot::charts::Quantity;
 use nalgebra::Complex;
 
-/// Look of the frequency responses in a figure.
+/// Style of the frequency responses in a figure.
 ///
 /// ```
 /// use mechid_report::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
@@ -22,16 +22,16 @@ use nalgebra::Complex;
 pub struct FigureStyle {
     /// Branch of the phase.
     pub phase: PhaseStyle,
-    /// Frequency axis; `None`: logarithmic for a machine over its whole range, linear over a band.
+    /// Frequency axis; `None`: logarithmic for a system over its whole range, linear over a band.
     pub frequency: Option<FrequencyScale>,
     /// Magnitude axis.
     pub magnitude: MagnitudeScale,
-    /// Response per unit force: receptance, mobility or accelerance; `None`: as it was measured, receptance
-    /// of a machine.
+    /// Response per unit force: receptance, mobility or accelerance; `None`: the measured one, and
+    /// the receptance for a system.
     pub quantity: Option<ResponseQuantity>,
 }
 
-/// Name and unit of the response per unit force.
+/// Returns name and unit of the response per unit force.
 pub(super) fn per_force(quantity: ResponseQuantity) -> Quantity<'static> {
     match quantity {
         ResponseQuantity::Displacement => Quantity::new("Receptance", "m/N"),
@@ -40,7 +40,8 @@ pub(super) fn per_force(quantity: ResponseQuantity) -> Quantity<'static> {
     }
 }
 
-/// Returns (iω)ᵈ, which turns a receptance into the response per unit force of the d-th derivative.
+/// Returns (iω)ᵈ, which converts a receptance to the response per unit force of the d-th
+/// derivative.
 pub(super) fn derivative(quantity: ResponseQuantity, omega: f64) -> Complex<f64> {
     let order = match quantity {
         ResponseQuantity::Displacement => 0,
@@ -56,7 +57,7 @@ pub enum PhaseStyle {
     /// Phase between −180° and 180°; a line breaks where it jumps.
     #[default]
     Wrapped,
-    /// Phase without jumps, from the lowest frequency on.
+    /// Phase without jumps, unwrapped from the lowest frequency.
     Continuous,
 }
 

@@ -8,7 +8,7 @@ use nalgebra::Complex;
 
 use super::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 
-/// A curve before it is drawn.
+/// Curve of a frequency response before it is drawn.
 pub struct Trace {
     name: String,
     frequency_hz: Vec<f64>,
@@ -17,11 +17,11 @@ pub struct Trace {
     standard_error: Vec<f64>,
 }
 
-/// Difference of angles, in degrees, that is rounding.
+/// Maximum difference, in degrees, of two angles that are equal up to rounding.
 const ALIKE: f64 = 1e-6;
 
-/// Returns an angle of ±180°, to rounding, with the sign of the one before, or −180°: a machine without
-/// damping must not jump to and fro.
+/// Returns an angle, where ±180° (up to rounding) gets the sign of the previous angle, or −180°
+/// without one: otherwise the phase of an undamped system could alternate.
 fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     match angle.abs() > 180.0 - ALIKE {
         true if previous.is_some_and(|previous| previous > 90.0) => 180.0,
@@ -30,8 +30,8 @@ fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
     }
 }
 
-/// The angle on the branch next to another one, both in degrees. Of two that are as near, as there
-/// are where a machine without damping turns over, the smaller one, or −180° of ±180°.
+/// Returns an angle on the branch nearest to another angle, both in degrees. If two are equally
+/// near, as at a resonance of an undamped system, returns the smaller one, and −180° for ±180°.
 fn next_to(other: f64, angle: f64) -> f64 {
     let near = angle - 360.0 * ((angle - other) / 360.0).round();
     let beyond = near - (near - other).signum() * 360.0;
@@ -42,7 +42,7 @@ fn next_to(other: f64, angle: f64) -> f64 {
 }
 
 impl Trace {
-    /// Makes the curve of points (ω, H).
+    /// Creates the curve of points (ω, H).
     pub fn line(
         style: FigureStyle,
         name: String,
@@ -55,7 +55,7 @@ impl Trace {
         })
     }
 
-    /// Makes the points (ω, H), with continuous phases on the branch next to those of a curve.
+    /// Creates points (ω, H), with continuous phases on the branch of another curve.
     pub fn beside(
         style: FigureStyle,
         curve: &Self,
@@ -70,7 +70,8 @@ impl Trace {
     }
 
     /// Returns the curve with standard errors of its magnitudes, one for each drawn point, in the
-    /// unit of the magnitudes; without them in decibels, and where one is not a number.
+    /// unit of the magnitudes; magnitudes in decibels get none, nor does a curve with an undefined
+    /// error.
     pub fn standard_error(mut self, style: FigureStyle, errors: Vec<f64>) -> Self {
         let is_whole = errors.len() == self.magnitude.len();
         let is_known = is_whole && errors.iter().all(|error| error.is_finite());
@@ -86,7 +87,7 @@ impl Trace {
         h.norm() > 0.0 && (!positive || omega > 0.0)
     }
 
-    /// Points of no magnitude, and those at 0 Hz on a logarithmic axis, cannot be drawn and are left out.
+    /// Leaves out points that an axis cannot show: zero magnitudes, and 0 Hz on a logarithmic axis.
     fn with_phase(
         style: FigureStyle,
         name: String,
@@ -115,18 +116,18 @@ impl Trace {
         trace
     }
 
-    /// Returns the curve with more behind its name.
+    /// Returns the curve with `more` appended to its name.
     pub fn suffixed(mut self, more: &str) -> Self {
         self.name += more;
         self
     }
 
-    /// Returns whether there is no point.
+    /// Returns whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.magnitude.is_empty()
     }
 
-    /// Returns the curve as a chart takes it.
+    /// Returns the curve in the form that a chart needs.
     pub fn as_response(&self) -> FrequencyResponse<'_> {
         FrequencyResponse {
             name: &self.name,

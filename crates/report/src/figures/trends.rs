@@ -4,16 +4,17 @@ use mechid_analysis::fleet::{TrendAxis, TrendPoint, TrendSeries, Trends};
 use mechid_analysis::text::significant;
 use mechid_plot::{Axis, Color, Curve, Figure, Marker, Panel, Reference};
 
-/// Number of points of a series that are drawn; of more, every other one or fewer, but every outlier.
+/// Maximum number of points of a series that are drawn; of a longer one, every k-th, and every
+/// outlier.
 pub const DRAWN: usize = 1000;
 
-/// All series below one another.
+/// Returns all series, one below the other.
 pub fn figure(trends: &Trends) -> Figure {
     let panels = trends.series.iter().map(|series| panel(series, trends.over));
     panels.fold(Figure::new("Results of many records"), Figure::panel).share_x()
 }
 
-/// One series: values with 95 % intervals, outliers in a colour of their own, and the median.
+/// Returns one series: values with 95 % intervals, outliers in another colour, and the median.
 pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     let x = match over {
         TrendAxis::Order => "Record",
@@ -70,18 +71,19 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     panel.y(axis)
 }
 
-/// Distance from the edge of an outlier beyond it, as a part of the axis.
+/// Distance from the edge of the axis at which outliers beyond it are drawn, as a fraction of the
+/// axis.
 const EDGE: f64 = 0.04;
 
-/// Margin of an axis, as a part of it.
+/// Margin of an axis, as a fraction of it.
 const MARGIN: f64 = 0.08;
 
-/// Range of the ordinate: that of the values that are no outliers, so that one outlier does not hide the others, and
-/// of the median.
+/// Returns the range of the ordinate: of the values without outliers, so that an outlier does not
+/// hide the others, and of the median.
 fn range(series: &TrendSeries, usual: &[&TrendPoint]) -> (f64, f64) {
     let ends = usual.iter().flat_map(|point| match point.interval {
         Some([low, high]) => {
-            // An interval without bound would hide the values.
+            // An infinite interval would hide the values, so its length is limited.
             let most = 4.0 * series.spread;
             [low.max(point.value - most), high.min(point.value + most)]
         }
@@ -90,16 +92,14 @@ fn range(series: &TrendSeries, usual: &[&TrendPoint]) -> (f64, f64) {
     let (low, high) = ends
         .chain([series.median])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-    match high > low {
-        true => (low - MARGIN * (high - low), high + MARGIN * (high - low)),
-        false => (
-            low - 0.05 * low.abs() - f64::MIN_POSITIVE,
-            high + 0.05 * high.abs() + f64::MIN_POSITIVE,
-        ),
+    if high > low {
+        (low - MARGIN * (high - low), high + MARGIN * (high - low))
+    } else {
+        (low - 0.05 * low.abs() - f64::MIN_POSITIVE, high + 0.05 * high.abs() + f64::MIN_POSITIVE)
     }
 }
 
-/// Record and value of a point in words.
+/// Returns record and value of a point as text.
 fn note(series: &TrendSeries, point: &TrendPoint) -> String {
     format!("{}: {} {}", point.record, significant(point.value, 6), series.unit)
 }

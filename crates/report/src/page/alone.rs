@@ -1,4 +1,4 @@
-//! Pages of figures alone, without an identification around them.
+//! Pages of figures without an identification.
 
 use maud::{DOCTYPE, html};
 use mechid_plot::{Figure, matrix_of_squares};
@@ -8,7 +8,7 @@ use super::{figure, figure_script, head};
 use crate::ReportError;
 use crate::figures::shapes::ModeShapes;
 
-/// Caption of deflected lines.
+/// Caption of the mode shapes.
 pub(super) const SHAPES: &str = "Mode shapes: lines of the largest deflection over those at rest; of a complex mode \
                                  the points do not reach theirs together.";
 
@@ -16,8 +16,8 @@ pub(super) const SHAPES: &str = "Mode shapes: lines of the largest deflection ov
 pub(super) const LIKENESS: &str = "Likeness of the mode shapes (modal assurance criterion): 1 for the same shape, \
                                    0 for orthogonal ones.";
 
-/// Returns a page of one figure or of several to choose from, by their names, and of mode shapes if there are any: HTML that
-/// loads nothing and runs nothing but the script of its figures.
+/// Returns a page of named figures, with a choice if there are several, and of mode shapes if there
+/// are any: HTML that loads no other file and runs only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] without a figure, or if one cannot be drawn.
@@ -48,7 +48,7 @@ pub fn figure_page(
     Ok(page.into_string() + "\n")
 }
 
-/// Deflected lines and the likeness of the shapes.
+/// Returns the deflected lines and the modal assurance criterion of the shapes.
 pub(super) fn shape_figures(shapes: &ModeShapes) -> [Drawn; 2] {
     let drawn = shapes.draw(SHAPES);
     let matrix = matrix_of_squares(&shapes.assurance(), LIKENESS);

@@ -5,7 +5,7 @@ use mechid_analysis::identify::checks::{CheckRow, When};
 
 use super::Contents;
 
-/// Checks before or after the fit, with their verdicts.
+/// Returns the checks before or after the fit, with their verdicts.
 pub fn list(contents: &Contents<'_>, when: When) -> Markup {
     let checks: Vec<&CheckRow> = contents
         .review

@@ -1,4 +1,4 @@
-//! The pictures of the report.
+//! Figures of the report.
 
 use mechid_analysis::AnalysisError;
 use mechid_analysis::identify::Identified;
@@ -21,27 +21,27 @@ use crate::figures::receptance::{self as picture, Names};
 use crate::figures::shapes::ModeShapes;
 use crate::figures::{displacement_name, restoring as surface};
 
-/// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
-/// one can still be read.
+/// Width of a figure, px: a screen shows two in a row, and the numbers of one are legible on a
+/// telephone.
 const WIDTH: f64 = 480.0;
 
-/// Width of a figure that has a row to itself, px.
+/// Width of a figure that fills a row, px.
 const WIDE: f64 = 760.0;
 
-/// Height of a panel with its labels, px, the first of a figure and any other.
+/// Height of a panel with its labels, px: of the first panel in a figure and of any other.
 const PANEL: [f64; 2] = [190.0, 150.0];
 
-/// The same of a figure that has a row to itself.
+/// Heights for a figure that fills a row, px.
 const WIDE_PANEL: [f64; 2] = [300.0, 180.0];
 
-/// Number of figures of a set above which the set has a row to itself.
+/// Maximum number of figures of a set that is drawn at the smaller width.
 pub(super) const BESIDE: usize = 4;
 
-/// A picture with its words.
+/// Figure with its caption.
 pub(crate) struct Drawn {
     pub id: String,
     pub svg: String,
-    /// Name and small drawing of each figure to choose from; empty if there is one.
+    /// Name and small drawing of each figure, to choose one; empty for a single figure.
     pub map: Vec<(String, String)>,
     pub caption: String,
 }
@@ -50,7 +50,7 @@ pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn
     drawn_set(id, vec![(String::new(), figure)], caption)
 }
 
-/// Figures of which the page shows one large and all small.
+/// Draws a set; the page shows one figure large and all figures small.
 pub(super) fn drawn_set(
     id: String,
     members: Vec<(String, Figure)>,
@@ -60,7 +60,7 @@ pub(super) fn drawn_set(
     let is_alone = members.len() == 1;
     let sized = members.into_iter().map(|(name, figure)| {
         let panels = figure.panels();
-        // Many curves have a legend of several rows.
+        // The legend of many curves needs several rows.
         let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
         let [first, other] = if width > WIDTH { WIDE_PANEL } else { PANEL };
         let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
@@ -76,8 +76,8 @@ fn times(record: &Record) -> Vec<f64> {
     record.sampling().times().collect()
 }
 
-/// Time history of the window above the amplitudes of its mean period, of each channel, by its name and
-/// unit; `held` are the samples to draw where these are all.
+/// Draws the time history of the window above the amplitudes of its mean period, for each channel,
+/// by its name and unit; `held` are the samples to draw if the data have all of them.
 fn history(
     (name, unit): (&dyn Fn(usize) -> String, &str),
     (held, whole): (&Record, &Gathered),
@@ -100,7 +100,7 @@ fn history(
     channels.iter().map(of_channel).collect()
 }
 
-/// A thin line over the thick one that it should hide.
+/// Returns a thin line on top of a thick one, which it hides if they agree.
 fn overlay(t: &[f64], measured: &[f64], name: &str, modelled: &[f64]) -> [Curve; 2] {
     [
         Curve::line("measured", t, measured).color(Color::GREY).width(2.6),
@@ -108,7 +108,7 @@ fn overlay(t: &[f64], measured: &[f64], name: &str, modelled: &[f64]) -> [Curve;
     ]
 }
 
-/// Time histories and spectra of force and motion.
+/// Draws time histories and spectra of force and response.
 pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
     let (held, period) = (part.held(), part.period());
     let (motion, kind) = held.response();
@@ -122,7 +122,7 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
             }
         },
     };
-    let all: Vec<usize> = (0..motion.channels()).collect();
+    let all_channels: Vec<usize> = (0..motion.channels()).collect();
     let of_force = (&held.force, &part.whole.force);
     let of_motion = (motion, &part.whole.motions[0]);
     Ok(vec![
@@ -142,15 +142,15 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
                 (&|dof| held.names.response_name(kind, dof), kind.unit()),
                 of_motion,
                 period.response().0,
-                &all,
+                &all_channels,
             ),
             format!("Measured {kind}: time history of the window, and line amplitudes of {of}."),
         )?,
     ])
 }
 
-/// Measured and identified receptance; where no line separates the forces, measured and predicted
-/// response.
+/// Draws measured and identified receptance; if no line separates the forces, measured and
+/// predicted response.
 ///
 /// # Errors
 /// [`ReportError::NothingToDraw`].
@@ -202,18 +202,19 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
     drawn("receptance".into(), figure, caption)
 }
 
-/// Measured and modelled motion with what is left, over one period or the whole open record.
+/// Draws measured and modelled response with the residual, over one period or the whole open
+/// record.
 pub fn fit(part: &RecordReview<'_>, compared: &Compared) -> Result<Drawn, ReportError> {
-    let held = part.held();
-    let extent = extent(held);
+    let block = part.held();
+    let extent = extent(block);
     let caption = format!(
         "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
         compared.kind
     );
-    over_time(part.id("fit"), compared, shown(held), caption)
+    over_time(part.id("fit"), compared, shown(block), caption)
 }
 
-/// The same of a record that was not fitted.
+/// Draws the same for a record that was not fitted.
 pub fn validation(source: &Block, compared: &Compared) -> Result<Drawn, ReportError> {
     let extent = extent(source);
     let caption = format!(
@@ -223,7 +224,7 @@ pub fn validation(source: &Block, compared: &Compared) -> Result<Drawn, ReportEr
     over_time("validation".into(), compared, shown(source), caption)
 }
 
-/// Samples of a motion in time that are drawn.
+/// Returns the number of samples of a response that are drawn.
 fn shown(source: &Block) -> usize {
     source.period.min(source.force.len())
 }
@@ -237,7 +238,7 @@ fn extent(source: &Block) -> String {
     }
 }
 
-/// The first samples of a motion, measured and modelled, above their difference.
+/// Draws the first samples of a response, measured and modelled, above their difference.
 fn over_time(
     id: String,
     compared: &Compared,
@@ -256,14 +257,14 @@ fn over_time(
         let both = Panel::new(time(), Axis::linear(name, unit))
             .curves(overlay(&t, x, "modelled", model))
             .legend(Legend::Above);
-        let rest = Curve::line("", &t, &residual).color(Color::VERMILION).width(1.0);
+        let residual_curve = Curve::line("", &t, &residual).color(Color::VERMILION).width(1.0);
         let below = Panel::new(time(), Axis::linear(format!("Residual of {name}"), unit));
-        (name.clone(), Figure::new("").share_x().panel(both).panel(below.curve(rest)))
+        (name.clone(), Figure::new("").share_x().panel(both).panel(below.curve(residual_curve)))
     };
     drawn_set(id, (0..measured.channels()).map(of_channel).collect(), caption)
 }
 
-/// Amplitudes of motion and residual, on the lines used or all.
+/// Draws the amplitudes of response and residual, on the lines used or all.
 pub fn residual_spectrum(
     part: &RecordReview<'_>,
     residual: &Residual,
@@ -278,7 +279,7 @@ pub fn residual_spectrum(
     let of_channel = |c: usize| {
         let points = |spectrum: &Spectrum| -> (Vec<f64>, Vec<f64>) {
             let point = |n: &usize| (spectrum.frequency_hz(*n), spectrum.line(*n, c).norm());
-            // A logarithmic axis has no place for nothing.
+            // A logarithmic axis cannot show zero.
             shown.iter().map(point).filter(|(_, amplitude)| *amplitude > 0.0).unzip()
         };
         let axis = Axis::log10(format!("Amplitude of {}", compared.names[c]), unit);
@@ -296,7 +297,7 @@ pub fn residual_spectrum(
         (0..motion.channels()).map(of_channel).collect(),
         format!(
             "{}: noise lies flat, what the model misses has the shape of a resonance or of the force.",
-            part.of_period(&format!(
+            part.period_caption(&format!(
                 "Spectra of the measured {} and of the residual",
                 compared.kind
             ))
@@ -304,18 +305,18 @@ pub fn residual_spectrum(
     )
 }
 
-/// Correlation of the residual with itself and with the forces.
+/// Draws the correlation of the residual with itself and with the forces.
 pub fn correlations(
     part: &RecordReview<'_>,
     correlations: &[Correlations],
 ) -> Result<Drawn, ReportError> {
-    let held = part.held();
-    let kind = held.response().1;
+    let block = part.held();
+    let kind = block.response().1;
     let mut members = Vec::new();
     let (mut widest, mut of_lines) = (0, false);
     for (c, channel) in correlations.iter().enumerate() {
         let mut figure = Figure::new("");
-        let residual = held.names.response_name(kind, c);
+        let residual = block.names.response_name(kind, c);
         let panel = |x: Axis, what: &str, at: &[f64], coefficients: &[f64], bound: f64| {
             Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
                 .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
@@ -333,10 +334,10 @@ pub fn correlations(
             }
             Some(OwnCorrelation::Lines(correlation)) => {
                 of_lines = true;
-                // The imaginary part stands beside the real one.
-                let place = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
+                // Real and imaginary part are drawn with a small offset.
+                let distance = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
                 let (r, bound) = (&correlation.coefficients, correlation.bound);
-                let distances: Vec<f64> = (0..r.len()).map(place).collect();
+                let distances: Vec<f64> = (0..r.len()).map(distance).collect();
                 let x = Axis::linear("Distance", "lines");
                 figure = figure.panel(panel(x, "from line to line", &distances, r, bound));
             }
@@ -346,20 +347,19 @@ pub fn correlations(
             let (r, bound) = (&correlation.coefficients, correlation.bound);
             let lag = |at: usize| (at as f64 - (r.len() / 2) as f64) * channel.lag;
             let lags: Vec<f64> = (0..r.len()).map(lag).collect();
-            let name = format!("with {}", held.names.force_name(*force));
+            let name = format!("with {}", block.names.force_name(*force));
             figure = figure.panel(panel(Axis::linear("Lag", "s"), &name, &lags, r, bound));
         }
         if !figure.panels().is_empty() {
             members.push((residual, figure));
         }
     }
-    let what = match of_lines {
-        true => "Correlation of the residual, weighted by its noise, from line to line (real and \
+    let what = if of_lines {
+        "Correlation of the residual, weighted by its noise, from line to line (real and \
                  imaginary part) and with the force"
-            .into(),
-        false => {
-            part.of_held("Autocorrelation of the residual, and its correlation with the force")
-        }
+            .into()
+    } else {
+        part.buffered_caption("Autocorrelation of the residual, and its correlation with the force")
     };
     let spanned = match widest {
         0 => String::new(),
@@ -370,8 +370,8 @@ pub fn correlations(
     drawn_set(part.id("correlations"), members, caption)
 }
 
-/// Deflected lines of the modes, and the likeness of their shapes; nothing for one degree of freedom, and where the
-/// geometry does not have the places of the channels.
+/// Draws the mode shapes and their modal assurance criterion; returns no figures for one degree of
+/// freedom, and if the geometry does not have the points of the channels.
 pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<[Drawn; 2]> {
     let report = contents.review.identified.summary();
     let dofs = contents.review.identified.estimate().dof();
@@ -381,7 +381,7 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
     Some(shape_figures(&shapes))
 }
 
-/// The restoring force of a machine with nonlinear terms, of the first record.
+/// Draws the restoring force of a system with nonlinear terms, for the first record.
 pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
     let Some(fitted) = &identified.fitted().nonlinear else { return Ok(None) };
     let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
@@ -390,7 +390,7 @@ pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> 
     drawn("restoring-force".into(), figure, caption.into()).map(Some)
 }
 
-/// The force found and the one measured.
+/// Draws the reconstructed and the measured force.
 pub fn force(
     part: &RecordReview<'_>,
     reconstruction: &Reconstruction,
@@ -419,6 +419,6 @@ pub fn force(
     drawn_set(
         part.id("reconstructed-force"),
         reconstruction.forced.iter().map(of_force).collect(),
-        part.of_period("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
+        part.period_caption("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
     )
 }

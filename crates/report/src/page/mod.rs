@@ -1,4 +1,4 @@
-//! The HTML page of an identification: one file that needs nothing else.
+//! The HTML page of an identification, in one file without dependencies.
 
 mod alone;
 mod checks;
@@ -27,11 +27,11 @@ use self::tables::Table;
 pub use self::trends::trends_page;
 use crate::ReportError;
 
-/// Inline, for the file stands alone.
+/// Style sheet, included in the page so that it needs no other file.
 const STYLE: &str = include_str!("style.css");
 
-/// Head of a page: nothing is loaded, and nothing runs but the script of the figures, whatever a name in a
-/// record says.
+/// Returns the head of a page: it loads no other file and runs only the script of the figures, even
+/// if a name in a record contains HTML.
 fn head(title: &str) -> Markup {
     html! {
         head {
@@ -46,7 +46,7 @@ fn head(title: &str) -> Markup {
     }
 }
 
-/// The script of the figures, which no text of a record is part of.
+/// Returns the script of the figures, which contains no text from a record.
 fn figure_script() -> Markup {
     html! { script { (PreEscaped(script())) } }
 }
@@ -62,18 +62,20 @@ const SECTIONS: [(&str, &str); 7] = [
     ("reconstruction", "Identified force"),
 ];
 
-/// Words of a page that the identification itself does not give.
+/// Texts of a page that are not part of the identification.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PageSettings {
     /// Heading; `None`: the name of the record.
     pub title: Option<String>,
-    /// `true` to reconstruct the force with the identified machine and compare it.
+    /// `true` to reconstruct the force with the identified system and compare it.
     pub reconstruct_force: bool,
     /// Command that writes the page again; `None`: only the saved settings are shown.
     pub command: Option<String>,
-    /// Name and value of what else is to stand on the page, such as sensors, operator, date, place and comment.
+    /// Names and values of further information on the page, such as sensors, operator, date, place
+    /// and comment.
     pub about: Vec<(String, String)>,
-    /// Places of the channels, to draw the mode shapes on; `None`: a row or a grid by their names.
+    /// Points of the channels, on which the mode shapes are drawn; `None`: a row or a grid from
+    /// their names.
     pub geometry: Option<Geometry>,
 }
 
@@ -86,8 +88,8 @@ struct Contents<'a> {
     geometry: Option<&'a Geometry>,
 }
 
-/// Returns a page with everything that an identification has to show, as HTML that loads nothing and
-/// runs nothing but the script of its figures.
+/// Returns a page with all results of an identification, as HTML that loads no other file and runs
+/// only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if a record cannot be read again or the force cannot be reconstructed,
@@ -105,17 +107,17 @@ pub fn page(identified: &Identified, settings: &PageSettings) -> Result<String, 
     })
 }
 
-/// Identifiers and captions of what is shown of a record.
+/// Identifiers and captions of the figures of a record.
 trait Captions {
     /// Returns the identifier of a figure of this record.
     fn id(&self, figure: &str) -> String;
 
-    /// Returns a caption of what is told of the samples held, with their numbers where these are not
-    /// all.
-    fn of_held(&self, caption: &str) -> String;
+    /// Returns a caption for a figure of the buffered samples, with their numbers if they are not
+    /// all samples.
+    fn buffered_caption(&self, caption: &str) -> String;
 
-    /// Returns the same for what is told of [`RecordReview::period`].
-    fn of_period(&self, caption: &str) -> String;
+    /// Returns such a caption for a figure of [`RecordReview::period`].
+    fn period_caption(&self, caption: &str) -> String;
 }
 
 impl Captions for RecordReview<'_> {
@@ -126,17 +128,17 @@ impl Captions for RecordReview<'_> {
         }
     }
 
-    fn of_held(&self, caption: &str) -> String {
+    fn buffered_caption(&self, caption: &str) -> String {
         match self.held().held_to() {
             Some(last) => format!("{caption}, samples {} to {last}", self.held().first_sample),
             None => caption.into(),
         }
     }
 
-    fn of_period(&self, caption: &str) -> String {
+    fn period_caption(&self, caption: &str) -> String {
         match self.lines {
             Some(_) => caption.into(),
-            None => self.of_held(caption),
+            None => self.buffered_caption(caption),
         }
     }
 }
@@ -183,11 +185,11 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
     Ok(page.into_string() + "\n")
 }
 
-/// A picture with its caption.
+/// Returns a figure with its caption.
 pub(crate) fn figure(drawn: &Drawn) -> Markup {
     html! {
         figure id={ "figure-" (drawn.id) } class=[(drawn.map.len() > figures::BESIDE).then_some("wide")] {
-            // Made by `mechid-plot`, which escapes the words in it.
+            // The SVG comes from `mechid-plot`, which escapes the text in it.
             (PreEscaped(&drawn.svg))
             @if !drawn.map.is_empty() {
                 div.map {
@@ -219,7 +221,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
     }
 }
 
-/// All modes in a table that sorts.
+/// Returns all modes in a sortable table.
 fn modes(modes: &[ModeRow]) -> Markup {
     let row = |(number, mode): (usize, &ModeRow)| {
         let [frequency, error, _] = mode.natural_frequency_hz.cells();
@@ -261,7 +263,7 @@ fn files(contents: &Contents<'_>) -> String {
     names.join(", ")
 }
 
-/// Section of warnings, and of what supports the numbers.
+/// Returns the section of warnings, and of the information that supports the numbers.
 fn remarks(contents: &Contents<'_>) -> Markup {
     let (doubts, merits) = (judgement::doubts(contents.review), judgement::merits(contents.review));
     html! {

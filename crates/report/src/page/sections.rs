@@ -1,4 +1,4 @@
-//! The sections of the report.
+//! Sections of the report.
 
 use std::f64::consts::TAU;
 
@@ -34,8 +34,8 @@ fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
     vec![name.into(), value.into()]
 }
 
-/// Something of every record, below its name where there are several.
-fn of_each(
+/// Returns a part of the page for every record, below the record's name if there are several.
+fn for_each_record(
     contents: &Contents<'_>,
     show: impl Fn(&RecordReview<'_>) -> Result<Markup, ReportError>,
 ) -> Result<Markup, ReportError> {
@@ -48,9 +48,9 @@ fn of_each(
     })
 }
 
-/// Section on what is in the records.
+/// Returns the section about the records.
 pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let records = of_each(contents, |part| {
+    let records = for_each_record(contents, |part| {
         let header =
             ["column", "what it is", "unit", "mean", "RMS", "peak", "crest factor", "not repeated"];
         let rows = part.channels.iter().map(channel_row).collect();
@@ -71,7 +71,8 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-/// Sentence that tells which statements are about all samples and which about a part, where the record is long.
+/// Returns a sentence that says, for a long record, which statements refer to all samples and which
+/// to a part.
 fn part_held(part: &RecordReview<'_>) -> Option<String> {
     let (first, last) = (part.held().first_sample, part.held().held_to()?);
     Some(format!(
@@ -121,7 +122,7 @@ fn channel_row(channel: &Channel) -> Vec<String> {
     row
 }
 
-/// Section on whether the force suits.
+/// Returns the section about the suitability of the force.
 pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let header = [
         "force",
@@ -132,10 +133,10 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         "flatness",
         "persistence (order)",
     ];
-    let records = of_each(contents, |part| {
+    let records = for_each_record(contents, |part| {
         let names = &part.held().names;
         let rows = part.excitations.iter().map(|e| excitation_row(e, names)).collect();
-        let caption = part.of_period("Quality of the excitation");
+        let caption = part.period_caption("Quality of the excitation");
         Ok(Table { caption: &caption, header: &header, numbers_from: 1, rows }.html())
     })?;
     Ok(html! {
@@ -169,7 +170,7 @@ fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
     row
 }
 
-/// Parameters, matrices, modes and their shapes.
+/// Returns parameters, matrices, modes and their shapes.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if the modes cannot be computed.
@@ -244,7 +245,8 @@ fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
     parameters.chunk_by(|a, b| a.matrix == b.matrix).map(of_one).collect()
 }
 
-/// Shapes of the modes, modulus and phase of each response, which `channel` names.
+/// Returns the shapes of the modes, with modulus and phase of each response; `channel` returns its
+/// name.
 fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
     let name = |(number, mode): (usize, &ShapedMode)| {
         let [re, im] = mode.eigenvalue;
@@ -289,7 +291,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
     rows
 }
 
-/// The frequency response, and the motion in time.
+/// Returns the section about the frequency response, and the response over time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let receptance = match &contents.review.receptance {
         Err(reason) => Err(reason.as_str()),
@@ -310,9 +312,9 @@ pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-/// Section on whether the residual is noise.
+/// Returns the section that tests whether the residual is noise.
 pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let records = of_each(contents, |part| match &part.residual {
+    let records = for_each_record(contents, |part| match &part.residual {
         Ok(residual) => residual_of(part, residual),
         Err(reason) => Ok(html! { p.note { "There is no residual to judge: " (reason) } }),
     })?;
@@ -349,12 +351,12 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
         }
     }
     Ok(html! {
-        (Table { caption: &part.of_held("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
+        (Table { caption: &part.buffered_caption("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
         div.figures { @for drawn in &drawn { (figure(drawn)) } }
     })
 }
 
-/// A record that was not fitted.
+/// Returns the section about a record that was not fitted.
 pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
     let identified = contents.review.identified;
     let (Some(validation), Some(source), Some(first)) = (
@@ -380,12 +382,12 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
     }))
 }
 
-/// The force found from the motion.
+/// Returns the section about the force reconstructed from the response.
 pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
     if contents.review.records.iter().all(|part| part.reconstruction.is_none()) {
         return Ok(None);
     }
-    let records = of_each(contents, |part| match &part.reconstruction {
+    let records = for_each_record(contents, |part| match &part.reconstruction {
         Some(reconstruction) => reconstruction_of(part, reconstruction),
         None => Ok(html! {}),
     })?;
@@ -426,7 +428,7 @@ fn reconstruction_of(
     let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
     Ok(html! {
         p { "Found from the measured motion with the identified machine: " (reconstruction.method) (lines) "." }
-        (Table { caption: &part.of_period("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
+        (Table { caption: &part.period_caption("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
     })
 }

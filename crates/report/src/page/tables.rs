@@ -1,38 +1,38 @@
-//! Tables that scroll by themselves where the page is narrow.
+//! Tables, each with a separate scroll bar on a narrow page.
 
 use maud::{Markup, html};
 
-/// A table under a caption; the first column of `rows` is the header of its row, `numeric` columns
-/// stand to the right.
+/// Table with a caption; the first column of `rows` is the header of its row, and numeric columns
+/// are aligned right.
 pub struct Table<'a> {
     pub caption: &'a str,
-    /// Empty where the rows need none.
+    /// Header; empty if the rows need none.
     pub header: &'a [&'a str],
-    /// Columns from this one on are numbers.
+    /// Index of the first column of numbers.
     pub numbers_from: usize,
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table<'_> {
     pub fn html(&self) -> Markup {
-        self.of_class(self.header.is_empty().then_some("facts"), &[])
+        self.html_with_class(self.header.is_empty().then_some("facts"), &[])
     }
 
-    /// The same with headers that sort it.
+    /// Returns the table with headers that sort it.
     pub fn sortable(&self) -> Markup {
-        self.of_class(Some("sort"), &[])
+        self.html_with_class(Some("sort"), &[])
     }
 
-    /// A sortable table whose rows are of categories, one for each row, by which they can be chosen.
+    /// Returns a sortable table in which rows can be chosen by their categories, one for each row.
     #[cfg(feature = "parquet")]
-    pub fn of_categories(&self, categories: &[String]) -> Markup {
-        self.of_class(Some("sort"), categories)
+    pub fn html_with_categories(&self, categories: &[String]) -> Markup {
+        self.html_with_class(Some("sort"), categories)
     }
 
-    fn of_class(&self, table: Option<&str>, categories: &[String]) -> Markup {
+    fn html_with_class(&self, table: Option<&str>, categories: &[String]) -> Markup {
         let class = |column: usize| (column >= self.numbers_from).then_some("number");
         html! {
-            // Reachable by keyboard, so that it can be scrolled without a mouse.
+            // The table can be focused, so that it can be scrolled without a mouse.
             div.scroll role="region" tabindex="0" aria-label=(self.caption) {
                 table class=[table] {
                     caption { (self.caption) }

@@ -1,4 +1,4 @@
-//! The page of the results of many records.
+//! Page of the results of many records.
 
 use maud::{DOCTYPE, html};
 use mechid_analysis::fleet::{SIGNIFICANT, Trends};
@@ -11,9 +11,8 @@ use super::{figure, figure_script, head};
 use crate::ReportError;
 use crate::figures::trends::{DRAWN, panel};
 
-/// Returns a page of the results of many records: what failed, every quantity over the records, and
-/// outliers; HTML that loads nothing and runs nothing but the
-/// script of its figures.
+/// Returns a page of the results of many records: failures, every quantity over the records, and
+/// outliers; HTML that loads no other file and runs only the script of its figures.
 ///
 /// # Errors
 /// [`ReportError::Plot`] if a figure cannot be drawn.
@@ -21,9 +20,12 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
     let mut figures = Vec::new();
     let categories: Vec<String> = trends.series.iter().map(|one| one.category().into()).collect();
     for (number, series) in (1..).zip(&trends.series) {
-        let all = series.points.len();
-        let thinned =
-            if all > DRAWN { format!("; some of {all} values are drawn") } else { String::new() };
+        let count = series.points.len();
+        let thinned = if count > DRAWN {
+            format!("; some of {count} values are drawn")
+        } else {
+            String::new()
+        };
         let caption = format!("{} with 95 % intervals{thinned}", series.name);
         let one = Figure::new(series.name.as_str()).panel(panel(series, trends.over));
         figures.push(drawn(format!("series-{number}"), one, caption)?);
@@ -58,7 +60,7 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
                     }
                     section id="quantities" data-filter aria-labelledby="quantities-heading" {
                         h2 id="quantities-heading" { "Quantities" }
-                        (quantities.of_categories(&categories))
+                        (quantities.html_with_categories(&categories))
                         p.note { "Spread: 1.4826 times the median distance from the median, the standard deviation of normal values. Where it is larger than the standard error, the machine changes from record to record, or the standard errors are too small." }
                         div.figures { @for (one, category) in figures.iter().zip(&categories) { div data-category=(category) { (figure(one)) } } }
                     }
