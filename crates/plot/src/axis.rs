@@ -3,15 +3,15 @@
 /// Division of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
-    /// Equal distances are equal differences.
+    /// Equal distances mean equal differences.
     #[default]
     Linear,
-    /// Equal distances are equal ratios.
+    /// Equal distances mean equal ratios.
     Log10,
 }
 
 impl Scale {
-    /// The position on a ruler of this scale, up to a factor and an offset.
+    /// Returns the position on an axis of this scale, up to a factor and an offset.
     pub(crate) fn forward(self, value: f64) -> f64 {
         match self {
             Scale::Linear => value,
@@ -35,7 +35,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis for the quantity `label` in `unit`; an empty unit stands for a pure number.
+    /// Creates a linear axis for the quantity `label` in `unit`; an empty unit means a pure number.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Axis {
             label: label.into(),
@@ -46,7 +46,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis for the quantity `label` in `unit`.
+    /// Creates a logarithmic axis for the quantity `label` in `unit`.
     pub fn log10(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Axis { scale: Scale::Log10, ..Axis::linear(label, unit) }
     }
@@ -59,15 +59,15 @@ impl Axis {
         self
     }
 
-    /// Labels multiples of `step` on a linear axis, such as 45 for a phase in degrees.
-    /// A step that would give more than forty labels is not followed.
+    /// Labels multiples of `step` on a linear axis, such as 45 for a phase in degrees. A step with
+    /// more than forty labels is ignored.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
     }
 
-    /// `label (unit)`, or the label alone for a pure number.
+    /// Returns `label (unit)`, or the label alone for a pure number.
     pub fn caption(&self) -> String {
         match (self.label.is_empty(), self.unit.is_empty()) {
             (_, true) => self.label.clone(),
@@ -77,7 +77,7 @@ impl Axis {
     }
 }
 
-/// Maps values to pixels along one axis.
+/// Mapping of values to pixels along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Mapping {
     scale: Scale,
@@ -87,7 +87,7 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
-    /// Mapping of `low` to `pixels.0` and of `high` to `pixels.1`.
+    /// Creates the mapping of `low` to `pixels.0` and of `high` to `pixels.1`.
     pub(crate) fn new(scale: Scale, (low, high): (f64, f64), pixels: (f64, f64)) -> Self {
         let origin = scale.forward(low);
         let slope = (pixels.1 - pixels.0) / (scale.forward(high) - origin);
@@ -99,14 +99,16 @@ impl Mapping {
     }
 }
 
-/// Values below this are drawn as zero, and no axis is shorter: its pixels per unit would overflow.
+/// Minimum magnitude of a value and length of an axis; smaller values are drawn as zero, because
+/// the pixels per unit would overflow.
 pub(crate) const TINY: f64 = 1e-290;
 
-/// The range that shows everything from `low` to `high`, with `margin` of it to spare on both sides.
+/// Returns the range that shows everything from `low` to `high`, with the fraction `margin` of it
+/// added on both sides.
 pub(crate) fn padded(scale: Scale, low: f64, high: f64, margin: f64) -> (f64, f64) {
     match scale {
         Scale::Linear => {
-            // A constant curve still needs a scale to lie in: ± 5 % of its value, or ± 1 about zero.
+            // A constant curve still needs a range: ± 5 % of its value, or ± 1 around zero.
             let largest = low.abs().max(high.abs());
             let pad = if largest < TINY {
                 1.0

@@ -7,7 +7,7 @@ use resvg::{tiny_skia, usvg};
 use crate::error::PlotError;
 use crate::text::FONTS;
 
-/// Longest side of a bitmap, pixels: 16,384² pixels of four bytes are a gibibyte.
+/// Maximum length of a side of a bitmap, in pixels: 16,384² pixels of four bytes are 1 GiB.
 const LIMIT: u32 = 16_384;
 
 /// Parsing the font takes longer than drawing a small figure, so it is done once.
@@ -20,12 +20,13 @@ static FONT_BASE: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// Turns an SVG document into a PNG file, with `scale` pixels for each px of the document.
+/// Converts an SVG document to a PNG file, with `scale` pixels for each px of the document.
 ///
-/// Text is set in the embedded Noto Sans whatever is installed, so the same document gives the same bytes.
+/// Text is set in the embedded Noto Sans, not in an installed font, so the same document always
+/// gives the same bytes.
 ///
 /// # Errors
-/// A document that is not SVG, and a scale that leads to an empty or an overlarge bitmap.
+/// A document that is not SVG, or a scale for which the bitmap is empty or too large.
 pub fn svg_to_png(svg: &str, scale: f64) -> Result<Vec<u8>, PlotError> {
     let raster = |reason: String| PlotError::Raster { reason };
     let options = usvg::Options {

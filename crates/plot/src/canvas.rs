@@ -1,11 +1,11 @@
-//! A sheet of SVG: the few shapes figures and sketches are made of.
+//! SVG canvas with the few shapes that figures and sketches need.
 
 use std::fmt::Write as _;
 
 use crate::style::{Color, Dash};
 use crate::text::{FAMILY, Level, SCRIPT_SIZE, Weight, runs, text_width};
 
-/// A point on the sheet, px, from the top left corner.
+/// Point on the canvas, in px from the top left corner.
 pub type Point = (f64, f64);
 
 /// Stroke of a shape.
@@ -26,7 +26,7 @@ impl Stroke {
     }
 }
 
-/// Part of a text that lies at its point.
+/// Alignment of a text with its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Anchor {
     /// The text starts there.
@@ -38,25 +38,25 @@ pub enum Anchor {
     End,
 }
 
-/// Look of a text.
+/// Style of a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextStyle {
     /// Font size, px.
     pub size: f64,
     /// Weight.
     pub weight: Weight,
-    /// Slanted, as variables are set.
+    /// `true` for italics, as for variables.
     pub italic: bool,
     /// Colour.
     pub color: Color,
-    /// Part of the text that lies at the point.
+    /// Alignment with the point.
     pub anchor: Anchor,
-    /// Turned a quarter to the left, to be read from the right.
+    /// `true` for text rotated by 90° to the left.
     pub vertical: bool,
 }
 
 impl TextStyle {
-    /// Dark, upright, centred text of this size, px.
+    /// Creates the style of dark, upright, centred text of this size, px.
     pub const fn new(size: f64) -> Self {
         TextStyle {
             size,
@@ -93,15 +93,17 @@ impl TextStyle {
     }
 }
 
-/// An SVG document in the making.
+/// SVG document under construction.
 ///
-/// Coordinates are written with two decimals, so the same drawing is the same text on every machine.
+/// Coordinates are written with two decimals, so the same drawing is the same text on every
+/// machine.
 ///
 /// ```
 /// use mechid_plot::{Canvas, Color, Stroke, TextStyle};
 ///
 /// let mut sheet = Canvas::new(200.0, 80.0);
-/// sheet.rect((20.0, 20.0), (160.0, 40.0), Some(Color::WHITE), Some(Stroke::solid(Color::BLACK, 1.0)));
+/// let stroke = Stroke::solid(Color::BLACK, 1.0);
+/// sheet.rect((20.0, 20.0), (160.0, 40.0), Some(Color::WHITE), Some(stroke));
 /// sheet.text((100.0, 45.0), "M < 10 kg", &TextStyle::new(14.0));
 /// let svg = sheet.finish("A box");
 /// assert!(svg.contains("M &lt; 10 kg"));
@@ -114,12 +116,12 @@ pub struct Canvas {
     clips: usize,
     /// Prefix of the ids in this document.
     ids: String,
-    /// `true` for a drawing that a reader who does not see it may pass over.
+    /// `true` for a drawing that screen readers skip.
     is_decorative: bool,
 }
 
 impl Canvas {
-    /// An empty white sheet, px.
+    /// Creates an empty white canvas, px.
     pub fn new(width: f64, height: f64) -> Self {
         let mut sheet = Canvas {
             width,
@@ -133,8 +135,8 @@ impl Canvas {
         sheet
     }
 
-    /// Returns the sheet with ids that begin with `ids` (letters, digits, `-`, `_`; others become `-`),
-    /// to stand in one document with other sheets.
+    /// Returns the canvas with ids that begin with `ids` (letters, digits, `-`, `_`; others become
+    /// `-`), so that several canvases can be in one document.
     #[must_use]
     pub fn with_ids(mut self, ids: &str) -> Self {
         let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
@@ -142,17 +144,17 @@ impl Canvas {
         self
     }
 
-    /// Returns the sheet as an ornament: without a title, and hidden from readers who do not see it.
+    /// Returns the canvas as a decorative drawing: without a title, and skipped by screen readers.
     pub(crate) fn decorative(mut self) -> Self {
         self.is_decorative = true;
         self
     }
 
-    /// Dots of one diameter, in px, and one colour, as one path.
+    /// Draws dots of one diameter, in px, and one colour, as one path.
     pub(crate) fn dots(&mut self, centers: &[Point], diameter: f64, color: Color) {
         let mut path = String::with_capacity(centers.len() * 12);
         for (x, y) in centers {
-            // A line of no length at all has no ends in some renderers.
+            // Some renderers draw no round ends on a line of length zero.
             let _ = write!(path, "M{} {}h.01", num(*x), num(*y));
         }
         let (width, color) = (num(diameter), color.0);
@@ -162,7 +164,7 @@ impl Canvas {
         );
     }
 
-    /// A straight line.
+    /// Draws a straight line.
     pub fn line(&mut self, from: Point, to: Point, stroke: Stroke) {
         self.path(
             &format!("M{} {}L{} {}", num(from.0), num(from.1), num(to.0), num(to.1)),
@@ -171,7 +173,8 @@ impl Canvas {
         );
     }
 
-    /// Straight lines apart from one another, as one path: hundreds of them stay a small file.
+    /// Draws separate straight lines as one path, so that the file stays small with hundreds of
+    /// them.
     pub fn segments(&mut self, all: impl IntoIterator<Item = (Point, Point)>, stroke: Stroke) {
         let path: String = all.into_iter().map(|(from, to)| chain(&[from, to])).collect();
         if !path.is_empty() {
@@ -179,7 +182,7 @@ impl Canvas {
         }
     }
 
-    /// Discs of one radius, in px, and one colour, which is written once.
+    /// Draws discs of one radius, in px, and one colour, which is written once.
     pub fn discs(&mut self, centers: &[Point], radius: f64, color: Color) {
         let _ = writeln!(self.body, "<g{}>", paint(Some(color), None));
         let r = num(radius);
@@ -190,17 +193,17 @@ impl Canvas {
         self.close_group();
     }
 
-    /// A chain of straight lines.
+    /// Draws connected straight lines.
     pub fn polyline(&mut self, points: &[Point], stroke: Stroke) {
         self.path(&chain(points), None, Some(stroke));
     }
 
-    /// A closed chain of straight lines.
+    /// Draws closed connected straight lines.
     pub fn polygon(&mut self, points: &[Point], fill: Option<Color>, stroke: Option<Stroke>) {
         self.path(&(chain(points) + "Z"), fill, stroke);
     }
 
-    /// A rectangle from its top left corner and its size.
+    /// Draws a rectangle from its top left corner and its size.
     pub fn rect(
         &mut self,
         corner: Point,
@@ -213,7 +216,7 @@ impl Canvas {
         let _ = writeln!(self.body, r#"<rect x="{x}" y="{y}" width="{w}" height="{h}"{paint}/>"#);
     }
 
-    /// A circle; centre and radius in px.
+    /// Draws a circle; centre and radius in px.
     pub fn circle(
         &mut self,
         center: Point,
@@ -226,13 +229,14 @@ impl Canvas {
         let _ = writeln!(self.body, r#"<circle cx="{x}" cy="{y}" r="{r}"{paint}/>"#);
     }
 
-    /// A path in SVG's path language.
+    /// Draws a path in the path language of SVG.
     pub fn path(&mut self, data: &str, fill: Option<Color>, stroke: Option<Stroke>) {
         let paint = paint(fill, stroke);
         let _ = writeln!(self.body, r#"<path d="{data}"{paint}/>"#);
     }
 
-    /// A line of text with its baseline at the point; `^{…}` is raised and `_{…}` lowered, as in `10^{−3}` and `K_{xx}`.
+    /// Draws a line of text with its baseline at the point; `^{…}` is a superscript and `_{…}` a
+    /// subscript, as in `10^{−3}` and `K_{xx}`.
     pub fn text(&mut self, at: Point, text: &str, style: &TextStyle) {
         let (x, y) = (num(at.0), num(at.1));
         let anchor = match style.anchor {
@@ -249,8 +253,8 @@ impl Canvas {
         if style.weight == Weight::Bold {
             self.body.push_str(r#" font-weight="bold""#);
         }
-        // Italic advances are not measured, renderers differ on texts with scripts, and one or two
-        // letters need no help.
+        // The length is written only where it is reliable: italics are not measured, renderers
+        // differ for scripts, and one or two letters do not need it.
         let plain = !style.italic && runs(text).len() == 1;
         if plain && text.chars().nth(2).is_some() {
             let length = num(text_width(text, style.size, style.weight));
@@ -265,7 +269,7 @@ impl Canvas {
         let _ = writeln!(self.body, ">{}</text>", spans(text, style.size));
     }
 
-    /// Opens a group with a class and a name a viewer shows as a tool tip.
+    /// Opens a group with a class and a name, which a viewer shows as a tool tip.
     pub fn open_group(&mut self, class: &str, name: &str) {
         let _ = writeln!(
             self.body,
@@ -275,7 +279,7 @@ impl Canvas {
         );
     }
 
-    /// Opens a group that is drawn with the given opacity, a fraction from 0 to 1.
+    /// Opens a group that is drawn with this opacity, a fraction from 0 to 1.
     pub fn open_faded(&mut self, opacity: f64) {
         let _ = writeln!(self.body, r#"<g opacity="{}">"#, num(opacity));
     }
@@ -291,12 +295,12 @@ impl Canvas {
         );
     }
 
-    /// Closes the group opened last.
+    /// Closes the most recently opened group.
     pub fn close_group(&mut self) {
         self.body.push_str("</g>\n");
     }
 
-    /// Returns the document, with a title for readers who do not see it.
+    /// Returns the document, with a title for screen readers.
     pub fn finish(self, title: &str) -> String {
         let (w, h) = (num(self.width), num(self.height));
         if self.is_decorative {
@@ -341,7 +345,7 @@ fn paint(fill: Option<Color>, stroke: Option<Stroke>) -> String {
     out
 }
 
-/// The runs of a text, raised and lowered by steps every viewer knows.
+/// Returns the spans of a text, raised and lowered in a way that every viewer supports.
 fn spans(text: &str, size: f64) -> String {
     let mut out = String::new();
     let mut height = 0.0;
@@ -367,14 +371,14 @@ fn spans(text: &str, size: f64) -> String {
     out
 }
 
-/// A coordinate with at most two decimals: a hundredth of a pixel is finer than print resolves.
+/// Returns a coordinate with at most two decimals, which is finer than the resolution of print.
 fn num(value: f64) -> String {
     let rounded = (value * 100.0).round() / 100.0;
-    // Adding zero turns −0 into 0, which Display would write as "-0".
+    // Adding zero converts −0 to 0, because Display would write "-0".
     format!("{}", rounded + 0.0)
 }
 
-/// The text without its marks, for titles, which have no raised or lowered runs.
+/// Returns the text without superscript and subscript marks, for titles.
 fn unmarked(text: &str) -> String {
     runs(text).into_iter().map(|(_, run)| run).collect()
 }
@@ -387,7 +391,7 @@ pub(crate) fn escape(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // XML 1.0 has no way to write the other control characters.
+            // XML 1.0 cannot represent the other control characters.
             control if control.is_control() => out.push(' '),
             other => out.push(other),
         }

@@ -1,4 +1,4 @@
-//! Figures that are drawn often: records with spectra, Bode plots, sweeps, stability.
+//! Figures for frequent purposes: records with spectra, Bode plots, sweeps, stability.
 
 use crate::axis::Axis;
 use crate::curve::{Curve, Reference};
@@ -6,23 +6,23 @@ use crate::figure::Figure;
 use crate::panel::{Panel, ResponsePart};
 use crate::style::{Color, Dash};
 
-/// A quantity with its unit, such as ("Force", "N").
+/// Quantity with its unit, such as ("Force", "N").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quantity<'a> {
-    /// Name, as it stands on an axis.
+    /// Name on an axis.
     pub name: &'a str,
     /// Unit; empty for a pure number.
     pub unit: &'a str,
 }
 
 impl<'a> Quantity<'a> {
-    /// A quantity.
+    /// Creates a quantity.
     pub const fn new(name: &'a str, unit: &'a str) -> Self {
         Quantity { name, unit }
     }
 }
 
-/// One curve of a chart: abscissae and ordinates of equal length under a name.
+/// One curve of a chart: abscissae and ordinates of equal length with a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Series<'a> {
     /// Legend label.
@@ -31,17 +31,17 @@ pub struct Series<'a> {
     pub x: &'a [f64],
     /// Ordinates, one for each point, in the unit of the axis.
     pub y: &'a [f64],
-    /// Place in the cycle of looks; `None` follows the order of the series.
+    /// Index in the cycle of curve styles; `None` follows the order of the series.
     pub slot: Option<usize>,
 }
 
 impl<'a> Series<'a> {
-    /// A series of points, `x` and `y` of equal length, in the units of the axes.
+    /// Creates a series of points, `x` and `y` of equal length, in the units of the axes.
     pub const fn new(name: &'a str, x: &'a [f64], y: &'a [f64]) -> Self {
         Series { name, x, y, slot: None }
     }
 
-    /// Returns the series with the look of number `slot` of the cycle, wherever it stands.
+    /// Returns the series with style number `slot` of the cycle, independent of its position.
     #[must_use]
     pub const fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);
@@ -49,7 +49,7 @@ impl<'a> Series<'a> {
     }
 }
 
-/// A record against time (s) above its line spectrum (amplitudes against frequency, Hz).
+/// Returns a record over time (s) above its line spectrum (amplitudes over frequency, Hz).
 pub fn time_and_spectrum(
     title: &str,
     quantity: Quantity<'_>,
@@ -64,7 +64,7 @@ pub fn time_and_spectrum(
     Figure::new(title).panel(time).panel(frequency)
 }
 
-/// One frequency response: magnitude and phase on the same frequencies.
+/// One frequency response: magnitude and phase at the same frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrequencyResponse<'a> {
     /// Legend label.
@@ -79,12 +79,12 @@ pub struct FrequencyResponse<'a> {
     pub standard_error: &'a [f64],
 }
 
-/// Bode plot: measured points under fitted lines, magnitude above phase (degrees). A line of the phase
-/// breaks where it jumps by more than half a turn.
+/// Returns a Bode plot: measured points under fitted lines, magnitude above phase (degrees). A line
+/// of the phase is interrupted at jumps of more than 180°.
 ///
-/// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`, and `magnitude` the ordinate of the
-/// upper panel, such as `Axis::log10("Receptance", "m/N")`; the fits may lie on a finer grid than the
-/// measurement.
+/// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`, and `magnitude` the
+/// ordinate of the upper panel, such as `Axis::log10("Receptance", "m/N")`; the fits may have a
+/// finer frequency grid than the measurement.
 pub fn bode(
     title: &str,
     frequency: Axis,
@@ -96,7 +96,7 @@ pub fn bode(
     let phase = Axis::linear("Phase", "°").step(45.0);
     let mut below = Panel::new(frequency, phase).part(ResponsePart::Phase);
     for (slot, response) in measured.iter().enumerate() {
-        // A single measurement is the reference for all fits and is drawn in a neutral colour.
+        // A single measurement is the reference for all fits and has a neutral colour.
         let color =
             if measured.len() == 1 { Color::GREY } else { Color::CYCLE[slot % Color::CYCLE.len()] };
         let points = |label: &str, y: &[f64]| {
@@ -130,10 +130,10 @@ pub fn bode(
     Figure::new(title).panel(above).panel(below).share_x()
 }
 
-/// Estimates of one coefficient against a swept setting, one marked line for each method, with the
-/// true value, all in the units of the axes.
+/// Returns estimates of one coefficient over a swept setting, with one marked line for each method,
+/// and the true value, all in the units of the axes.
 ///
-/// The k-th method always has the k-th look, so several sweeps can be laid side by side.
+/// The k-th method always has the k-th style, so that several sweeps can be compared.
 pub fn sweep_panel(
     setting: Axis,
     coefficient: Quantity<'_>,
@@ -151,7 +151,7 @@ pub fn sweep_panel(
     }
 }
 
-/// Figure of one [`sweep_panel`], in the units of its axes.
+/// Returns a figure of one [`sweep_panel`], in the units of its axes.
 pub fn sweep(
     title: &str,
     setting: Axis,
@@ -162,9 +162,10 @@ pub fn sweep(
     Figure::new(title).panel(sweep_panel(setting, coefficient, methods, truth))
 }
 
-/// Spectral radius of time-stepping schemes against the step, with the limit of stability.
+/// Returns the spectral radius of time-stepping schemes over the step, with the limit of stability.
 ///
-/// Abscissae are Δt/T, the step over the natural period, all positive; ordinates are spectral radii.
+/// Abscissae are Δt/T, the step over the natural period, all positive; ordinates are spectral
+/// radii.
 pub fn stability(title: &str, schemes: &[Series<'_>]) -> Figure {
     let mut panel = Panel::new(
         Axis::log10("Step over natural period Δt/T", ""),
@@ -174,7 +175,7 @@ pub fn stability(title: &str, schemes: &[Series<'_>]) -> Figure {
     for scheme in schemes {
         panel = panel.curve(Curve::line(scheme.name, scheme.x, scheme.y));
     }
-    // Clip unstable schemes; only ρ ≤ 1 is compared.
+    // Only ρ ≤ 1 is compared, so curves of unstable schemes are clipped.
     panel.y = panel.y.range(0.0, 1.6);
     Figure::new(title).panel(panel)
 }

@@ -2,7 +2,7 @@
 
 use crate::style::{Color, Dash, Marker, Style};
 
-/// Way in which the points of a curve are drawn.
+/// Kind of drawing of the points of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Line,
@@ -12,17 +12,17 @@ pub(crate) enum Kind {
     Band,
 }
 
-/// One set of points with its look and its legend label.
+/// One set of points with its style and its legend label.
 ///
-/// Parts of the look that are not set follow the place of the curve in its panel:
-/// the k-th curve has the k-th colour, dash and marker of the cycle.
+/// Parts of the style that are not set follow the index of the curve in its panel: the k-th curve
+/// has the k-th colour, dash and marker of the cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     pub(crate) label: String,
     pub(crate) kind: Kind,
     pub(crate) x: Vec<f64>,
     pub(crate) y: Vec<f64>,
-    /// Upper edge of a band; empty otherwise.
+    /// Upper edge of a band; empty for other curves.
     pub(crate) upper: Vec<f64>,
     pub(crate) style: Style,
     pub(crate) slot: Option<usize>,
@@ -30,7 +30,7 @@ pub struct Curve {
     pub(crate) phase_deg: Vec<f64>,
     /// Standard errors of the ordinates; empty if they are not known.
     pub(crate) error: Vec<f64>,
-    /// Words about each point; empty if there are none.
+    /// Note for each point; empty if there are none.
     pub(crate) notes: Vec<String>,
 }
 
@@ -50,31 +50,32 @@ impl Curve {
         }
     }
 
-    /// A line through the points (`x` and `y` of equal length, in the units of the axes). An empty
-    /// label keeps the curve out of the legend.
+    /// Creates a line through the points (`x` and `y` of equal length, in the units of the axes). A
+    /// curve with an empty label is not in the legend.
     pub fn line(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Line, label, x, y)
     }
 
-    /// A line through the points, as [`line`](Self::line) takes them in the units of the axes and
-    /// of equal length, with a marker at each: for sweeps, where the points are what was computed.
+    /// Creates a line as [`line`](Self::line) does (`x` and `y` of equal length, in the units of
+    /// the axes), with a marker at each point: for sweeps, whose points are the computed values.
     pub fn marked_line(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::MarkedLine, label, x, y)
     }
 
-    /// Markers alone, `x` and `y` of equal length in the units of the axes: for measurements.
+    /// Creates markers only, `x` and `y` of equal length in the units of the axes: for
+    /// measurements.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Points, label, x, y)
     }
 
-    /// A stem from zero (from the bottom of a logarithmic axis) to each point, in the units of the
-    /// axes: for line spectra.
+    /// Creates a stem from zero (from the bottom of a logarithmic axis) to each point, in the units
+    /// of the axes: for line spectra.
     pub fn stems(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Stems, label, x, y)
     }
 
-    /// A shaded band between `lower` and `upper`, one entry of each per abscissa, in the units of
-    /// the axes: for confidence intervals. It takes the look of the curve added after it.
+    /// Creates a shaded band between `lower` and `upper`, one entry of each per abscissa, in the
+    /// units of the axes: for confidence intervals. It has the style of the curve added after it.
     pub fn band(label: impl Into<String>, x: &[f64], lower: &[f64], upper: &[f64]) -> Self {
         Curve { upper: upper.to_vec(), ..Curve::new(Kind::Band, label, x, lower) }
     }
@@ -100,15 +101,15 @@ impl Curve {
         self
     }
 
-    /// Draws the line this wide, px.
+    /// Draws the line with this width, px.
     #[must_use]
     pub fn width(mut self, width: f64) -> Self {
         self.style.width = Some(width);
         self
     }
 
-    /// Gives the curve the look of number `slot` of the cycle, wherever it stands in its panel:
-    /// the same method keeps the same look in every figure.
+    /// Gives the curve style number `slot` of the cycle, independent of its position in the panel,
+    /// so that the same method has the same style in every figure.
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);
@@ -116,40 +117,41 @@ impl Curve {
     }
 
     /// Gives a magnitude the phases of its points, in degrees, one for each: an interactive figure
-    /// then draws phase, real and imaginary part and the Nyquist plot from them.
+    /// then offers phase, real and imaginary part and the Nyquist plot.
     #[must_use]
     pub fn phase(mut self, phase_deg: &[f64]) -> Self {
         self.phase_deg = phase_deg.to_vec();
         self
     }
 
-    /// Shades ± 2 standard errors around the curve; `error` has one standard error for each point, in the unit
-    /// of the ordinate.
+    /// Shades ± 2 standard errors around the curve; `error` has one standard error for each point,
+    /// in the unit of the ordinate.
     #[must_use]
     pub fn standard_error(mut self, error: &[f64]) -> Self {
         self.error = error.to_vec();
         self
     }
 
-    /// Gives each point words, such as the name of its record, which an interactive figure shows when
-    /// the pointer is over it.
+    /// Gives each point a note, such as the name of its record, which an interactive figure shows
+    /// at the pointer.
     #[must_use]
     pub fn notes(mut self, notes: Vec<String>) -> Self {
         self.notes = notes;
         self
     }
 
-    /// Legend label.
+    /// Returns the legend label.
     pub fn label(&self) -> &str {
         &self.label
     }
 
-    /// Abscissae, one for each point, in the unit of the axis.
+    /// Returns the abscissae, one for each point, in the unit of the axis.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
 
-    /// Ordinates, one for each point, in the unit of the axis; of a band, those of its lower edge.
+    /// Returns the ordinates, one for each point, in the unit of the axis; for a band, its lower
+    /// edge.
     pub fn y(&self) -> &[f64] {
         &self.y
     }
@@ -162,13 +164,13 @@ impl Curve {
         matches!(self.kind, Kind::MarkedLine | Kind::Points | Kind::Stems)
     }
 
-    /// All ordinates: those of the curve and, for a band, those of its upper edge.
+    /// Returns all ordinates of the curve and, for a band, of its upper edge.
     pub(crate) fn ordinates(&self) -> impl Iterator<Item = f64> {
         self.y.iter().chain(&self.upper).copied()
     }
 }
 
-/// A straight line across the panel at one value of one axis, such as the true value of what is estimated.
+/// Straight line across the panel at one value of one axis, such as a true value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     pub(crate) label: String,
@@ -179,7 +181,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// A horizontal line at the ordinate `y`, in the unit of its axis.
+    /// Creates a horizontal line at the ordinate `y`, in the unit of its axis.
     pub fn horizontal(label: impl Into<String>, y: f64) -> Self {
         Reference {
             label: label.into(),
@@ -190,7 +192,7 @@ impl Reference {
         }
     }
 
-    /// A vertical line at the abscissa `x`, in the unit of its axis.
+    /// Creates a vertical line at the abscissa `x`, in the unit of its axis.
     pub fn vertical(label: impl Into<String>, x: f64) -> Self {
         Reference {
             horizontal: false,
@@ -214,17 +216,18 @@ impl Reference {
         self
     }
 
-    /// Legend label.
+    /// Returns the legend label.
     pub fn label(&self) -> &str {
         &self.label
     }
 
-    /// Position of the line, in the unit of its axis.
+    /// Returns the position of the line, in the unit of its axis.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Returns whether the line is horizontal, at one ordinate, rather than vertical, at one abscissa.
+    /// Returns whether the line is horizontal, at an ordinate; otherwise it is vertical, at an
+    /// abscissa.
     pub fn is_horizontal(&self) -> bool {
         self.horizontal
     }

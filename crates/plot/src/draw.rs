@@ -1,4 +1,4 @@
-//! Draws a laid-out figure on a sheet.
+//! Drawing of a figure whose layout is known.
 
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Curve, Kind};
@@ -34,7 +34,7 @@ fn panel(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
     sheet.open_clip(layout.corner, layout.size);
     references(panel, layout, sheet);
     let styles = panel.styles();
-    // Bands lie under all lines, whatever their order.
+    // Bands are drawn below all lines, independent of their order.
     let (bands, lines): (Vec<_>, Vec<_>) =
         panel.curves.iter().zip(styles).partition(|(curve, _)| curve.kind == Kind::Band);
     for (curve, style) in bands.into_iter().chain(lines) {
@@ -136,13 +136,15 @@ fn draw_curve(
     }
 }
 
-/// Number of markers above which they are one path, a third as long as circles.
+/// Number of markers above which they are drawn as one path, which needs a third of the text of
+/// circles.
 const MANY: usize = 400;
 
-/// Number of standard errors that a band reaches to either side.
+/// Half-width of an error band, in standard errors.
 const ERRORS: f64 = 2.0;
 
-/// Shades ± 2 standard errors; on a logarithmic axis an edge that is not positive lies at the bottom.
+/// Shades ± 2 standard errors; on a logarithmic axis, an edge that is not positive is at the
+/// bottom.
 fn error_band(layout: &PanelLayout, curve: &Curve, color: Color, sheet: &mut Canvas) {
     let edge = |sign: f64| {
         let edge = curve.y.iter().zip(&curve.error).map(|(y, error)| y + sign * ERRORS * error);
@@ -166,7 +168,7 @@ fn draw_stems(
 ) {
     let base = trace::stem_base(layout.maps, panel.y.scale, layout.y_range);
     let stems = trace::thin_stems(points, base);
-    // Hundreds of wide stems would merge into one block.
+    // Hundreds of wide stems would merge into one area.
     let width = (layout.size.0 / stems.len() as f64 * 0.5).clamp(0.5, 1.3);
     let stems = stems.into_iter().map(|(x, y)| ((x, base), (x, y)));
     sheet.segments(stems, Stroke::solid(color, width));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Reason for which a figure was not drawn.
+/// Reason why a figure was not drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
@@ -26,7 +26,7 @@ pub enum PlotError {
         /// Legend label of the curve.
         curve: String,
     },
-    /// The coordinates of a curve differ in number.
+    /// The numbers of abscissae and ordinates of a curve differ.
     #[error("the curve \"{curve}\" has {x_len} abscissae but {y_len} ordinates")]
     LengthMismatch {
         /// Legend label of the curve.
@@ -43,11 +43,11 @@ pub enum PlotError {
     NonFinite {
         /// Legend label of the curve.
         curve: String,
-        /// Coordinate concerned: `x` or `y`.
+        /// Name of the coordinate: `x` or `y`.
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
-        /// The offending value, in the unit of its axis.
+        /// The value, in the unit of its axis.
         value: f64,
     },
     /// A logarithmic axis cannot show zero or a negative number.
@@ -57,32 +57,32 @@ pub enum PlotError {
     NotPositive {
         /// Legend label of the curve.
         curve: String,
-        /// Coordinate concerned: `x` or `y`.
+        /// Name of the coordinate: `x` or `y`.
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
-        /// The offending value, in the unit of its axis.
+        /// The value, in the unit of its axis.
         value: f64,
     },
-    /// A reference line lies at a value its axis cannot show.
+    /// A reference line is at a value that its axis cannot show.
     #[error("the reference line \"{label}\" lies at {value}, which its axis cannot show")]
     Reference {
         /// Legend label of the line.
         label: String,
-        /// The offending value, in the unit of its axis.
+        /// The value, in the unit of its axis.
         value: f64,
     },
-    /// The range asked of an axis is empty, not finite, or not positive on a logarithmic axis.
+    /// The requested range of an axis is empty, not finite, or not positive on a logarithmic axis.
     #[error("the axis \"{axis}\" cannot run from {low} to {high}")]
     Range {
         /// Label of the axis.
         axis: String,
-        /// Lower end asked for, in the unit of the axis.
+        /// Requested lower end, in the unit of the axis.
         low: f64,
-        /// Upper end asked for, in the unit of the axis.
+        /// Requested upper end, in the unit of the axis.
         high: f64,
     },
-    /// The figure is too small for its axes and legends, or not of a finite size.
+    /// The figure is too small for its axes and legends, or its size is not finite.
     #[error(
         "{width} × {height} px is too small or not finite; the labels alone need {needed_width:.0} × {needed_height:.0} px: choose a larger size"
     )]
@@ -96,25 +96,25 @@ pub enum PlotError {
         /// Minimum height, px.
         needed_height: f64,
     },
-    /// The bitmap asked for is empty or larger than 16,384 pixels a side.
+    /// The requested bitmap is empty or has more than 16,384 pixels per side.
     #[error(
         "a bitmap of {width} × {height} pixels cannot be made: choose a scale that gives 1 to {limit} pixels a side"
     )]
     BitmapSize {
-        /// Width asked for, pixels.
+        /// Requested width, pixels.
         width: f64,
-        /// Height asked for, pixels.
+        /// Requested height, pixels.
         height: f64,
-        /// Largest number of pixels a side.
+        /// Maximum number of pixels per side.
         limit: u32,
     },
-    /// The rasteriser refused a drawing.
+    /// The renderer of bitmaps refused a drawing.
     #[error("the drawing cannot be turned into a bitmap: {reason}")]
     Raster {
-        /// Message of the rasteriser.
+        /// Message of the renderer.
         reason: String,
     },
-    /// A file name that ends neither in `.svg` nor in `.png`.
+    /// A file name does not end in `.svg` or `.png`.
     #[error("{}: the file name must end in .svg or .png", path.display())]
     Extension {
         /// The file name.

@@ -1,10 +1,10 @@
-//! Figures: titled grids of panels.
+//! Figures: grids of panels with a title.
 
 use crate::curve::Reference;
 use crate::error::PlotError;
 use crate::panel::{Legend, Panel};
 
-/// A titled grid of panels, filled row by row.
+/// Grid of panels with a title, filled row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     pub(crate) title: String,
@@ -16,7 +16,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure without panels yet; an empty title takes no room.
+    /// Creates a figure without panels; an empty title needs no space.
     pub fn new(title: impl Into<String>) -> Self {
         Figure {
             title: title.into(),
@@ -42,23 +42,23 @@ impl Figure {
         self
     }
 
-    /// Gives the panels of a column one abscissa, labelled under the lowest;
-    /// a title that repeats the one above is written once.
+    /// Gives the panels of a column one abscissa, labelled under the lowest; a title that is equal
+    /// to the title above is written once.
     #[must_use]
     pub fn share_x(mut self) -> Self {
         self.share_x = true;
         self
     }
 
-    /// Puts one legend above all panels instead of one in each.
-    /// It shows each label once, with the look it has where it first occurs.
+    /// Draws one legend above all panels instead of one in each. It shows each label once, with the
+    /// style of its first curve.
     #[must_use]
     pub fn shared_legend(mut self) -> Self {
         self.shared_legend = true;
         self
     }
 
-    /// Makes the whole figure this large, px, instead of the size that suits its panels.
+    /// Sets the size of the whole figure, px, which otherwise follows from its panels.
     #[must_use]
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = Some((width, height));
@@ -66,7 +66,7 @@ impl Figure {
     }
 
     /// Marks these abscissae, in the unit of their axis, by vertical reference lines through every
-    /// panel, which the legend of the first names once.
+    /// panel, with one entry in the first legend.
     #[must_use]
     pub fn mark_x(mut self, label: &str, values: &[f64]) -> Self {
         for (at, panel) in self.panels.iter_mut().enumerate() {
@@ -84,17 +84,17 @@ impl Figure {
         self
     }
 
-    /// Title of the figure.
+    /// Returns the title of the figure.
     pub fn name(&self) -> &str {
         &self.title
     }
 
-    /// The panels in order, for writing the drawn numbers to a table.
+    /// Returns the panels in order, for example to write the drawn numbers to a table.
     pub fn panels(&self) -> &[Panel] {
         &self.panels
     }
 
-    /// Checks that every panel has curves, and every coordinate against what its axis can show.
+    /// Checks that every panel has curves, and that every coordinate can be shown on its axis.
     pub(crate) fn validate(&self) -> Result<(), PlotError> {
         if self.panels.is_empty() {
             return Err(PlotError::NoPanels { figure: self.title.clone() });
@@ -108,7 +108,7 @@ impl Figure {
         Ok(())
     }
 
-    /// Legend of a panel once the shared legend is allowed for.
+    /// Returns the legend position of a panel, which is hidden if the figure has a shared legend.
     pub(crate) fn legend_of(&self, panel: &Panel) -> Legend {
         if self.shared_legend { Legend::Hidden } else { panel.legend }
     }

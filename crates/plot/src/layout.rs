@@ -1,4 +1,4 @@
-//! Positions of everything in a figure.
+//! Positions of all parts of a figure.
 
 use crate::axis::{Mapping, TINY};
 use crate::canvas::Point;
@@ -11,10 +11,10 @@ use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
 use crate::trace::{self, Mappings, Segment};
 
-/// Largest width or height of a figure, px: more would overflow on a short axis.
+/// Maximum width or height of a figure, px; larger ones would overflow on a short axis.
 const LARGEST: f64 = 1e9;
 
-/// Length of a tick and the distance of its label.
+/// Length of a tick, which is also the distance of its label, px.
 pub(crate) const TICK: f64 = 4.0;
 const TICK_GAP: f64 = 4.0;
 const EDGE: f64 = 10.0;
@@ -23,7 +23,7 @@ const PANEL_TITLE: f64 = 21.0;
 const FACTOR: f64 = 15.0;
 const CAPTION: f64 = LABEL_SIZE + 9.0;
 const BETWEEN: f64 = 16.0;
-/// Smallest readable frame of a panel.
+/// Minimum size of the frame of a panel that is legible, px.
 const LEAST_FRAME: Point = (60.0, 40.0);
 
 /// Position of the legend of one panel.
@@ -34,7 +34,7 @@ pub(crate) enum Place {
     Above,
 }
 
-/// A panel with its frame and its axes.
+/// Panel with its frame and its axes.
 #[derive(Debug, Clone)]
 pub(crate) struct PanelLayout {
     pub(crate) corner: Point,
@@ -44,9 +44,9 @@ pub(crate) struct PanelLayout {
     pub(crate) y_range: (f64, f64),
     pub(crate) x_ticks: Ticks,
     pub(crate) y_ticks: Ticks,
-    /// True if ticks and caption of the abscissa are written under this panel.
+    /// `true` if ticks and caption of the abscissa are written under this panel.
     pub(crate) labels_x: bool,
-    /// True if the title of the panel is written above it.
+    /// `true` if the title of the panel is written above it.
     pub(crate) titled: bool,
     /// Centre line of the ordinate's caption.
     pub(crate) y_caption: f64,
@@ -54,12 +54,12 @@ pub(crate) struct PanelLayout {
     pub(crate) place: Place,
 }
 
-/// A figure with all its positions.
+/// Figure with all its positions.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     pub(crate) size: Point,
     pub(crate) panels: Vec<PanelLayout>,
-    /// Shared legend and the height at which it starts.
+    /// Entries of the shared legend, and its vertical position.
     pub(crate) strip: Vec<Entry>,
     pub(crate) strip_top: f64,
 }
@@ -74,15 +74,16 @@ struct Margins {
 impl Layout {
     pub(crate) fn new(figure: &Figure) -> Result<Self, PlotError> {
         let planner = Planner::new(figure)?;
-        let first = planner.place(&vec![false; figure.panels.len()])?;
-        // A legend that found no room inside goes above, which moves every frame of its row.
+        let first = planner.arrange(&vec![false; figure.panels.len()])?;
+        // A legend without a free place inside goes above the panel, which moves every frame of its
+        // row.
         let above: Vec<bool> =
             first.panels.iter().map(|panel| panel.place == Place::Above).collect();
-        if above.contains(&true) { planner.place(&above) } else { Ok(first) }
+        if above.contains(&true) { planner.arrange(&above) } else { Ok(first) }
     }
 }
 
-/// Lowest and highest value each axis of a panel shows.
+/// Lowest and highest value on each axis of a panel.
 #[derive(Debug, Clone, Copy)]
 struct Ranges {
     x: (f64, f64),
@@ -128,12 +129,13 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Returns whether the abscissa of a panel is labelled: with shared abscissae only the lowest of a column.
+    /// Returns whether the abscissa of a panel is labelled: with shared abscissae, only the lowest
+    /// of a column.
     fn labels_x(&self, index: usize) -> bool {
         !self.figure.share_x || index + self.columns >= self.figure.panels.len()
     }
 
-    /// Returns whether the title of a panel is written: not if it repeats the title of the panel above.
+    /// Returns whether the title of a panel is written: not if the panel above has the same title.
     fn titled(&self, index: usize) -> bool {
         let title = |index: usize| &self.figure.panels[index].title;
         let repeated = self.figure.share_x
@@ -142,7 +144,7 @@ impl<'a> Planner<'a> {
         !title(index).is_empty() && !repeated
     }
 
-    fn place(&self, above: &[bool]) -> Result<Layout, PlotError> {
+    fn arrange(&self, above: &[bool]) -> Result<Layout, PlotError> {
         let strip_height = legend::strip_height(&self.strip, self.size.0 - 2.0 * EDGE);
         let strip_top = EDGE + if self.figure.title.is_empty() { 0.0 } else { TITLE };
         let (tops, frame_height) = self.rows(above, strip_top + strip_height)?;
@@ -177,7 +179,7 @@ impl<'a> Planner<'a> {
         Ok(Layout { size: self.size, panels, strip: self.strip.clone(), strip_top })
     }
 
-    /// Tops of the frames of each row, and their common height.
+    /// Returns the tops of the frames of each row, and their common height.
     fn rows(&self, above: &[bool], top: f64) -> Result<(Vec<f64>, f64), PlotError> {
         let mut margins = vec![Margins::default(); self.rows];
         for (index, panel) in self.figure.panels.iter().enumerate() {
@@ -226,12 +228,14 @@ impl<'a> Planner<'a> {
         margins
     }
 
-    /// Width of a frame before the labels beside it are known; only legends above a panel are measured with it.
+    /// Returns an estimate of the frame width before the widths of the tick labels are known; only
+    /// legends above a panel use it.
     fn rough_width(&self) -> f64 {
         self.size.0 / self.columns as f64 - 90.0
     }
 
-    /// Left edges of the frames of each column, their common width, and the widest tick label of each column.
+    /// Returns the left edges of the frames of each column, their common width, and the widest tick
+    /// label of each column.
     fn columns(&self, y_ticks: &[Ticks]) -> Result<(Vec<f64>, f64, Vec<f64>), PlotError> {
         let mut labels = vec![0.0f64; self.columns];
         let mut captions = vec![0.0f64; self.columns];
@@ -284,7 +288,7 @@ impl<'a> Planner<'a> {
             y: Mapping::new(panel.y.scale, y_range, (corner.1 + size.1, corner.1)),
         };
         let entries = legend::entries(panel);
-        let place = match self.figure.legend_of(panel) {
+        let legend_place = match self.figure.legend_of(panel) {
             _ if entries.is_empty() => Place::Nowhere,
             Legend::Hidden => Place::Nowhere,
             Legend::Above => Place::Above,
@@ -307,12 +311,13 @@ impl<'a> Planner<'a> {
             titled: self.titled(index),
             y_caption,
             entries,
-            place,
+            place: legend_place,
         }
     }
 }
 
-/// Abscissa and ordinate range of each panel; shared abscissae cover all panels of their column.
+/// Returns the ranges of abscissa and ordinate of each panel; shared abscissae cover all panels of
+/// their column.
 fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
     let extents: Vec<(f64, f64)> = figure.panels.iter().map(Panel::x_extent).collect();
     let common = |index: usize| {
@@ -324,13 +329,14 @@ fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
     let mut ranges = Vec::with_capacity(figure.panels.len());
     for (index, panel) in figure.panels.iter().enumerate() {
         let column = || figure.panels.iter().skip(index % columns).step_by(columns);
-        let (extent, markers) = match figure.share_x {
-            true => (common(index), column().any(Panel::has_markers)),
-            false => (extents[index], panel.has_markers()),
+        let (extent, markers) = if figure.share_x {
+            (common(index), column().any(Panel::has_markers))
+        } else {
+            (extents[index], panel.has_markers())
         };
         let (x, y) = (panel.x_range(extent, markers), panel.y_range());
         for (axis, (low, high)) in [(&panel.x, x), (&panel.y, y)] {
-            // Numbers near the ends of f64 leave no room for a margin or have no finite difference.
+            // The range of numbers near the limits of f64 may have no margin or an infinite length.
             let length = axis.scale.forward(high) - axis.scale.forward(low);
             if !(length > TINY && length.is_finite()) {
                 return Err(PlotError::Range { axis: axis.caption(), low, high });
@@ -341,7 +347,7 @@ fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
     Ok(ranges)
 }
 
-/// Ticks of the abscissa, as many as have room for their labels.
+/// Returns the ticks of the abscissa, as many as there is space for their labels.
 fn x_ticks(panel: &Panel, (low, high): (f64, f64), width: f64) -> Ticks {
     const AIR: f64 = 14.0;
     let mut wanted = (width / 62.0).clamp(2.0, 12.0);
@@ -359,7 +365,7 @@ fn x_ticks(panel: &Panel, (low, high): (f64, f64), width: f64) -> Ticks {
     }
 }
 
-/// Lines and points that a legend must not hide.
+/// Returns the lines and points that a legend must not hide.
 fn footprint(
     panel: &Panel,
     maps: Mappings,

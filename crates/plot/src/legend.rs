@@ -1,4 +1,4 @@
-//! Legends: their entries, and places where they hide no curve.
+//! Legends: their entries, and positions where they hide no curve.
 
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Kind, Reference};
@@ -9,7 +9,7 @@ use crate::text::{Weight, text_width};
 use crate::trace::{Segment, meets};
 
 const ROW: f64 = 18.0;
-/// Length of a sample with a line in it, and of one without.
+/// Length of a sample with a line, and of a sample without a line.
 const LINE_SAMPLE: f64 = 36.0;
 const POINT_SAMPLE: f64 = 12.0;
 const GAP: f64 = 7.0;
@@ -17,7 +17,7 @@ const BETWEEN: f64 = 20.0;
 const PADDING: f64 = 7.0;
 const TEXT: f64 = LABEL_SIZE - 1.0;
 
-/// Sample that an entry shows beside its label.
+/// Sample to the left of a label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sample {
     Curve(Kind, Resolved),
@@ -43,7 +43,7 @@ impl Entry {
         self.sample_length() + GAP + text_width(&self.label, TEXT, Weight::Regular)
     }
 
-    /// Draws the entry from `x` on, its label `indent` further to the right.
+    /// Draws the entry from `x` on, with its label `indent` further to the right.
     fn draw(&self, sheet: &mut Canvas, (x, y): Point, indent: f64) {
         let length = self.sample_length();
         let start = x + (indent - length) / 2.0;
@@ -56,7 +56,7 @@ impl Entry {
     }
 }
 
-/// Entries of a panel: its labelled curves, then its labelled reference lines.
+/// Returns the entries of a panel: its labelled curves, then its labelled reference lines.
 pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
     let curves = panel.curves.iter().zip(panel.styles()).map(|(curve, style)| Entry {
         label: curve.label.clone(),
@@ -69,34 +69,35 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
     curves.chain(references).filter(|entry| !entry.label.is_empty()).collect()
 }
 
-/// Entries of several panels, each label once.
+/// Returns the entries of several panels, each label once.
 pub(crate) fn union<'a>(panels: impl Iterator<Item = &'a Panel>) -> Vec<Entry> {
-    let mut all: Vec<Entry> = Vec::new();
+    let mut union: Vec<Entry> = Vec::new();
     for entry in panels.flat_map(entries) {
-        if !all.iter().any(|known| known.label == entry.label) {
-            all.push(entry);
+        if !union.iter().any(|known| known.label == entry.label) {
+            union.push(entry);
         }
     }
-    all
+    union
 }
 
 pub(crate) fn reference_stroke(reference: &Reference) -> Stroke {
     Stroke { color: reference.color, width: 1.1, dash: reference.dash }
 }
 
-/// Room for the samples of a legend whose labels stand one under the other.
+/// Returns the width of the samples of a legend with one entry per row.
 fn indent(entries: &[Entry]) -> f64 {
     entries.iter().map(Entry::sample_length).fold(0.0, f64::max)
 }
 
-/// Size of a legend that stands inside a panel, one entry under the other.
+/// Returns the size of a legend inside a panel, with one entry per row.
 pub(crate) fn box_size(entries: &[Entry]) -> Point {
     let label = |entry: &Entry| entry.width() - entry.sample_length();
     let widest = entries.iter().map(label).fold(0.0, f64::max);
     (indent(entries) + widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
 }
 
-/// The corner, inside the frame from `corner` of `size`, at which a box of size `legend` hides none of `drawn`; `None` if there is none.
+/// Returns the corner, inside the frame from `corner` of `size`, at which a box of size `legend`
+/// hides none of `drawn`; `None` if there is no such corner.
 pub(crate) fn free_place(
     corner: Point,
     size: Point,
@@ -109,7 +110,8 @@ pub(crate) fn free_place(
     if free_x < 0.0 || free_y < 0.0 {
         return None;
     }
-    // Corners first, right before left as readers expect, then the middles of the sides.
+    // The usual positions come first: the corners, right before left, then the middles of the
+    // sides.
     let places = [
         (1.0, 0.0),
         (0.0, 0.0),
@@ -145,7 +147,7 @@ pub(crate) fn draw_box(sheet: &mut Canvas, entries: &[Entry], (x, y): Point) {
     }
 }
 
-/// Entries in as many rows as `width` asks for, by index.
+/// Returns the entries of each row of a legend with this width, by index.
 fn rows(entries: &[Entry], width: f64) -> Vec<std::ops::Range<usize>> {
     let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
     let mut used = f64::INFINITY;
@@ -165,7 +167,7 @@ fn rows(entries: &[Entry], width: f64) -> Vec<std::ops::Range<usize>> {
     rows
 }
 
-/// Height of a legend that stands above what it explains.
+/// Returns the height of a legend above a panel or a figure.
 pub(crate) fn strip_height(entries: &[Entry], width: f64) -> f64 {
     let rows = rows(entries, width).len();
     if rows == 0 { 0.0 } else { ROW * rows as f64 + 6.0 }

@@ -1,8 +1,9 @@
 //! Drawings of records, spectra, frequency responses and sweeps, as SVG and PNG.
 //!
-//! A [`Figure`] is a description: panels, axes with units, curves, reference lines.
-//! Drawing it is a pure function: the same description gives the same bytes on every machine,
-//! because widths come from the metrics of an embedded font (Noto Sans, SIL Open Font License) and no font of the system is looked up.
+//! A [`Figure`] is a description: panels, axes with units, curves, reference lines. Drawing it is a
+//! pure function: the same description gives the same bytes on every machine, because widths come
+//! from the metrics of an embedded font (Noto Sans, SIL Open Font License), and fonts of the system
+//! are not used.
 //!
 //! ```
 //! use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
@@ -12,8 +13,9 @@
 //! let receptance: Vec<f64> =
 //!     omega.iter().map(|w| 1.0 / (5000.0 - 10.0 * w * w).hypot(180.0 * w)).collect();
 //!
+//! let abscissa = Axis::log10("Angular frequency ω", "rad/s");
 //! let figure = Figure::new("Mass on spring and damper").panel(
-//!     Panel::new(Axis::log10("Angular frequency ω", "rad/s"), Axis::log10("Receptance |H|", "m/N"))
+//!     Panel::new(abscissa, Axis::log10("Receptance |H|", "m/N"))
 //!         .curve(Curve::line("exact", &omega, &receptance))
 //!         .reference(Reference::vertical("natural frequency", 500f64.sqrt())),
 //! );
@@ -25,14 +27,14 @@
 //! # Ok::<(), mechid_plot::PlotError>(())
 //! ```
 //!
-//! [`charts`] holds the figures drawn most often; [`Canvas`] is the sheet beneath, for sketches other than plots.
+//! [`charts`] has the most frequent figures; [`Canvas`] draws sketches other than plots.
 //!
-//! Text is shaped and bitmaps are made by `resvg`. The axes are our own: no plotting crate was found that
+//! Text is shaped and bitmaps are made by `resvg`. The axes are our own, because no plotting crate
 //! aligns the frames of stacked panels, keeps legends off the curves and writes exponents.
 //!
 //! Every figure has a palette for colour-blind readers with a dash and a marker for each colour,
-//! legends that hide no curve, the same look for the same method in every figure, ticks at round numbers,
-//! and aligned axes of stacked panels.
+//! legends that hide no curve, the same style for the same method in every figure, ticks at round
+//! numbers, and aligned axes of stacked panels.
 
 mod axis;
 mod bitmap;

@@ -7,10 +7,10 @@ use crate::style::{Color, Marker, Resolved};
 /// Opacity of a shaded band.
 pub(crate) const BAND_OPACITY: f64 = 0.22;
 
-/// Smallest radius of a marker, px; stems that stand closer are drawn without markers.
+/// Minimum radius of a marker, px; stems that are closer together are drawn without markers.
 pub(crate) const LEAST_RADIUS: f64 = 1.4;
 
-/// Radius, in px, at which `count` markers do not run into one another in a panel of this width.
+/// Returns the radius, in px, at which `count` markers do not overlap in a panel of this width.
 pub(crate) fn marker_radius(width: f64, count: usize) -> f64 {
     (0.45 * width / count as f64).clamp(LEAST_RADIUS, 3.6)
 }
@@ -63,7 +63,7 @@ pub(crate) fn marker(sheet: &mut Canvas, marker: Marker, (x, y): Point, radius: 
     }
 }
 
-/// Sample of a curve in a legend: `length` px from `at` to the right.
+/// Draws the sample of a curve in a legend: `length` px from `at` to the right.
 pub(crate) fn sample(sheet: &mut Canvas, kind: Kind, style: Resolved, at: Point, length: f64) {
     let middle = (at.0 + length / 2.0, at.1);
     match kind {

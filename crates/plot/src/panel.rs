@@ -5,15 +5,15 @@ use crate::curve::{Curve, Kind, Reference};
 use crate::error::PlotError;
 use crate::style::Resolved;
 
-/// Place of the legend of a panel.
+/// Position of the legend of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Legend {
-    /// Inside where it hides nothing; above the panel if there is no such place.
+    /// Inside, at a position where it hides no curve; above the panel if there is no such position.
     #[default]
     Auto,
     /// Outside, above the panel.
     Above,
-    /// Nowhere.
+    /// No legend.
     Hidden,
 }
 
@@ -26,7 +26,7 @@ pub enum ResponsePart {
     Phase,
 }
 
-/// A pair of axes with curves and reference lines.
+/// Pair of axes with curves and reference lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     pub(crate) title: String,
@@ -40,7 +40,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// An empty panel.
+    /// Creates an empty panel.
     pub fn new(x: Axis, y: Axis) -> Self {
         Panel {
             title: String::new(),
@@ -75,14 +75,15 @@ impl Panel {
         self
     }
 
-    /// Adds a reference line. It is drawn under the curves, and the axis always reaches it.
+    /// Adds a reference line. It is drawn under the curves, and the range of the axis always
+    /// includes it.
     #[must_use]
     pub fn reference(mut self, reference: Reference) -> Self {
         self.references.push(reference);
         self
     }
 
-    /// Makes the ordinate reach from `low` to `high` at least, so that panels can share a scale.
+    /// Extends the ordinate to at least `low` to `high`, so that panels can share a scale.
     #[must_use]
     pub fn including_y(mut self, low: f64, high: f64) -> Self {
         self.reach_y = Some((low, high));
@@ -96,62 +97,63 @@ impl Panel {
         self
     }
 
-    /// Places the legend.
+    /// Sets the position of the legend.
     #[must_use]
     pub fn legend(mut self, legend: Legend) -> Self {
         self.legend = legend;
         self
     }
 
-    /// Says which part of a frequency response the panel shows, so that an interactive figure can
-    /// show others: a magnitude whose curves have phases, and the phase in the panel after it.
+    /// States which part of a frequency response the panel shows, so that an interactive figure can
+    /// offer the other parts: a magnitude whose curves have phases, and the phase in the next
+    /// panel.
     #[must_use]
     pub fn part(mut self, part: ResponsePart) -> Self {
         self.part = Some(part);
         self
     }
 
-    /// Title.
+    /// Returns the title.
     pub fn name(&self) -> &str {
         &self.title
     }
 
-    /// The abscissa.
+    /// Returns the abscissa.
     pub fn x_axis(&self) -> &Axis {
         &self.x
     }
 
-    /// The ordinate.
+    /// Returns the ordinate.
     pub fn y_axis(&self) -> &Axis {
         &self.y
     }
 
-    /// The curves in order.
+    /// Returns the curves in order.
     pub fn data(&self) -> &[Curve] {
         &self.curves
     }
 
-    /// The reference lines in order.
+    /// Returns the reference lines in order.
     pub fn references(&self) -> &[Reference] {
         &self.references
     }
 
-    /// Style of each curve, in order.
+    /// Returns the style of each curve, in order.
     pub(crate) fn styles(&self) -> Vec<Resolved> {
         let mut next = 0;
         let slot = |curve: &Curve| {
             curve.slot.unwrap_or_else(|| {
-                let own = next;
-                // A band has the look of the line that follows it.
+                let slot = next;
+                // A band has the style of the line that follows it.
                 next += usize::from(curve.kind != Kind::Band);
-                own
+                slot
             })
         };
         let slots: Vec<usize> = self.curves.iter().map(slot).collect();
         self.curves.iter().zip(slots).map(|(curve, slot)| curve.style.resolve(slot)).collect()
     }
 
-    /// Checks every coordinate against what its axis can show.
+    /// Checks that every coordinate can be shown on its axis.
     pub(crate) fn validate(&self) -> Result<(), PlotError> {
         for axis in [&self.x, &self.y] {
             if let Some((low, high)) = axis.range
@@ -227,30 +229,31 @@ impl Panel {
         Ok(())
     }
 
-    /// Smallest and largest abscissa of the curves and reference lines.
+    /// Returns the smallest and largest abscissa of the curves and reference lines.
     pub(crate) fn x_extent(&self) -> (f64, f64) {
         let references =
             self.references.iter().filter(|line| !line.horizontal).map(|line| line.value);
         extent(self.curves.iter().flat_map(|curve| curve.x.iter().copied()).chain(references))
     }
 
-    /// Returns whether a marker or a stem needs room to stand beside the outermost points.
+    /// Returns whether markers or stems need space beyond the outermost points.
     pub(crate) fn has_markers(&self) -> bool {
         self.curves.iter().any(Curve::has_markers)
     }
 
-    /// The abscissae the panel shows when all points lie in `extent`, with room for markers or not.
+    /// Returns the abscissae that the panel shows when all points are in `extent`, with or without
+    /// space for markers.
     pub(crate) fn x_range(&self, extent: (f64, f64), markers: bool) -> (f64, f64) {
-        // Lines run from edge to edge.
+        // Lines extend from edge to edge.
         let margin = if markers { 0.03 } else { 0.0 };
         self.x.range.unwrap_or_else(|| {
             let (low, high) = padded(self.x.scale, extent.0, extent.1, margin);
-            // Positive times and frequencies do not get an axis with negative ones.
+            // An axis of positive times or frequencies does not begin below zero.
             (if extent.0 > 0.0 { low.max(0.0) } else { low }, high)
         })
     }
 
-    /// The ordinates the panel shows.
+    /// Returns the ordinates that the panel shows.
     pub(crate) fn y_range(&self) -> (f64, f64) {
         if let Some(range) = self.y.range {
             return range;
@@ -264,7 +267,7 @@ impl Panel {
             && self.curves.iter().any(|curve| curve.kind == Kind::Stems);
         if from_zero {
             let (low, high) = padded(Scale::Linear, low.min(0.0), high.max(0.0), 0.06);
-            // Stems that all rise stand on the frame.
+            // Stems with positive values begin at the frame.
             let rising = !self.curves.iter().flat_map(Curve::ordinates).any(|value| value < 0.0);
             return (if rising { 0.0 } else { low }, high);
         }

@@ -14,13 +14,14 @@ impl Figure {
     /// Returns the figure as an SVG document.
     ///
     /// # Errors
-    /// A panel or a curve without points, coordinates an axis cannot show, or a size without room to draw in.
+    /// A panel or a curve without points, coordinates that an axis cannot show, or a size that is
+    /// too small.
     pub fn to_svg(&self) -> Result<String, PlotError> {
         self.svg("", &self.title)
     }
 
-    /// Returns the figure as an SVG element for an HTML document beside others: its ids begin with `ids`,
-    /// different for each, and `label` is its name for readers who do not see it.
+    /// Returns the figure as an SVG element for an HTML document with several figures: its ids
+    /// begin with `ids`, different for each, and `label` is its name for screen readers.
     ///
     /// # Errors
     /// As [`Figure::to_svg`].
@@ -36,24 +37,26 @@ impl Figure {
         Ok(sheet.finish(label))
     }
 
-    /// Returns the figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.
+    /// Returns the figure as a PNG file with `scale` pixels for each px of the drawing: 2 for
+    /// screens and slides, 4 for print.
     ///
     /// # Errors
-    /// As [`Figure::to_svg`], and a scale that leads to an empty or an overlarge bitmap.
+    /// As [`Figure::to_svg`], and a scale for which the bitmap is empty or too large.
     pub fn to_png(&self, scale: f64) -> Result<Vec<u8>, PlotError> {
         bitmap::svg_to_png(&self.to_svg()?, scale)
     }
 
     /// Saves the figure as SVG or, at two pixels per px, as PNG, by the extension of `path`.
     ///
-    /// The file is written completely or not at all: a temporary file beside it is renamed.
+    /// The file is written completely or not at all: a temporary file in the same folder is
+    /// renamed.
     ///
     /// # Errors
     /// As [`Figure::to_svg`]; [`PlotError::Extension`] unless the extension is `.svg` or `.png`,
     /// [`PlotError::Write`] if the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
-        // Check the extension before drawing.
-        let format = save::Format::of(path.as_ref())?;
+        // The extension is checked before the drawing, which takes longer.
+        let format = save::Format::from_path(path.as_ref())?;
         save::write(path.as_ref(), format, &self.to_svg()?)
     }
 }

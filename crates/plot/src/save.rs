@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::bitmap::svg_to_png;
 use crate::error::PlotError;
 
-/// Pixels of a saved bitmap for each px of the drawing.
+/// Number of pixels of a saved bitmap for each px of the drawing.
 const SAVED_SCALE: f64 = 2.0;
 
 /// File format, chosen by the extension.
@@ -17,7 +17,7 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    pub(crate) fn of(path: &Path) -> Result<Self, PlotError> {
+    pub(crate) fn from_path(path: &Path) -> Result<Self, PlotError> {
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("svg") => Ok(Format::Svg),
@@ -27,13 +27,13 @@ impl Format {
     }
 }
 
-/// Saves an SVG document as it is or, at two pixels per px, as PNG, by the extension of `path`.
+/// Saves an SVG document unchanged or, at two pixels per px, as PNG, by the extension of `path`.
 ///
 /// # Errors
 /// [`PlotError::Extension`] unless the extension is `.svg` or `.png`, [`PlotError::Raster`] for a
 /// document that is not SVG, [`PlotError::Write`] if the file cannot be written.
 pub fn save_svg(path: impl AsRef<Path>, svg: &str) -> Result<(), PlotError> {
-    write(path.as_ref(), Format::of(path.as_ref())?, svg)
+    write(path.as_ref(), Format::from_path(path.as_ref())?, svg)
 }
 
 pub(crate) fn write(path: &Path, format: Format, svg: &str) -> Result<(), PlotError> {
@@ -44,14 +44,15 @@ pub(crate) fn write(path: &Path, format: Format, svg: &str) -> Result<(), PlotEr
     replace(path, &bytes).map_err(|source| PlotError::Write { path: path.to_owned(), source })
 }
 
-/// Writes a temporary file beside the target and renames it, so that no reader sees an incomplete file.
+/// Writes a temporary file in the same folder and renames it, so that the target is never
+/// incomplete.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     let mut builder = tempfile::Builder::new();
-    // A temporary file is private by default; a figure gets the rights of any other new file.
+    // A temporary file is private by default; a figure gets the permissions of any other new file.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;

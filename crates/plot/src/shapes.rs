@@ -1,4 +1,4 @@
-//! Shapes of modes as deflected lines, and matrices as squares.
+//! Mode shapes as deflected lines, and matrices as squares.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::style::Color;
 /// Modes to be drawn at the points of a structure.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ShapeDrawing {
-    /// Name and cartesian coordinates of each point, in one unit of length.
+    /// Name and Cartesian coordinates of each point, in one unit of length.
     pub points: Vec<(String, [f64; 3])>,
     /// Pairs of points, by their index, that a line joins.
     pub lines: Vec<[usize; 2]>,
@@ -22,9 +22,9 @@ pub struct ShapeDrawing {
 pub struct DrawnMode {
     /// Name, such as `mode 1: 12.5 Hz, damping ratio 2 %`.
     pub name: String,
-    /// Name below a small drawing.
+    /// Name under a small drawing.
     pub short_name: String,
-    /// Real and imaginary part of the displacement along x, y, z, for each point; of any scale.
+    /// Real and imaginary part of the displacement along x, y, z, for each point; in any scale.
     pub displacement: Vec<[[f64; 2]; 3]>,
 }
 
@@ -34,17 +34,18 @@ const SIZE: (f64, f64) = (640.0, 340.0);
 /// Size of a small drawing, px.
 const SMALL: (f64, f64) = (120.0, 64.0);
 
-/// Turn about the vertical axis, and tilt towards the reader, of the first view, in radians.
+/// Rotation about the vertical axis, and tilt towards the viewer, of the first view, in radians.
 const VIEW: (f64, f64) = (-0.5, 0.42);
 
-/// Largest displacement drawn, over the size of the structure; the script uses the same.
+/// Largest displacement in the drawing, relative to the size of the structure; the script uses the
+/// same value.
 const DEFLECTION: f64 = 0.16;
 
-/// Parts of width and height of the sheet that the structure fills at most, and part of its length that its depth adds to
-/// its height; the script uses the same.
+/// Maximum fractions of the width and height of the canvas that the structure fills, and fraction
+/// of its length that its depth adds to its height; the script uses the same values.
 const FILLED: (f64, f64, f64) = (0.7, 0.8, 0.45);
 
-/// Number of points up to which their names are written.
+/// Maximum number of points whose names are written.
 const NAMED: usize = 40;
 
 #[derive(Serialize)]
@@ -66,7 +67,7 @@ struct ModeData<'a> {
 }
 
 impl DrawnMode {
-    /// Returns the largest modulus of a displacement, or 1 if nothing moves.
+    /// Returns the largest modulus of a displacement, or 1 if all are zero.
     fn largest(&self) -> f64 {
         let sizes = self.displacement.iter().flatten().map(|[re, im]| re.hypot(*im));
         let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
@@ -75,7 +76,7 @@ impl DrawnMode {
 
     fn data(&self) -> ModeData<'_> {
         let largest = self.largest();
-        // Four digits of the largest: less than a dot of the screen.
+        // Four digits of the largest value are finer than the resolution of a screen.
         let short = |value: f64| (1e4 * value / largest).round() / 1e4 + 0.0;
         let point = |by: &[[f64; 2]; 3]| {
             let [[a, b], [c, d], [e, f]] = by.map(|entry| entry.map(short));
@@ -86,7 +87,7 @@ impl DrawnMode {
 }
 
 impl ShapeDrawing {
-    /// Returns whether points, lines and modes belong together and all numbers are finite.
+    /// Returns whether points, lines and modes are consistent and all numbers are finite.
     fn is_drawable(&self) -> bool {
         let has_points = |pair: &[usize; 2]| pair.iter().all(|at| *at < self.points.len());
         let is_finite = |mode: &DrawnMode| {
@@ -99,9 +100,10 @@ impl ShapeDrawing {
             && self.points.iter().all(|(_, at)| at.iter().all(|value| value.is_finite()))
     }
 
-    /// Draws the first mode at its largest deflection over the undeformed lines, and every mode small; with the
-    /// numbers for the script, which animates them: complex modes travel. An empty sheet without modes, with a line
-    /// to no point, a mode without a displacement for each point, or a number that is not finite.
+    /// Draws the first mode at its largest deflection on the undeformed lines, and small drawings
+    /// of all modes, with the numbers for the script, which animates them, so that complex modes
+    /// travel. The canvas is empty without modes, for a line with a missing point, a mode without a
+    /// displacement for each point, or a number that is not finite.
     pub fn draw(&self, label: &str) -> DrawnSet {
         let Some(first) = self.modes.first().filter(|_| self.is_drawable()) else {
             return DrawnSet { svg: Canvas::new(SIZE.0, SIZE.1).finish(label), map: Vec::new() };
@@ -116,7 +118,7 @@ impl ShapeDrawing {
             lines: &self.lines,
             modes: self.modes.iter().map(DrawnMode::data).collect(),
         };
-        // Numbers and texts have no way to fail.
+        // Numbers and texts can always be serialised.
         let json = serde_json::to_string(&data).unwrap_or_default();
         let svg = self.sheet(first, SIZE, true).finish(label);
         let svg = svg.replacen("<svg ", "<svg class=\"shape\" ", 1);
@@ -132,8 +134,8 @@ impl ShapeDrawing {
         let mut sheet = Canvas::new(size.0, size.1);
         let view = View::new(&self.points, size);
         let factor = DEFLECTION * view.size / mode.largest();
-        let still: Vec<[f64; 3]> = self.points.iter().map(|(_, position)| *position).collect();
-        let moved: Vec<[f64; 3]> = still
+        let undeformed: Vec<[f64; 3]> = self.points.iter().map(|(_, position)| *position).collect();
+        let moved: Vec<[f64; 3]> = undeformed
             .iter()
             .zip(&mode.displacement)
             .map(|(at, by)| [0, 1, 2].map(|axis| at[axis] + factor * by[axis][0]))
@@ -145,7 +147,7 @@ impl ShapeDrawing {
             };
             sheet.segments(self.lines.iter().map(ends), stroke);
         };
-        lines(&still, Stroke::solid(Color::GREY, if has_words { 1.0 } else { 0.6 }));
+        lines(&undeformed, Stroke::solid(Color::GREY, if has_words { 1.0 } else { 0.6 }));
         lines(&moved, Stroke::solid(Color::BLUE, if has_words { 2.0 } else { 1.2 }));
         let spots: Vec<(f64, f64)> = moved.iter().map(|at| view.project(*at)).collect();
         sheet.discs(&spots, if has_words { 3.0 } else { 1.6 }, Color::VERMILION);
@@ -196,11 +198,12 @@ impl View {
     }
 }
 
-/// Number of modes above which a matrix has no numbers in its squares: they would not fit.
+/// Maximum number of modes for which the squares of a matrix have numbers; with more, they do not
+/// fit.
 const NUMBERED: usize = 20;
 
-/// Draws a square matrix of pure numbers from 0 to 1, row by row, as squares, darker for more, with
-/// the numbers in them.
+/// Draws a square matrix of pure numbers from 0 to 1, row by row, as squares with their numbers;
+/// larger numbers are darker.
 pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     const EDGE: f64 = 34.0;
     let side = (440.0 / values.len().max(1) as f64).clamp(14.0, 46.0);
@@ -217,7 +220,7 @@ pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     for row in 0..values.len() {
         for column in 0..values.len() {
             let value = values[row].get(column).copied().unwrap_or(0.0);
-            // Light enough for dark digits.
+            // The colour stays light enough for dark digits.
             sheet.open_faded(0.06 + 0.4 * value);
             let corner = (at(column) + 1.0, at(row) + 1.0);
             sheet.rect(corner, (side - 2.0, side - 2.0), Some(Color::BLUE), None);

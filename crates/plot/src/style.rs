@@ -1,4 +1,4 @@
-//! Colours, dashes and markers that colour-blind readers and grey print can distinguish.
+//! Colours, dashes and markers that can be distinguished in grey print and by colour-blind readers.
 
 /// Font size of captions and legends, px.
 pub(crate) const LABEL_SIZE: f64 = 13.0;
@@ -9,7 +9,7 @@ pub(crate) const TITLE_SIZE: f64 = 15.0;
 /// Font size of the title of a panel, px.
 pub(crate) const PANEL_TITLE_SIZE: f64 = 13.0;
 
-/// A colour of the drawing, written the way SVG writes it (`#rrggbb`).
+/// Colour in SVG notation (`#rrggbb`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Color(pub &'static str);
 
@@ -26,7 +26,7 @@ impl Color {
     pub const ORANGE: Color = Color("#e69f00");
     /// Sky blue of the Okabe–Ito palette.
     pub const SKY: Color = Color("#56b4e9");
-    /// Black: the truth, the reference, the measurement.
+    /// Black: the true value, the reference, the measurement.
     pub const BLACK: Color = Color("#000000");
     /// Dark grey: frames and tick labels.
     pub const DARK: Color = Color("#333333");
@@ -35,7 +35,8 @@ impl Color {
     /// White: the paper.
     pub const WHITE: Color = Color("#ffffff");
 
-    /// Curve colours in the order of the curves of a panel. The palette's yellow is left out: it vanishes on white paper.
+    /// Curve colours in the order of the curves of a panel. The yellow of the palette is omitted,
+    /// because it is hardly visible on white paper.
     ///
     /// # Source
     /// M. Okabe and K. Ito, *Color Universal Design* (2008).
@@ -63,7 +64,7 @@ impl Dash {
     const CYCLE: [Dash; 5] =
         [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::LongDash, Dash::Dotted];
 
-    /// The SVG dash array for a stroke of the given width, px; `None` for a solid line.
+    /// Returns the SVG dash array for a stroke of the given width, px; `None` for a solid line.
     pub(crate) fn array(self, width: f64) -> Option<Vec<f64>> {
         let pattern: &[f64] = match self {
             Dash::Solid => return None,
@@ -106,7 +107,7 @@ impl Marker {
     ];
 }
 
-/// Look of one curve: parts that are `None` follow the place of the curve in its panel.
+/// Style of one curve: parts that are `None` follow the index of the curve in its panel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Style {
     pub(crate) color: Option<Color>,
@@ -115,7 +116,7 @@ pub(crate) struct Style {
     pub(crate) width: Option<f64>,
 }
 
-/// A style with every part set.
+/// Style with every part set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Resolved {
     pub(crate) color: Color,
@@ -125,7 +126,7 @@ pub(crate) struct Resolved {
 }
 
 impl Style {
-    /// Style of curve number `slot` of a panel.
+    /// Returns the style of curve number `slot` of a panel.
     pub(crate) fn resolve(self, slot: usize) -> Resolved {
         Resolved {
             color: self.color.unwrap_or(Color::CYCLE[slot % Color::CYCLE.len()]),

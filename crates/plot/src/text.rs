@@ -15,12 +15,13 @@ pub enum Weight {
     Bold,
 }
 
-/// Family names offered to a viewer: the embedded font first, then similar fonts, then any sans serif.
-/// [`Canvas::text`](crate::Canvas::text) states each text's length, so another font changes the letters and not the layout.
+/// Font families for a viewer: the embedded font first, then similar fonts, then any sans serif.
+/// [`Canvas::text`](crate::Canvas::text) states the length of each text, so another font does not
+/// change the layout.
 pub(crate) const FAMILY: &str =
     "Noto Sans, Open Sans, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif";
 
-/// The embedded font's files: regular, bold, italic.
+/// Files of the embedded font: regular, bold, italic.
 pub(crate) const FONTS: [&[u8]; 3] =
     [notosans::REGULAR_TTF, notosans::BOLD_TTF, notosans::ITALIC_TTF];
 
@@ -29,10 +30,10 @@ static REGULAR: LazyLock<Option<FontRef<'static>>> =
 static BOLD: LazyLock<Option<FontRef<'static>>> =
     LazyLock::new(|| FontRef::new(notosans::BOLD_TTF).ok());
 
-/// Size of a raised or lowered run, as a fraction of the size of the text.
+/// Size of a superscript or subscript, as a fraction of the size of the text.
 pub(crate) const SCRIPT_SIZE: f64 = 0.72;
 
-/// Height of a run of text.
+/// Vertical position of a run of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Level {
     Base,
@@ -61,10 +62,11 @@ pub(crate) fn runs(text: &str) -> Vec<(Level, &str)> {
     runs
 }
 
-/// Width of `text` in px at `size` px, from the advance widths of the embedded font; `^{…}` and `_{…}` count as drawn.
+/// Returns the width of `text` in px at `size` px, from the advance widths of the embedded font;
+/// superscripts `^{…}` and subscripts `_{…}` have their drawn size.
 ///
-/// Kerning is left out: it changes labels by less than a hundredth, and a layout needs an upper bound.
-/// A character the font lacks counts as 0.6 em.
+/// Kerning is ignored: it changes labels by less than a hundredth, and a layout needs an upper
+/// bound. A character that the font lacks has a width of 0.6 em.
 pub fn text_width(text: &str, size: f64, weight: Weight) -> f64 {
     let part = |level| if level == Level::Base { 1.0 } else { SCRIPT_SIZE };
     runs(text).into_iter().map(|(level, run)| size * part(level) * ems(run, weight)).sum()
@@ -79,7 +81,7 @@ fn ems(text: &str, weight: Weight) -> f64 {
     let unknown = UNKNOWN_EM * text.chars().count() as f64;
     font.map_or(unknown, |font| {
         let characters = font.charmap();
-        // Scaled metrics are rounded to a grid; font units are exact.
+        // Scaled metrics are rounded to a grid, whereas font units are exact.
         let glyphs = font.glyph_metrics(Size::unscaled(), LocationRef::default());
         let em = f64::from(font.metrics(Size::unscaled(), LocationRef::default()).units_per_em);
         let advance = |character| glyphs.advance_width(characters.map(character)?);

@@ -13,7 +13,8 @@ pub(crate) struct Ticks {
     pub(crate) factor: Option<String>,
 }
 
-/// Ticks on `low..=high`, about `wanted` of them; `step` fixes the distance on a linear axis.
+/// Returns ticks on `low..=high`, about `wanted` of them; `step` sets the distance on a linear
+/// axis.
 pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     match scale {
         Scale::Linear => linear(low, high, wanted, step),
@@ -22,7 +23,7 @@ pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option
 }
 
 fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
-    // A step that gives more than forty labels is not used.
+    // A step with more than forty labels is ignored.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
         .unwrap_or_else(|| {
@@ -43,27 +44,30 @@ fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     Ticks { major, minor: Vec::new(), factor }
 }
 
-/// The first multiple of `step` on `low..=high`, and how many there are.
+/// Returns the first multiple of `step` on `low..=high`, and their number.
 fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
     let first = (low / step - 1e-9).ceil();
     let last = (high / step + 1e-9).floor();
     (first, (last - first).max(-1.0) as usize + 1)
 }
 
-/// Returns `step`, or one of the next finer ones if it gives fewer than two ticks: a single tick does
-/// not show the length of the axis.
+/// Returns `step`, or a finer one if it gives fewer than two ticks: a single tick does not show the
+/// scale of the axis.
 fn step_of_two_ticks(low: f64, high: f64, step: f64) -> f64 {
     let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
     finer.take(3).find(|step| multiples(low, high, *step).1 >= 2).unwrap_or(step)
 }
 
-/// Part of an axis beyond its last tick, at either end, above which finer steps are tried.
+/// Maximum fraction of an axis beyond its last tick, at either end; above it, finer steps are
+/// tried.
 const END: f64 = 0.1;
 
-/// Number of ticks over the number wanted, up to which they may be finer to reach the ends.
+/// Maximum ratio of the number of ticks to the wanted number, for finer steps that reach nearer to
+/// the ends.
 const CROWDED: f64 = 1.6;
 
-/// Returns `step`, or one of the next finer ones whose ticks come nearer to the ends of the axis, if they have room.
+/// Returns `step`, or a finer one whose ticks are nearer to the ends of the axis, if there is space
+/// for them.
 fn step_to_the_ends(low: f64, high: f64, wanted: f64, step: f64) -> f64 {
     let near = |step: &f64| {
         let (first, count) = multiples(low, high, *step);
@@ -77,7 +81,7 @@ fn step_to_the_ends(low: f64, high: f64, wanted: f64, step: f64) -> f64 {
     finer.find(near).unwrap_or(step)
 }
 
-/// The least of 1, 2, 5 × 10ⁿ that is not below `rough`.
+/// Returns the smallest of 1, 2, 5 × 10ⁿ that is not below `rough`.
 fn nice_step(rough: f64) -> f64 {
     let decade = 10f64.powf(rough.log10().floor());
     let mantissa = rough / decade;
@@ -85,7 +89,7 @@ fn nice_step(rough: f64) -> f64 {
     decade * nice.unwrap_or(10.0)
 }
 
-/// Engineering exponent taken out of labels that would otherwise be long: a multiple of three.
+/// Returns the engineering exponent, a multiple of three, for labels that would otherwise be long.
 fn common_exponent(largest: f64) -> i32 {
     let exponent = largest.log10().floor();
     if largest == 0.0 || (-2.0..5.0).contains(&exponent) {
@@ -95,7 +99,8 @@ fn common_exponent(largest: f64) -> i32 {
     }
 }
 
-/// Decimals that write every multiple of `step` exactly (steps have at most two digits), at most twelve.
+/// Returns the number of decimals, at most twelve, with which every multiple of `step` is exact
+/// (steps have at most two digits).
 fn decimals(step: f64) -> usize {
     (0..12)
         .find(|&digits| {
@@ -130,7 +135,7 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         };
         let labelled = subdivisions(first..=last, &[1, 2, 5]).filter(|value| inside(*value));
         let mut labelled: Vec<f64> = labelled.collect();
-        // As many as have room; otherwise powers of ten, and the ends.
+        // Only powers of ten and the ends are labelled if there is no space for all labels.
         if labelled.len() as f64 > wanted {
             let ends = [labelled.first().copied(), labelled.last().copied()];
             let is_decade = |value: f64| decades.iter().any(|n| is_same(value, 10f64.powi(*n)));
@@ -158,12 +163,13 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
     Ticks { major, minor, factor: None }
 }
 
-/// Returns whether two ticks are one.
+/// Returns whether two ticks are equal up to rounding.
 fn is_same(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < 1e-6
 }
 
-/// Less than a decade between labelled powers: label 1, 2, 5 inside the decade, or a linear choice when that is too few.
+/// Returns the ticks of an axis with less than one decade between labelled powers: 1, 2, 5 within
+/// the decade, or linear ticks if these are too few.
 fn short_logarithmic(
     low: f64,
     high: f64,
@@ -196,14 +202,14 @@ fn subdivisions(
     decades.flat_map(move |n| digits.iter().map(move |&digit| f64::from(digit) * 10f64.powi(n)))
 }
 
-/// A decimal number with a true minus sign.
+/// Returns a decimal number with a true minus sign.
 fn plain(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
     let is_zero = text.bytes().all(|byte| byte == b'0' || byte == b'.');
     if value < 0.0 && !is_zero { format!("−{text}") } else { text }
 }
 
-/// A power of ten, marked up for [`Canvas::text`](crate::Canvas::text).
+/// Returns a power of ten in the notation of [`Canvas::text`](crate::Canvas::text).
 fn power(exponent: i32) -> String {
     let sign = if exponent < 0 { "−" } else { "" };
     format!("10^{{{sign}{}}}", exponent.abs())

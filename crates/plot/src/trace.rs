@@ -1,4 +1,4 @@
-//! Curves as pixels: mapped, thinned out, and tested for collisions with legends.
+//! Curves in pixels: mapped, thinned out, and tested for overlap with legends.
 
 use std::collections::HashSet;
 
@@ -7,21 +7,22 @@ use crate::canvas::Point;
 use crate::curve::{Curve, Kind};
 use crate::marks::LEAST_RADIUS;
 
-/// The two mappings of a panel.
+/// Mappings of abscissa and ordinate of a panel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mappings {
     pub(crate) x: Mapping,
     pub(crate) y: Mapping,
 }
 
-/// Pixels of the points `(x, y)`. Values far outside the panel are limited to what a viewer computes exactly.
+/// Returns the pixels of the points `(x, y)`. Values far outside the panel are limited to the range
+/// that viewers compute exactly.
 pub(crate) fn map(maps: Mappings, x: &[f64], y: &[f64]) -> Vec<Point> {
     const FAR: f64 = 1e5;
     let pixel = |map: Mapping, value: f64| map.pixel(value).clamp(-FAR, FAR);
     x.iter().zip(y).map(|(&x, &y)| (pixel(maps.x, x), pixel(maps.y, y))).collect()
 }
 
-/// Ordinate at which stems stand, px.
+/// Returns the ordinate at which stems begin, px.
 pub(crate) fn stem_base(maps: Mappings, scale: Scale, range: (f64, f64)) -> f64 {
     match scale {
         Scale::Linear => maps.y.pixel(0f64.clamp(range.0, range.1)),
@@ -31,22 +32,22 @@ pub(crate) fn stem_base(maps: Mappings, scale: Scale, range: (f64, f64)) -> f64 
 
 /// Keeps the first, the lowest, the highest and the last point of a line in each column of pixels.
 ///
-/// The drawn line is the same to within a pixel, and a record of a million samples stays a small file.
-/// Lines that run back in x, and lines with few points, are kept as they are.
+/// The drawn line is the same to within a pixel, and the file of a record of a million samples
+/// stays small. Lines whose x is not monotonic, and lines with few points, are not changed.
 pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     if are_few(&points, width) || points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
         return points;
     }
-    let mut kept = Vec::new();
+    let mut thinned = Vec::new();
     for column in points.chunk_by(|a, b| a.0.floor() == b.0.floor()) {
         let by_height = |a: &&Point, b: &&Point| a.1.total_cmp(&b.1);
-        let place = |point: Option<&Point>| {
+        let index_of = |point: Option<&Point>| {
             point.and_then(|point| column.iter().position(|other| other == point))
         };
         let mut places: Vec<usize> = [
             Some(0),
-            place(column.iter().min_by(by_height)),
-            place(column.iter().max_by(by_height)),
+            index_of(column.iter().min_by(by_height)),
+            index_of(column.iter().max_by(by_height)),
             Some(column.len() - 1),
         ]
         .into_iter()
@@ -54,35 +55,35 @@ pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
         .collect();
         places.sort_unstable();
         places.dedup();
-        kept.extend(places.into_iter().map(|place| column[place]));
+        thinned.extend(places.into_iter().map(|at| column[at]));
     }
-    kept
+    thinned
 }
 
-/// Returns whether these are no more points than a line keeps in a panel of this width, in px.
+/// Returns whether there are no more points than a thinned line has in a panel of this width, in
+/// px.
 fn are_few(points: &[Point], width: f64) -> bool {
     points.len() as f64 <= 4.0 * width
 }
 
-/// Keeps the first of the points that fall on the same cell: the others would be hidden. A
-/// cell is half a pixel wide and high, and where many points make a cloud as large as a marker of
-/// this radius, in px.
+/// Keeps the first of the points in the same cell: the others would be hidden. A cell is half a
+/// pixel wide and high or, if many points form a cloud, as large as a marker of this radius, in px.
 pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<Point> {
     let cell = if are_few(&points, width) { 0.5 } else { 2.0 * radius };
-    let place = |value: f64| (value / cell).floor() as i64;
+    let cell_index = |value: f64| (value / cell).floor() as i64;
     let mut taken = HashSet::with_capacity(points.len());
-    points.into_iter().filter(|(x, y)| taken.insert((place(*x), place(*y)))).collect()
+    points.into_iter().filter(|(x, y)| taken.insert((cell_index(*x), cell_index(*y)))).collect()
 }
 
-/// Indices of the first point in each cell of this radius, in px.
+/// Returns the indices of the first point in each cell of this radius, in px.
 pub(crate) fn thinned_indices(points: &[Point], radius: f64) -> Vec<usize> {
     let cell = |value: f64| (value / (2.0 * radius)).floor() as i64;
     let mut taken = HashSet::new();
     (0..points.len()).filter(|k| taken.insert((cell(points[*k].0), cell(points[*k].1)))).collect()
 }
 
-/// Keeps the highest and the lowest point of each of `columns` columns, whatever the number of points; the
-/// points as they are where they run back.
+/// Keeps the highest and the lowest point of each of `columns` columns, for any number of points;
+/// returns the points unchanged if x is not monotonic.
 pub(crate) fn thin_coarsely(points: Vec<Point>, columns: f64) -> Vec<Point> {
     let is_cloud = points.windows(2).any(|pair| pair[1].0 < pair[0].0);
     if points.len() as f64 <= columns {
@@ -114,14 +115,14 @@ pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
         .collect()
 }
 
-/// A straight segment of a drawing.
+/// Straight segment of a drawing.
 pub(crate) type Segment = (Point, Point);
 
 /// Returns all lines of a curve as straight segments; a marker is a segment without length.
 pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Segment> {
     let chain = |points: Vec<Point>| -> Vec<Segment> {
         let points = thin_out(points, width);
-        // The first point counts alone, or a curve of one point would draw nothing.
+        // The first point is a separate segment, because a curve of one point has no other segment.
         let first = points.first().map(|&point| (point, point));
         first.into_iter().chain(points.windows(2).map(|pair| (pair[0], pair[1]))).collect()
     };

@@ -1,17 +1,18 @@
-//! Numbers as text for the script, each list once.
+//! Numbers as text for the script, with each list written once.
 
 use std::collections::HashMap;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Number of values up to which a list is written in decimal digits, all of them; longer ones in single precision.
+/// Maximum length of a list that is written with all decimal digits; longer ones are in single
+/// precision.
 const EXACT: usize = 100;
 
-/// Largest deviation of an even list from its step, in steps.
+/// Maximum deviation of an evenly spaced list from its step, in steps.
 const EVEN: f64 = 1e-9;
 
-/// Lists by their text.
+/// Lists, identified by their text.
 #[derive(Debug, Default)]
 pub(super) struct Arrays {
     texts: Vec<String>,
@@ -19,17 +20,17 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
-    /// Adds a list and returns its index; `[]` has none.
+    /// Adds a list and returns its index; `None` for an empty list.
     pub fn add(&mut self, values: &[f64]) -> Option<usize> {
         (!values.is_empty()).then(|| self.insert(text(values, 4)))
     }
 
-    /// Adds phases in degrees, of which four digits suffice.
+    /// Adds phases in degrees, for which four digits are sufficient.
     pub fn add_phase(&mut self, degrees: &[f64]) -> Option<usize> {
         (!degrees.is_empty()).then(|| self.insert(text(degrees, 3)))
     }
 
-    /// Adds positive numbers of which two digits suffice, such as standard errors.
+    /// Adds positive numbers for which two digits are sufficient, such as standard errors.
     pub fn add_rough(&mut self, values: &[f64]) -> Option<usize> {
         (!values.is_empty()).then(|| self.insert(single_precision(values, 1.0, 2)))
     }
@@ -49,7 +50,8 @@ impl Arrays {
     }
 }
 
-/// Writes a list; a long one that is not even with this many bytes of single precision.
+/// Writes a list; a long list that is not evenly spaced gets this many bytes of single precision
+/// per number.
 fn text(values: &[f64], bytes: usize) -> String {
     let (first, last, len) = (values[0], values[values.len() - 1], values.len());
     if len <= EXACT {
@@ -62,19 +64,20 @@ fn text(values: &[f64], bytes: usize) -> String {
     if step.is_finite() && step != 0.0 && values.iter().enumerate().all(is_near) {
         return format!("e {first:?} {last:?} {len}");
     }
-    // A power of two keeps the digits, and the numbers within the range of single precision.
+    // A power of two preserves the digits and brings the numbers into the range of single
+    // precision.
     let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let scale =
         if largest > 0.0 { largest.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
     single_precision(values, scale, bytes)
 }
 
-/// Writes values over a scale with the first two, three or four bytes of single precision.
+/// Writes values divided by a scale with the first two, three or four bytes of single precision.
 fn single_precision(values: &[f64], scale: f64, bytes: usize) -> String {
     let kind = ["h", "m", "f"][bytes.clamp(2, 4) - 2];
     let first = |value: &f64| ((value / scale) as f32).to_le_bytes().into_iter().skip(4 - bytes);
-    let all: Vec<u8> = values.iter().flat_map(first).collect();
-    format!("{kind} {scale:?} {}", STANDARD.encode(all))
+    let bytes_of_all: Vec<u8> = values.iter().flat_map(first).collect();
+    format!("{kind} {scale:?} {}", STANDARD.encode(bytes_of_all))
 }
 
 #[cfg(test)]

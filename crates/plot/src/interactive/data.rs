@@ -1,4 +1,4 @@
-//! Data that the script reads: axes, curves and numbers of figures, as JSON.
+//! Data for the script: axes, curves and numbers of figures, as JSON.
 
 use serde::Serialize;
 
@@ -11,11 +11,11 @@ use crate::panel::{Panel, ResponsePart};
 use crate::style::{Marker, Resolved};
 use crate::trace;
 
-/// Number of points of a curve up to which all are kept; more than a screen shows, and more than a response has
-/// lines in most tests. A longer record keeps its extremes.
+/// Maximum number of points of a curve that are all written: more than a screen shows, and more
+/// than the lines of a response in most tests. Of a longer record, the extremes are written.
 const POINTS: usize = 8192;
 
-/// Number of columns of a thinned record; each keeps first, lowest, highest and last point.
+/// Number of columns of a thinned record; each has its first, lowest, highest and last point.
 const COLUMNS: f64 = 1024.0;
 
 /// Radius of a marker of a thinned cloud, in columns.
@@ -25,7 +25,7 @@ const CLOUD: f64 = 2.0;
 struct Data<'a> {
     #[serde(rename = "w")]
     width: f64,
-    /// Figures of which one is shown.
+    /// Figures; one of them is shown.
     #[serde(rename = "v")]
     views: Vec<View<'a>>,
     #[serde(rename = "a")]
@@ -100,7 +100,7 @@ struct CurveData<'a> {
     dash: Option<Vec<f64>>,
     #[serde(rename = "m", skip_serializing_if = "Option::is_none")]
     marker: Option<&'static str>,
-    /// Number of points of which those here were kept.
+    /// Number of points before thinning.
     #[serde(rename = "of", skip_serializing_if = "Option::is_none")]
     thinned: Option<usize>,
 }
@@ -139,7 +139,7 @@ pub(super) fn json(members: &[(String, Figure)], layouts: &[Layout]) -> String {
     });
     let views: Vec<View<'_>> = views.collect();
     let width = layouts.first().map_or(0.0, |layout| layout.size.0);
-    // Plain numbers and texts have no way to fail.
+    // Numbers and texts can always be serialised.
     serde_json::to_string(&Data { width, views, arrays: arrays.into_texts() }).unwrap_or_default()
 }
 
@@ -244,7 +244,7 @@ fn marker_name(marker: Marker) -> &'static str {
     }
 }
 
-/// Keeps of a long record what a screen can show: abscissae, ordinates, upper edge.
+/// Reduces a long record to what a screen can show: abscissae, ordinates, upper edge.
 fn thin(panel: &Panel, curve: &Curve, layout: &PanelLayout) -> [Vec<f64>; 3] {
     let (low, high) = layout.x_range;
     let across = Mapping::new(panel.x.scale, (low, high), (0.0, COLUMNS));
@@ -253,11 +253,12 @@ fn thin(panel: &Panel, curve: &Curve, layout: &PanelLayout) -> [Vec<f64>; 3] {
         let down = Mapping::new(panel.y.scale, layout.y_range, (0.0, COLUMNS));
         let maps = trace::Mappings { x: across, y: down };
         let points = trace::map(maps, &curve.x, &curve.y);
-        let kept = trace::thinned_indices(&points, CLOUD);
-        let pick = |values: &[f64]| kept.iter().filter_map(|k| values.get(*k).copied()).collect();
+        let indices = trace::thinned_indices(&points, CLOUD);
+        let pick =
+            |values: &[f64]| indices.iter().filter_map(|k| values.get(*k).copied()).collect();
         return [pick(&curve.x), pick(&curve.y), pick(&curve.upper)];
     }
-    let mut kept = Vec::new();
+    let mut retained = Vec::new();
     let indices: Vec<usize> = (0..curve.x.len()).collect();
     let column = |k: &usize| across.pixel(curve.x[*k]).floor();
     for of_column in indices.chunk_by(|a, b| column(a) == column(b)) {
@@ -273,9 +274,9 @@ fn thin(panel: &Panel, curve: &Curve, layout: &PanelLayout) -> [Vec<f64>; 3] {
             of_column[of_column.len() - 1],
         ];
         of_column.sort_unstable();
-        kept.extend_from_slice(&of_column);
+        retained.extend_from_slice(&of_column);
     }
-    kept.dedup();
-    let pick = |values: &[f64]| kept.iter().filter_map(|k| values.get(*k).copied()).collect();
+    retained.dedup();
+    let pick = |values: &[f64]| retained.iter().filter_map(|k| values.get(*k).copied()).collect();
     [pick(&curve.x), pick(&curve.y), pick(&curve.upper)]
 }

@@ -1,4 +1,4 @@
-//! The script of interactive figures, the policy under which it runs, and a page of one figure.
+//! The script of interactive figures, its content security policy, and a page of one figure.
 
 use std::sync::LazyLock;
 
@@ -16,24 +16,25 @@ static POLICY: LazyLock<String> = LazyLock::new(|| {
     format!("default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{hash}'")
 });
 
-/// Returns the script that makes figures with `metadata` answer: zoom, cursor, legend, scales, animation.
+/// Returns the script that makes figures with `metadata` interactive: zoom, cursor, legend, scales,
+/// animation.
 ///
-/// It has no dependency, loads nothing, and takes names as text only. A page that carries it inline needs the
-/// [`content_policy`].
+/// It has no dependency, loads no other file, and treats names as text only. A page that includes
+/// it inline needs the [`content_policy`].
 pub fn script() -> &'static str {
     &SCRIPT
 }
 
-/// Returns the content security policy of a page: nothing is loaded, and nothing runs but the [`script()`],
-/// known by its hash, whatever a name in a record says.
+/// Returns the content security policy of a page: no other file is loaded, and only the
+/// [`script()`], identified by its hash, is run, even if a name in a record contains HTML.
 pub fn content_policy() -> &'static str {
     &POLICY
 }
 
-/// Look of what the script adds beside a figure.
+/// Style of the elements that the script adds to a figure.
 pub const FIGURE_STYLE: &str = include_str!("figure.css");
 
-/// A page of drawn figures.
+/// Returns a page of drawn figures.
 pub(super) fn page(title: &str, figures: &str) -> String {
     let heading = if title.is_empty() { "Figure".into() } else { escape(title) };
     let above = if title.is_empty() { String::new() } else { format!("<h1>{heading}</h1>") };

@@ -1,4 +1,5 @@
-//! Figures that answer: their numbers beside their drawing, the script that zooms in them, and pages of one figure.
+//! Interactive figures: their numbers in the SVG, the script that zooms in them, and pages of one
+//! figure.
 
 mod arrays;
 mod data;
@@ -12,7 +13,7 @@ use crate::layout::Layout;
 
 pub use self::html::{FIGURE_STYLE, content_policy, script};
 
-/// Figures of one kind of which one is shown at a time, such as the responses of a matrix.
+/// Figures of one kind that are shown one at a time, such as the responses of a matrix.
 ///
 /// ```
 /// use mechid_plot::{Axis, Curve, Figure, FigureSet, Panel};
@@ -21,7 +22,8 @@ pub use self::html::{FIGURE_STYLE, content_policy, script};
 ///     let panel = Panel::new(Axis::linear("Time", "s"), Axis::linear("x", "m"));
 ///     Figure::new("").panel(panel.curve(Curve::line("", &[0.0, 1.0], &y)))
 /// };
-/// let set = FigureSet::new([("x1".to_owned(), one([0.0, 1.0])), ("x2".to_owned(), one([1.0, 0.0]))]);
+/// let [x1, x2] = [one([0.0, 1.0]), one([1.0, 0.0])];
+/// let set = FigureSet::new([("x1".to_owned(), x1), ("x2".to_owned(), x2)]);
 /// let drawn = set.draw("shapes", "Two displacements")?;
 /// assert_eq!(drawn.map.len(), 2);
 /// assert!(drawn.svg.contains("<metadata>"));
@@ -32,17 +34,17 @@ pub struct FigureSet {
     members: Vec<(String, Figure)>,
 }
 
-/// A drawn set: the figure shown first, with the numbers of all, and a small drawing of each.
+/// Drawn set: the first figure, with the numbers of all, and a small drawing of each.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DrawnSet {
-    /// SVG of the first figure, which holds the numbers of all in an element `metadata`.
+    /// SVG of the first figure, with the numbers of all in an element `metadata`.
     pub svg: String,
     /// Name and small SVG of each figure, in order; empty for a single one.
     pub map: Vec<(String, String)>,
 }
 
 impl FigureSet {
-    /// Gathers named figures; the first is the one shown at first.
+    /// Creates a set of named figures; the first one is shown at first.
     pub fn new(members: impl IntoIterator<Item = (String, Figure)>) -> Self {
         Self { members: members.into_iter().collect() }
     }
@@ -52,8 +54,8 @@ impl FigureSet {
         &self.members
     }
 
-    /// Draws the set for an HTML document beside others: its ids begin with `ids`, different for each, and
-    /// `label` is its name for readers who do not see it.
+    /// Draws the set for an HTML document with several sets: its ids begin with `ids`, different
+    /// for each, and `label` is its name for screen readers.
     ///
     /// # Errors
     /// [`PlotError::NoPanels`] without figures; as [`Figure::to_svg`] for each.
@@ -82,20 +84,23 @@ impl FigureSet {
 }
 
 impl DrawnSet {
-    /// Returns the drawing, with the small ones to choose by, as elements of an HTML document.
+    /// Returns the drawing, with the small drawings to choose from, as elements of an HTML
+    /// document.
     pub fn html(&self) -> String {
         let button = |(name, svg): &(String, String)| {
             format!("<button type=\"button\">{svg}{}</button>", crate::canvas::escape(name))
         };
         let buttons: String = self.map.iter().map(button).collect();
-        match buttons.is_empty() {
-            true => self.svg.clone(),
-            false => format!("{}<div class=\"map\">{buttons}</div>", self.svg),
+        if buttons.is_empty() {
+            self.svg.clone()
+        } else {
+            format!("{}<div class=\"map\">{buttons}</div>", self.svg)
         }
     }
 }
 
-/// Returns an HTML page of drawings below one another, which zooms, has a cursor and loads nothing.
+/// Returns an HTML page of drawings below one another, which has zoom and cursor and loads no other
+/// file.
 pub fn page_of(title: &str, drawings: &[DrawnSet]) -> String {
     let figures: String = drawings
         .iter()
@@ -105,8 +110,8 @@ pub fn page_of(title: &str, drawings: &[DrawnSet]) -> String {
 }
 
 impl Figure {
-    /// Returns the figure as [`Figure::to_inline_svg`] does, with its numbers for the [`script()`] that makes
-    /// it answer.
+    /// Returns the figure as [`Figure::to_inline_svg`] does, with its numbers for the [`script()`]
+    /// that makes it interactive.
     ///
     /// # Errors
     /// As [`Figure::to_svg`].
@@ -114,7 +119,7 @@ impl Figure {
         Ok(FigureSet::new([(String::new(), self.clone())]).draw(ids, label)?.svg)
     }
 
-    /// Returns an HTML page of the figure, which zooms, has a cursor and loads nothing.
+    /// Returns an HTML page of the figure, which has zoom and cursor and loads no other file.
     ///
     /// # Errors
     /// As [`Figure::to_svg`].
@@ -124,7 +129,8 @@ impl Figure {
     }
 }
 
-/// Puts text for the script behind the title of a document, with the signs of XML escaped.
+/// Inserts text for the script after the title of a document, with the special characters of XML
+/// escaped.
 pub fn with_metadata(svg: &str, json: &str) -> String {
     let text = crate::canvas::escape(json);
     svg.replacen("</title>", &format!("</title><metadata>{text}</metadata>"), 1)

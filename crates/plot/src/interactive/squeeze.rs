@@ -1,7 +1,7 @@
-//! The script as a page carries it: without comments, without spaces that mean nothing, and with short names.
+//! Shortened script for pages: without comments and unnecessary spaces, and with short names.
 
-/// Names of the script's own that are written short. None is a name of the browser, a key of the data, or
-/// spelled out in a text of the script.
+/// Names defined by the script that are shortened. None is a name of the browser, a key of the
+/// data, or part of a text of the script.
 const LONG: [&str; 105] = [
     "frame",
     "state",
@@ -110,13 +110,14 @@ const LONG: [&str; 105] = [
     "decimals",
 ];
 
-/// Returns the script in fewer characters, which do the same.
+/// Returns an equivalent script with fewer characters.
 pub(super) fn squeeze(script: &str) -> String {
     let lines = script.lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
     let text: Vec<char> = lines.collect::<Vec<_>>().join("\n").chars().collect();
     let mut out = String::with_capacity(text.len());
-    // Open strings and templates; a brace for each expression within a template.
+    // This stack has the open strings and templates, and a brace for each expression within a
+    // template.
     let mut open: Vec<char> = Vec::new();
     let mut at = 0;
     while at < text.len() {
@@ -161,7 +162,7 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_' || c == '$'
 }
 
-/// Returns whether a space or the end of a line means nothing between these signs.
+/// Returns whether a space or line break between these characters is unnecessary.
 fn is_idle(blank: char, before: Option<char>, after: Option<char>) -> bool {
     let (Some(before), Some(after)) = (before, after) else { return true };
     match blank {

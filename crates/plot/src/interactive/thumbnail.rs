@@ -1,4 +1,4 @@
-//! Small drawings without words, to choose a figure by.
+//! Small drawings without text, for the choice of a figure.
 
 use crate::axis::Mapping;
 use crate::canvas::{Canvas, Stroke};
