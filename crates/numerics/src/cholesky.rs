@@ -1,14 +1,14 @@
-//! The Cholesky factor of a large matrix, by blocks.
+//! Cholesky factor of a large matrix, computed in blocks.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Columns of a block: its triangle stays in the first-level cache.
+/// Number of columns in a block: its triangle fits into the first-level cache.
 const BLOCK: usize = 48;
 
 /// L of a symmetric positive definite matrix A = L Lᵀ.
 ///
-/// Blocks of columns, so that nearly all operations are those of a matrix product: at a thousand
-/// columns ten times as fast as column by column.
+/// The columns are processed in blocks, so that nearly all operations are matrix products: at a
+/// thousand columns this is ten times as fast as column by column.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.2.6.
@@ -17,8 +17,8 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// The factor of A + `damping`·I; only the lower triangle of A is read. `None` if it is not positive
-    /// definite.
+    /// Returns the factor of A + `damping`·I; only the lower triangle of A is read. `None` if the
+    /// matrix is not positive definite.
     pub fn new(matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let size = matrix.nrows();
         let mut lower = matrix.lower_triangle();
@@ -47,13 +47,12 @@ impl Cholesky {
                 to.gemm(-1.0, &rows, &wide, 1.0);
             }
         }
-        // The products have filled parts above the diagonal of the blocks.
+        // The matrix products also write entries above the diagonal of the blocks.
         lower.fill_upper_triangle(0.0, 1);
         Some(Self { lower })
     }
 
-    /// A⁻¹b.
-    /// In the unit of b over that of A.
+    /// Returns A⁻¹b, in the unit of b divided by the unit of A.
     pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         let mut solution = right.clone();
         self.lower.solve_lower_triangular_unchecked_mut(&mut solution);
@@ -61,20 +60,19 @@ impl Cholesky {
         solution
     }
 
-    /// L⁻¹.
-    /// Rows × columns as A, in the root of the inverse unit of A.
+    /// Returns L⁻¹, rows × columns as A, in the root of the inverse unit of A.
     pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);
         for start in (0..size).step_by(BLOCK) {
             let width = BLOCK.min(size - start);
             let diagonal = self.lower.view((start, start), (width, width));
-            // Above these rows: X = −L⁻¹ (row of L) (what is known of the inverse).
+            // The rows X of this block follow from L X = I and the rows of the inverse above.
             let mut rows = DMatrix::zeros(width, start + width);
             rows.columns_mut(start, width).fill_with_identity();
-            let left = self.lower.view((start, 0), (width, start));
+            let left_part = self.lower.view((start, 0), (width, start));
             let known = inverse.view((0, 0), (start, start));
-            rows.columns_mut(0, start).gemm(-1.0, &left, &known, 0.0);
+            rows.columns_mut(0, start).gemm(-1.0, &left_part, &known, 0.0);
             diagonal.solve_lower_triangular_unchecked_mut(&mut rows);
             inverse.view_mut((start, 0), (width, start + width)).copy_from(&rows);
         }

@@ -29,10 +29,10 @@ pub enum NumericsError {
         /// The value, in the unit of the data.
         value: f64,
     },
-    /// Squares of the data are beyond the largest number.
+    /// The sum of squares of the data overflows.
     #[error("the squares of the data overflow: use other units, values below 1e150")]
     Overflow,
-    /// Squares of the data are below the least number.
+    /// The squares of the data underflow.
     #[error(
         "all values of the {what} {} are so small that their squares vanish (their root sum of \
          squares is about {norm:.0e}): use other units",
@@ -43,7 +43,7 @@ pub enum NumericsError {
         what: &'static str,
         /// Column, counted from 0.
         column: usize,
-        /// Root sum of squares of the column, in its unit; 0 where all squares vanish.
+        /// Root sum of squares of the column, in its unit; 0 if all squares underflow.
         norm: f64,
     },
     /// Fewer equations than unknowns are given.
@@ -62,14 +62,15 @@ pub enum NumericsError {
     /// Every unknown is already known.
     #[error("there is nothing to estimate: every entry of M, C and K is known")]
     NothingUnknown,
-    /// A matrix has no real logarithm: the motion from sample to sample belongs to no continuous system.
+    /// A matrix has no real logarithm: the transition from sample to sample is not that of a
+    /// continuous system.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
          has no logarithm and no continuous machine moves like that: either a mode oscillates near or \
          above half the sampling rate (sample faster), or one dies out within a sample, or noise drowns it"
     )]
     NoLogarithm {
-        /// The offending eigenvalue of the matrix, a pure number, zero or negative.
+        /// The eigenvalue of the matrix, a pure number, zero or negative.
         eigenvalue: f64,
     },
     /// The eigenvalues of a matrix could not be computed.
@@ -86,7 +87,7 @@ pub enum NumericsError {
         /// Number of its columns.
         columns: usize,
     },
-    /// A matrix that must be square is not.
+    /// A matrix that must be square is not square.
     #[error("a {rows}×{columns} matrix was given where a square one is needed")]
     NotSquare {
         /// Number of rows of the matrix.
@@ -105,7 +106,7 @@ pub enum NumericsError {
         /// Column, counted from 0.
         column: usize,
     },
-    /// A matrix exponential is too large to be computed.
+    /// A matrix exponential overflows.
     #[error(
         "the exponential of a matrix of norm {norm:.1e} overflows: the time step is too long for \
          the system"
@@ -117,12 +118,12 @@ pub enum NumericsError {
     /// A confidence level is outside (0, 1).
     #[error("a confidence level lies between 0 and 1, got {level}")]
     Level {
-        /// The level given, a probability.
+        /// Given level, a probability.
         level: f64,
     },
 }
 
-/// Returns an error unless `got` items are as many as `expected`.
+/// Returns an error unless `got` is equal to `expected`.
 ///
 /// # Errors
 /// [`NumericsError::Size`].
@@ -130,8 +131,8 @@ pub fn check_size(what: &'static str, expected: usize, got: usize) -> Result<(),
     if expected == got { Ok(()) } else { Err(NumericsError::Size { what, expected, got }) }
 }
 
-/// Returns an error that names the first value that is not finite, if there is one.
-/// Rows × columns, in any unit.
+/// Returns an error that names the first value that is not finite, if there is one, in a matrix of
+/// rows × columns in any unit.
 ///
 /// # Errors
 /// [`NumericsError::NotFinite`].
@@ -144,7 +145,7 @@ pub fn check_finite(what: &'static str, data: DMatrixView<'_, f64>) -> Result<()
     Ok(())
 }
 
-/// Writes a number with its noun, in the plural unless it is 1.
+/// Returns a number with its noun, in the plural unless it is 1.
 fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }

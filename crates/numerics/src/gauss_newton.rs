@@ -1,10 +1,11 @@
-//! Nonlinear least squares: Gauss–Newton steps along the curve of the residuals, damped where they do not
-//! descend.
+//! Nonlinear least squares: Gauss–Newton steps that follow the curvature of the residuals, with
+//! damping if they do not descend.
 //!
-//! A problem gives its sum of squares at some parameters, and a linearisation of its residuals there in
-//! coordinates of its own choice. Two linearisations are here: [`GramMatrix`] (normal equations, for many
-//! residuals and well-scaled coordinates) and [`Triangle`] (QR of the Jacobian, for badly conditioned ones).
-//! [`minimise_residuals`] is for problems that have all residuals and their Jacobian at once.
+//! A problem returns its sum of squares for given parameters, and a linearisation of its residuals
+//! there in coordinates that it chooses. There are two linearisations: [`GramMatrix`] (normal
+//! equations, for many residuals and well-scaled coordinates) and [`Triangle`] (QR of the Jacobian,
+//! for badly conditioned ones). [`minimise_residuals`] is for problems that compute all residuals
+//! and their Jacobian at once.
 
 mod gram_matrix;
 mod residuals;
@@ -20,9 +21,11 @@ pub use gram_matrix::GramMatrix;
 pub use residuals::{Residuals, minimise_residuals};
 pub use triangle::{DampedTriangle, Triangle};
 
-/// Residuals r linearised about some parameters, r + J v, in coordinates v of a change of the parameters.
+/// Residuals r linearised about some parameters, r + J v, in coordinates v of a change of the
+/// parameters.
 ///
-/// The coordinates are such that the columns of J have unit length: damping then acts alike on all.
+/// In these coordinates the columns of J have unit length, so that damping has the same effect on
+/// all.
 pub trait Linearisation {
     /// Factor of JᵀJ + λI.
     type Factor;
@@ -30,7 +33,7 @@ pub trait Linearisation {
     /// Returns Jᵀr.
     fn gradient(&self) -> &DVector<f64>;
 
-    /// Returns the factor of JᵀJ + `damping`·I, `None` if that is singular to rounding.
+    /// Returns the factor of JᵀJ + `damping`·I; `None` if that is numerically singular.
     fn factor(&self, damping: f64) -> Option<Self::Factor>;
 
     /// Returns (JᵀJ + λI)⁻¹ `right`.
@@ -41,34 +44,34 @@ pub trait Linearisation {
         self.solve(factor, self.gradient())
     }
 
-    /// Returns by how much the sum of squares of r + J v is below that of r.
+    /// Returns the sum of squares of r minus the sum of squares of r + J v.
     fn decrease(&self, v: &DVector<f64>) -> f64;
 
-    /// Returns the coordinates of parameters.
+    /// Converts parameters to coordinates.
     fn coordinates(&self, parameters: &DVector<f64>) -> DVector<f64>;
 
-    /// Returns the parameters at coordinates.
+    /// Converts coordinates to parameters.
     fn parameters(&self, coordinates: &DVector<f64>) -> DVector<f64>;
 }
 
 /// Sum of squares to be minimised over its parameters.
 pub trait SumOfSquares {
-    /// Its linearisation.
+    /// Linearisation of the residuals.
     type Linearisation: Linearisation;
 
-    /// Returns the sum at `parameters`, `None` where it does not exist.
-    /// The parameters are a list in any units; the sum is in the square of the unit of the residuals.
+    /// Returns the sum at `parameters`; `None` if it does not exist there. The parameters are a
+    /// list in any units; the sum is in the square of the unit of the residuals.
     fn try_at(&mut self, parameters: &DVector<f64>) -> Option<f64>;
 
-    /// Makes the parameters last tried those that everything else refers to.
+    /// Accepts the most recently tried parameters, to which linearisation and curvature then refer.
     fn accept(&mut self);
 
-    /// Returns the linearisation, `None` where rounding or overflow leave none.
+    /// Returns the linearisation; `None` if rounding or overflow prevents it.
     fn linearise(&mut self) -> Option<Self::Linearisation>;
 
-    /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the parameters;
-    /// `None` if it is not known, and steps are straight.
-    /// The change is a list, one entry for each parameter, in its unit.
+    /// Returns Jᵀr″ with r″ the second derivative of the residuals along `change`, a change of the
+    /// parameters; `None` if it is not known, which gives steps without correction. The change is a
+    /// list, one entry for each parameter, in its unit.
     fn curvature(
         &self,
         _linearisation: &Self::Linearisation,
@@ -78,22 +81,21 @@ pub trait SumOfSquares {
     }
 }
 
-/// End of a search.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub struct Minimum {
-    /// Parameters reached.
-    /// A list, each in its unit.
+    /// Final parameters, a list, each in its unit.
     pub parameters: DVector<f64>,
-    /// Sum of squares there.
-    /// In the square of the unit of the residuals.
+    /// Final sum of squares, in the square of the unit of the residuals.
     pub cost: f64,
     /// Number of steps taken.
     pub steps: usize,
-    /// Flag of a minimum, to within rounding; otherwise the steps ran out.
+    /// `true` for a minimum up to rounding; `false` if the number of steps was exhausted.
     pub converged: bool,
 }
 
-/// Searches the local minimum from `parameters` in at most `max_steps`; `problem` is left there.
+/// Searches for the local minimum from `parameters` in at most `max_steps` steps; `problem` keeps
+/// the accepted parameters.
 ///
 /// A step v and its correction a for the curvature of the residuals solve
 ///
@@ -101,19 +103,19 @@ pub struct Minimum {
 /// (JᵀJ + λI) v = −Jᵀr,      (JᵀJ + λI) a = −½ Jᵀr″(v)
 /// ```
 ///
-/// and the step v + a is tried if a is small against v. The correction follows the curved valleys of parameters
-/// that the data determine badly, where straight steps have to be tiny.
-/// Parameters are a list in any units.
+/// and the step v + a is tried if a is small relative to v. The correction follows curved valleys,
+/// which arise when the data determine a combination of parameters badly, and in which steps
+/// without correction would be tiny. Parameters are a list in any units.
 ///
 /// # Source
-/// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for the damping;
-/// Transtrum & Sethna (2012), arXiv:1201.5885, for the correction.
+/// Nocedal & Wright, *Numerical Optimization*, section 10.3; Nielsen (1999), IMM-REP-1999-05, for
+/// the damping; Transtrum & Sethna (2012), arXiv:1201.5885, for the correction.
 ///
 /// ```
 /// use mechid_numerics::gauss_newton::{SumOfSquares, Triangle, minimise};
 /// use nalgebra::{DVector, dmatrix, dvector};
 ///
-/// /// The circle that the points (1, 0), (0, 2) and (−3, 0) lie nearest to, of unknown radius about the origin.
+/// /// Circle about the origin whose radius fits the points (1, 0), (0, 2) and (−3, 0) best.
 /// struct Circle(f64, f64);
 ///
 /// impl SumOfSquares for Circle {
@@ -149,7 +151,8 @@ pub fn minimise<P: SumOfSquares>(
         log::trace!("step {}, sum of squares {cost:.4e}", steps + 1);
         let linearisation = problem.linearise()?;
         let undamped = linearisation.factor(0.0);
-        // Where JᵀJ is singular to rounding only damped steps can tell.
+        // The search for a minimum needs the undamped step, which does not exist if JᵀJ is
+        // numerically singular.
         if let Some(factor) = &undamped {
             if is_minimum(&linearisation, factor, &parameters, cost) {
                 return Some(Minimum { parameters, cost, steps, converged: true });
@@ -177,7 +180,8 @@ pub fn minimise<P: SumOfSquares>(
             damping = f64::max(growth * damping, FIRST_DAMPING);
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
-                // No descent in any direction: a minimum to within rounding, if the data determine one.
+                // No direction descends: this is a minimum up to rounding, if the data determine
+                // one.
                 return Some(Minimum { parameters, cost, steps, converged: undamped.is_some() });
             }
         }
@@ -185,7 +189,7 @@ pub fn minimise<P: SumOfSquares>(
     Some(Minimum { parameters, cost, steps: max_steps, converged: false })
 }
 
-/// Returns whether the undamped step promises next to nothing, or is next to nothing.
+/// Returns whether the undamped step, or the decrease that it predicts, is negligible.
 fn is_minimum<L: Linearisation>(
     linearisation: &L,
     factor: &L::Factor,
@@ -197,14 +201,15 @@ fn is_minimum<L: Linearisation>(
         || linearisation.gradient().dot(&newton) <= COST_TOLERANCE * cost
 }
 
-/// Change of the parameters and the decrease of the sum of squares that it promises.
+/// Change of the parameters, and the predicted decrease of the sum of squares.
 struct Step {
     change: DVector<f64>,
     promise: f64,
 }
 
 impl Step {
-    /// Returns the step with its correction, `None` if the correction is too large or the step does not descend.
+    /// Returns the step with its correction; `None` if the correction is too large or the step does
+    /// not descend.
     fn new<P: SumOfSquares>(
         problem: &P,
         linearisation: &P::Linearisation,

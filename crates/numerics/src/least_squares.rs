@@ -1,4 +1,5 @@
-//! Linear least squares from row blocks, with everything one must know about the answer.
+//! Linear least squares from blocks of rows, with covariance, condition and undetermined
+//! directions.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
@@ -32,15 +33,15 @@ pub struct LeastSquares {
     factor: TriangularFactor,
 }
 
-/// The least-squares answer of one set of regressors for one or several right-hand sides.
+/// Least-squares solution of one set of regressors for one or several right-hand sides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// θ: unknowns × right-hand sides, in the unit of the target over that of the regressor.
-    /// Entries that are not determined are NaN.
+    /// θ: unknowns × right-hand sides, in the unit of the target divided by the unit of the
+    /// regressor. Undetermined entries are NaN.
     pub coefficients: DMatrix<f64>,
     /// (AᵀA)⁻¹: unknowns × unknowns, in inverse units of the regressors, over the determined
-    /// directions. The covariance of
-    /// coefficients (i, a) and (j, b) is `unscaled_covariance[(i, j)] · residual_covariance[(a, b)]`.
+    /// directions. The covariance of coefficients (i, a) and (j, b) is `unscaled_covariance[(i, j)]
+    /// · residual_covariance[(a, b)]`.
     pub unscaled_covariance: DMatrix<f64>,
     /// EᵀE / (rows − unknowns): right-hand sides × right-hand sides, in the units of the targets;
     /// infinite without excess rows.
@@ -51,34 +52,32 @@ pub struct Solution {
     pub degrees_of_freedom: usize,
     /// Largest over smallest singular value of A with its columns scaled to unit length.
     pub condition: f64,
-    /// The combinations of unknowns on which the data say nothing.
+    /// Undetermined combinations of unknowns.
     pub undetermined: Vec<Direction>,
-    /// A⁺ acting on the triangular factor's rows.
-    /// In inverse units of the regressors.
+    /// A⁺, applied to the rows of the triangular factor, in inverse units of the regressors.
     pub inverse: DMatrix<f64>,
-    /// Residuals of the triangular factor's rows.
-    /// In the units of the targets.
+    /// Residuals of the rows of the triangular factor, in the units of the targets.
     pub residuals: DMatrix<f64>,
 }
 
-/// A combination of unknowns that can be added to a solution without changing the fit.
+/// Combination of unknowns that can be added to a solution without changing the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
-    /// Ratio of the singular value of the scaled regressors along it to the largest.
+    /// Ratio of the singular value of the scaled regressors along it to the largest one.
     pub relative_singular_value: f64,
-    /// One entry per unknown, in its unit, the one that counts most (in scaled columns) being 1.
+    /// One entry per unknown, in its unit; the entry that is largest in scaled columns is 1.
     pub combination: DVector<f64>,
-    /// `true` for each unknown that takes part.
+    /// `true` for each unknown that is part of the combination.
     pub involved: Vec<bool>,
 }
 
 impl LeastSquares {
-    /// No rows yet; `unknowns` columns of A and `targets` columns of B.
+    /// Creates equations without rows; A has `unknowns` columns and B has `targets` columns.
     pub fn new(unknowns: usize, targets: usize) -> Self {
         Self { unknowns, targets, factor: TriangularFactor::new(unknowns.saturating_add(targets)) }
     }
 
-    /// Rows seen so far.
+    /// Returns the number of rows so far.
     pub fn rows(&self) -> usize {
         self.factor.rows()
     }
@@ -86,8 +85,8 @@ impl LeastSquares {
     /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides, in any units.
     ///
     /// # Errors
-    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; then
-    /// nothing is added.
+    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; no
+    /// row is then added.
     pub fn push_rows(
         &mut self,
         regressors: DMatrixView<'_, f64>,
@@ -104,7 +103,7 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Adds everything `other` has seen, as from another record.
+    /// Adds all rows of `other`, for example of another record.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if it has other numbers of unknowns or right-hand sides,
@@ -115,24 +114,24 @@ impl LeastSquares {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow) }
     }
 
-    /// The triangle of \[A | B\], which has the Gram matrix of all rows so far.
-    /// In the units of regressors and targets.
+    /// Returns the triangle of \[A | B\], whose Gram matrix is that of all rows so far, in the
+    /// units of regressors and targets.
     pub fn triangle(&self) -> &DMatrix<f64> {
         self.factor.r()
     }
 
-    /// The least-squares solution of all rows so far; more rows may follow.
+    /// Returns the least-squares solution of all rows so far; more rows may follow.
     ///
-    /// Columns are scaled to unit length, the triangle is solved by QR, and by a truncated
-    /// singular value decomposition where it is rank-deficient.
+    /// Columns are scaled to unit length, and the triangle is solved by QR or, if it is
+    /// rank-deficient, by a truncated singular value decomposition.
     ///
     /// # Errors
     /// [`NumericsError::TooFewRows`], [`NumericsError::NothingUnknown`] without unknowns,
     /// [`NumericsError::Underflow`].
     ///
     /// # Source
-    /// Björck, *Numerical Methods for Least Squares Problems* (1996), chapters 1–2;
-    /// Dissertation eqs. (4.4.1)–(4.4.6), there by normal equations.
+    /// Björck, *Numerical Methods for Least Squares Problems* (1996), chapters 1–2; Dissertation
+    /// eqs. (4.4.1)–(4.4.6), there by normal equations.
     pub fn solve(&self) -> Result<Solution, NumericsError> {
         if let Some((at, norm)) = self.factor.too_small() {
             let (what, column) = match at.checked_sub(self.unknowns) {
@@ -154,11 +153,11 @@ impl LeastSquares {
     }
 }
 
-/// Least squares on rows that stand for `rows` original ones with the same Gram matrices.
-/// Units are those of [`Solution`].
+/// Solves least squares on compressed rows, which replace `rows` original rows with the same Gram
+/// matrices. Units are as in [`Solution`].
 ///
 /// # Errors
-/// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`], and what a decomposition refuses.
+/// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`], and errors of a decomposition.
 ///
 /// # Source
 /// As [`LeastSquares::solve`].
@@ -208,7 +207,7 @@ pub fn solve_compressed(
     })
 }
 
-/// A regressor matrix with columns of unit length, factored.
+/// Factored regressor matrix with columns of unit length.
 struct Scaled {
     lengths: DVector<f64>,
     q: DMatrix<f64>,
@@ -252,7 +251,7 @@ impl Scaled {
         let lost = (0..count).filter(|at| self.relative(*at) <= tolerance);
         lost.map(|at| {
             let scaled = self.v_t.row(at).transpose();
-            // Rounding must not decide which of two equals is called 1.
+            // The threshold keeps rounding from deciding which of two equal entries becomes 1.
             let main = scaled.iter().position(|v| v.abs() > 0.999 * scaled.amax()).unwrap_or(0);
             let involved = scaled.iter().map(|v| v.abs() > SHARE_TOLERANCE).collect();
             let mut combination = scaled.component_div(&self.lengths);
@@ -262,7 +261,7 @@ impl Scaled {
         .collect()
     }
 
-    /// unknowns × rows; of the determined part only, when `lost` directions are not.
+    /// Returns the pseudo-inverse, unknowns × rows, without `lost` undetermined directions.
     fn pseudo_inverse(&self, lost: usize) -> DMatrix<f64> {
         let mut inverse = if lost == 0 {
             self.r.solve_upper_triangular(&self.q.transpose()).expect("full rank")
@@ -270,8 +269,8 @@ impl Scaled {
             let tolerance = RANK_TOLERANCE * self.singular_values.len() as f64;
             let mut weighted = self.v_t.transpose();
             for (at, mut column) in weighted.column_iter_mut().enumerate() {
-                let kept = self.relative(at) > tolerance;
-                column *= if kept { 1.0 / self.singular_values[at] } else { 0.0 };
+                let is_determined = self.relative(at) > tolerance;
+                column *= if is_determined { 1.0 / self.singular_values[at] } else { 0.0 };
             }
             weighted * self.u.transpose() * self.q.transpose()
         };

@@ -1,14 +1,15 @@
-//! Numerical methods that several crates share; nothing here knows of machines or records.
+//! Numerical methods that several crates share; they are independent of mechanical systems and
+//! records.
 //!
 //! | Method | Module |
 //! |---|---|
 //! | nonlinear least squares: Gauss–Newton with Levenberg–Marquardt damping | [`gauss_newton`] |
-//! | least squares from row blocks, with covariance and undetermined directions | [`least_squares`] |
+//! | least squares from row blocks, with covariance and rank | [`least_squares`] |
 //! | the triangular factor of any number of rows | [`triangular`] |
 //! | the Cholesky factor of a large matrix | [`cholesky`] |
-//! | singular values, eigenvalues of a Hermitian matrix, exponential, all of which end | [`linear_algebra`] |
+//! | singular values, Hermitian eigenvalues, exponential, always finite | [`linear_algebra`] |
 //! | eigenvalues of any matrix, equal ones too | [`real_schur`] |
-//! | linear equations and the largest eigenvalues of operators given by their products | [`krylov`] |
+//! | linear equations and largest eigenvalues of operators given by products | [`krylov`] |
 //! | the logarithm of a matrix, its integral and their derivatives | [`logarithm`] |
 //! | the minimum of a function of a few variables, without derivatives | [`nelder_mead`] |
 //! | values with a standard error, and their intervals | [`Uncertain`] |

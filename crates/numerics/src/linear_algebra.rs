@@ -1,7 +1,7 @@
-//! Decompositions that end and do not panic, whatever the entries of the matrix.
+//! Decompositions that always end and never panic, for any entries of the matrix.
 //!
-//! Those of nalgebra iterate without a bound, and panic or do not return where an entry is not
-//! finite. Here the entries are checked, the iterations counted, and failure is an error.
+//! The decompositions of nalgebra iterate without a bound, and panic or do not return if an entry
+//! is not finite. Here the entries are checked, the iterations counted, and failure is an error.
 
 #![allow(clippy::disallowed_methods, reason = "the one home of the iterations kept out elsewhere")]
 
@@ -10,8 +10,8 @@ use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 use crate::NumericsError;
 use crate::limits::{EXPONENTIAL_NORM, ITERATIONS, NEGLIGIBLE};
 
-/// Returns the singular value decomposition A = U Σ Vᴴ of a rows × columns matrix, singular values
-/// falling, in the unit of A, with both sets of singular vectors.
+/// Returns the singular value decomposition A = U Σ Vᴴ of a rows × columns matrix, with decreasing
+/// singular values in the unit of A, and both sets of singular vectors.
 ///
 /// # Errors
 /// [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
@@ -23,8 +23,8 @@ use crate::limits::{EXPONENTIAL_NORM, ITERATIONS, NEGLIGIBLE};
 /// use mechid_numerics::linear_algebra::svd;
 /// use nalgebra::dmatrix;
 ///
-/// let found = svd(dmatrix![3.0, 0.0; 0.0, -5.0])?;
-/// assert_eq!(found.singular_values.as_slice(), [5.0, 3.0]);
+/// let decomposition = svd(dmatrix![3.0, 0.0; 0.0, -5.0])?;
+/// assert_eq!(decomposition.singular_values.as_slice(), [5.0, 3.0]);
 /// assert!(svd(dmatrix![f64::NAN, 0.0; 0.0, 1.0]).is_err());
 /// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
@@ -34,7 +34,7 @@ pub fn svd<T: ComplexField<RealField = f64>>(
     decomposed(matrix, true, 5.0 * f64::EPSILON)
 }
 
-/// Returns the singular values of a rows × columns matrix, falling, in its unit.
+/// Returns the singular values of a rows × columns matrix in decreasing order, in its unit.
 ///
 /// # Errors
 /// As [`svd`].
@@ -47,7 +47,7 @@ pub fn singular_values<T: ComplexField<RealField = f64>>(
     decomposed(matrix, false, 5.0 * f64::EPSILON).map(|svd| svd.singular_values)
 }
 
-/// The decomposition, converged to `tolerance` relative to the largest entry.
+/// Returns the decomposition, converged to `tolerance` relative to the largest entry.
 fn decomposed<T: ComplexField<RealField = f64>>(
     mut matrix: DMatrix<T>,
     vectors: bool,
@@ -70,11 +70,12 @@ fn decomposed<T: ComplexField<RealField = f64>>(
     Ok(svd)
 }
 
-/// Returns the eigenvalues, in no order and the unit of the matrix, and the eigenvectors of a
-/// Hermitian n × n matrix, of which the lower triangle is read.
+/// Returns the eigenvalues, unsorted and in the unit of the matrix, and the eigenvectors of a
+/// Hermitian n × n matrix; only its lower triangle is read.
 ///
 /// # Errors
-/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
+/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`],
+/// [`NumericsError::NotConverged`].
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 8.3.
@@ -96,8 +97,9 @@ pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
 /// Returns the exponential of an n × n matrix without unit.
 ///
 /// # Errors
-/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`]; [`NumericsError::ExponentialOverflow`]
-/// if the 1-norm of the matrix exceeds 1e11 or its exponential the largest number.
+/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`];
+/// [`NumericsError::ExponentialOverflow`] if the 1-norm of the matrix exceeds 1e11 or its
+/// exponential the largest number.
 ///
 /// # Source
 /// Al-Mohy & Higham (2009), SIAM J. Matrix Anal. Appl. 31, 970–989 (scaling and squaring).
@@ -136,13 +138,13 @@ fn clear_negligible<T: ComplexField<RealField = f64>>(matrix: &mut DMatrix<T>) {
     }
 }
 
-/// [`NumericsError::NotSquare`] for a matrix that is not.
+/// Returns [`NumericsError::NotSquare`] for a matrix that is not square.
 pub(crate) fn check_square<T>(matrix: &DMatrix<T>) -> Result<(), NumericsError> {
     let (rows, columns) = matrix.shape();
     if rows == columns { Ok(()) } else { Err(NumericsError::NotSquare { rows, columns }) }
 }
 
-/// [`NumericsError::EntryNotFinite`] for a matrix with a NaN or infinity.
+/// Returns [`NumericsError::EntryNotFinite`] for a matrix with NaN or infinity.
 pub(crate) fn check_finite<T: ComplexField>(matrix: &DMatrix<T>) -> Result<(), NumericsError> {
     match matrix.iter().position(|entry| !entry.is_finite()) {
         None => Ok(()),

@@ -1,14 +1,16 @@
-//! The principal logarithm of a real matrix, its integral, and the derivatives of both.
+//! Principal logarithm of a real matrix, its integral, and the derivatives of both.
 //!
-//! A linear machine sampled every Δt moves by x⁺ = Φ x + Γ f, with the matrix exponential
+//! A linear system with sampling interval Δt has the transition x⁺ = Φ x + Γ f, with the matrix
+//! exponential
 //!
 //! ```text
 //! ┌ Φ  Γ ┐       ┌ AΔt  BΔt ┐
 //! └ 0  I ┘ = exp └  0    0  ┘
 //! ```
 //!
-//! when the force is held. The logarithm of the left side therefore gives A and B at once, also
-//! when A is singular (a free body), and its derivative carries the covariance of Φ and Γ over.
+//! if the force is constant between samples. The logarithm of the left side therefore gives A and B
+//! at once, also if A is singular (rigid-body modes), and its derivative converts the covariance of
+//! Φ and Γ.
 
 use nalgebra::DMatrix;
 
@@ -16,13 +18,13 @@ use crate::RealSchur;
 use crate::error::{NumericsError, check_finite, check_size};
 use crate::quasi_triangular::{root_derivative, shifted_root};
 
-/// ‖X‖₁ up to which the \[7/7\] Padé approximant of log(I + X) is exact to double precision.
+/// Largest ‖X‖₁ for which the \[7/7\] Padé approximant of log(I + X) is exact to double precision.
 ///
 /// # Source
 /// Higham, *Functions of Matrices* (2008), table 11.1 (θ₇).
 const PADE_REACH: f64 = 0.264;
 
-/// Nodes and weights of Gauss and Legendre on [−1, 1], seven points.
+/// Nodes and weights of the Gauss–Legendre quadrature on [−1, 1] with seven points.
 const GAUSS_LEGENDRE: [(f64, f64); 7] = [
     (-0.949_107_912_342_758_5, 0.129_484_966_168_869_7),
     (-0.741_531_185_599_394_4, 0.279_705_391_489_276_7),
@@ -33,11 +35,12 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
     (0.949_107_912_342_758_5, 0.129_484_966_168_869_7),
 ];
 
-/// The principal logarithm of a square matrix of pure numbers: exp(log A) = A with all eigenvalues
-/// of log A within ±iπ.
+/// Returns the principal logarithm of a square matrix of pure numbers: exp(log A) = A with the
+/// imaginary parts of all eigenvalues of log A within ±π.
 ///
-/// Real Schur form, square roots until the matrix is close to I, then a Padé approximant. What is
-/// carried along is the difference to I, so that a matrix close to I keeps its relative accuracy.
+/// It uses the real Schur form and square roots until the matrix is close to I, then a Padé
+/// approximant. All steps use the difference to I, so that a matrix close to I keeps its relative
+/// accuracy.
 ///
 /// ```
 /// use mechid_numerics::logarithm::logarithm;
@@ -55,8 +58,8 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// [`NumericsError::Eigenvalues`].
 ///
 /// # Source
-/// Higham, *Functions of Matrices* (2008), chapter 11 (inverse scaling and squaring,
-/// algorithm 11.9; partial fractions of the Padé approximants).
+/// Higham, *Functions of Matrices* (2008), chapter 11 (inverse scaling and squaring, algorithm
+/// 11.9; partial fractions of the Padé approximants).
 pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     check_size("columns of a square matrix", a.nrows(), a.ncols())?;
     check_finite("matrix", a.as_view())?;
@@ -65,7 +68,7 @@ pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     Ok(Generator::new(&(a - DMatrix::identity(size, size)), &none)?.value)
 }
 
-/// \[AΔt BΔt\] from \[Φ − I, Γ\], ready to be differentiated.
+/// \[AΔt BΔt\] from \[Φ − I, Γ\], prepared for derivatives.
 #[derive(Debug, Clone)]
 pub struct Generator {
     /// \[AΔt BΔt\]: states × (states + inputs), dimensionless.
@@ -75,15 +78,15 @@ pub struct Generator {
     blocks: Vec<(usize, usize)>,
     /// (I + U)^(1/2^l) − I for l = 1, 2, …, with U the Schur form of \[Φ − I, Γ; 0, 0\].
     roots: Vec<DMatrix<f64>>,
-    /// The last of them, or U itself.
+    /// Last of these roots, or U itself if there is none.
     x: DMatrix<f64>,
-    /// Factor by which Γ was multiplied to be of the size of Φ − I.
+    /// Factor that scaled Γ to the size of Φ − I.
     input_scale: f64,
 }
 
 impl Generator {
-    /// `difference` is Φ − I (states × states), `input` is Γ (states × inputs).
-    /// Both are pure numbers.
+    /// Computes \[AΔt BΔt\] from `difference` = Φ − I (states × states) and `input` = Γ (states ×
+    /// inputs), both pure numbers.
     ///
     /// # Errors
     /// [`NumericsError::NoLogarithm`], [`NumericsError::Eigenvalues`].
@@ -116,7 +119,8 @@ impl Generator {
         Ok(generator)
     }
 
-    /// Returns the change of \[AΔt BΔt\] when \[Φ − I, Γ\] changes by `change` (states × (states + inputs)), dimensionless.
+    /// Returns the change of \[AΔt BΔt\] when \[Φ − I, Γ\] changes by `change` (states × (states +
+    /// inputs)), dimensionless.
     ///
     /// # Errors
     /// [`NumericsError::Eigenvalues`].
@@ -136,7 +140,7 @@ impl Generator {
         Ok(self.back(pade_derivative(&self.x, &e)?))
     }
 
-    /// Undoes the square roots, the Schur form and the scaling of the inputs.
+    /// Reverses the square roots, the Schur form and the scaling of the inputs.
     fn back(&self, logarithm: DMatrix<f64>) -> DMatrix<f64> {
         let (states, all) = (self.q.nrows(), self.x.nrows());
         let powers = 2f64.powi(self.roots.len() as i32);
@@ -148,7 +152,7 @@ impl Generator {
     }
 }
 
-/// An error unless the eigenvalues 1 + λ of a diagonal block of Φ − I keep off (−∞, 0].
+/// Returns an error if an eigenvalue 1 + λ of a diagonal block of Φ − I is on (−∞, 0].
 fn check_block(t: &DMatrix<f64>, (start, width): (usize, usize)) -> Result<(), NumericsError> {
     let smallest = if width == 1 {
         Some(1.0 + t[(start, start)])
@@ -172,12 +176,12 @@ fn one_norm(a: &DMatrix<f64>) -> f64 {
     a.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max)
 }
 
-/// Nodes and weights on [0, 1]: log(1 + x) = ∫₀¹ x/(1 + t x) dt.
+/// Returns nodes and weights on [0, 1] for log(1 + x) = ∫₀¹ x/(1 + t x) dt.
 fn nodes() -> impl Iterator<Item = (f64, f64)> {
     GAUSS_LEGENDRE.into_iter().map(|(node, weight)| (0.5 * (1.0 + node), 0.5 * weight))
 }
 
-/// log(I + X) ≈ Σ w (I + t X)⁻¹ X, which is the \[7/7\] Padé approximant.
+/// Returns log(I + X) ≈ Σ w (I + t X)⁻¹ X, which is the \[7/7\] Padé approximant.
 fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     let mut sum = DMatrix::zeros(x.nrows(), x.ncols());
     for (node, weight) in nodes() {
@@ -186,13 +190,13 @@ fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     Ok(sum)
 }
 
-/// Σ w (I + t X)⁻¹ E (I + t X)⁻¹.
+/// Returns Σ w (I + t X)⁻¹ E (I + t X)⁻¹.
 fn pade_derivative(x: &DMatrix<f64>, e: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     let mut sum = DMatrix::zeros(x.nrows(), x.ncols());
     for (node, weight) in nodes() {
         let factor = shifted(x, node);
-        let left = solve(&factor, e)?;
-        sum += solve(&factor.transpose(), &left.transpose())?.transpose() * weight;
+        let left_solution = solve(&factor, e)?;
+        sum += solve(&factor.transpose(), &left_solution.transpose())?.transpose() * weight;
     }
     Ok(sum)
 }
@@ -202,7 +206,7 @@ fn shifted(x: &DMatrix<f64>, node: f64) -> DMatrix<f64> {
 }
 
 fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
-    // I + t X with ‖X‖ ≤ 0.264 is never singular; a non-finite X is the only way here.
+    // I + t X with ‖X‖ ≤ 0.264 is never singular, so only an X that is not finite fails here.
     a.clone().lu().solve(b).ok_or(NumericsError::Eigenvalues { size: a.nrows() })
 }
 

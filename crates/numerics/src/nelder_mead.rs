@@ -1,8 +1,8 @@
-//! The least value of a function of a few variables, without derivatives.
+//! Minimum of a function of a few variables, without derivatives.
 
-/// Returns the best point found from `start`, with a first simplex of edge `step`, after at most `rounds`
-/// rounds or once all values of the simplex lie within `settled`.
-/// A point is a list in any unit, the same for all coordinates.
+/// Returns the best point from a search at `start`, with an initial simplex of edge `step`, after
+/// at most `rounds` rounds or once the values at the simplex differ by at most `settled`. A point
+/// is a list in any unit, the same for all coordinates.
 ///
 /// # Source
 /// Nelder & Mead (1965), with the usual coefficients 1, 2, ½, ½.

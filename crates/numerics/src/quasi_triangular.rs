@@ -2,20 +2,21 @@
 
 use nalgebra::{DMatrix, Matrix2, Matrix4, Vector4};
 
-/// (I + U)^½ − I of a quasi-triangular U, without ever forming I + U.
+/// Returns (I + U)^½ − I of a quasi-triangular U, without forming I + U.
 ///
-/// With Y the result, Y² + 2Y = U: the recurrence of Björck and Hammarling, shifted, so that
-/// nothing cancels when U is small.
+/// With Y the result, Y² + 2Y = U: this is the recurrence of Björck and Hammarling, shifted to
+/// avoid cancellation for a small U.
 ///
 /// # Source
-/// Björck & Hammarling (1983), Linear Algebra Appl. 52/53, 127–140; Higham (1987), Linear
-/// Algebra Appl. 88/89, 405–430 (real Schur form); Higham, *Functions of Matrices* (2008),
-/// algorithms 6.3 and 6.7.
+/// Björck & Hammarling (1983), Linear Algebra Appl. 52/53, 127–140; Higham (1987), Linear Algebra
+/// Appl. 88/89, 405–430 (real Schur form); Higham, *Functions of Matrices* (2008), algorithms 6.3
+/// and 6.7.
 pub(crate) fn shifted_root(u: &DMatrix<f64>, blocks: &[(usize, usize)]) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(u.nrows(), u.ncols());
     for (at, &(start, width)) in blocks.iter().enumerate() {
         root_of_block(u, &mut y, start, width);
-        // Columns of this block, upwards: everything it needs stands to the left and below.
+        // The blocks of a column are computed upwards, because each needs the blocks to its left
+        // and below.
         for &(row, height) in blocks[..at].iter().rev() {
             let inner = row + height..start;
             let mut right = Matrix2::zeros();
@@ -31,8 +32,8 @@ pub(crate) fn shifted_root(u: &DMatrix<f64>, blocks: &[(usize, usize)]) -> DMatr
     y
 }
 
-/// Y_bb for one diagonal block B of U: (B + det B/(1 + s + p) I)/s with p = √det(I + B) and
-/// s = tr (I + B)^½ = √(tr(I + B) + 2p), by the theorem of Cayley and Hamilton.
+/// Returns Y_bb for one diagonal block B of U: (B + det B/(1 + s + p) I)/s with p = √det(I + B) and
+/// s = tr (I + B)^½ = √(tr(I + B) + 2p), by the Cayley–Hamilton theorem.
 fn root_of_block(u: &DMatrix<f64>, y: &mut DMatrix<f64>, start: usize, width: usize) {
     if width == 1 {
         let value = u[(start, start)];
@@ -45,16 +46,19 @@ fn root_of_block(u: &DMatrix<f64>, y: &mut DMatrix<f64>, start: usize, width: us
     let half_gap = 0.5 * (b[(0, 0)] - b[(1, 1)]);
     let imaginary_square = -(half_gap * half_gap + b[(0, 1)] * b[(1, 0)]);
     let real = 1.0 + 0.5 * trace;
-    // For a pair near the negative real axis tr(I + B) + 2p cancels; its imaginary part does not.
-    let s = match real < 0.0 && imaginary_square > 0.0 {
-        true => (2.0 * imaginary_square / (p - real)).sqrt(),
-        false => (2.0 * (real + p)).sqrt(),
+    // For a pair near the negative real axis, tr(I + B) + 2p suffers cancellation, and its
+    // imaginary part does not.
+    let s = if real < 0.0 && imaginary_square > 0.0 {
+        (2.0 * imaginary_square / (p - real)).sqrt()
+    } else {
+        (2.0 * (real + p)).sqrt()
     };
     let shift = Matrix2::identity() * (determinant / (1.0 + s + p));
     y.fixed_view_mut::<2, 2>(start, start).copy_from(&((b + shift) / s));
 }
 
-/// Z with Y Z + Z Y + 2 Z = E: how [`shifted_root`] changes when U changes by E (E may be full).
+/// Returns Z with Y Z + Z Y + 2 Z = E: the change of [`shifted_root`] when U changes by E (E may be
+/// full).
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.3 (Bartels–Stewart).
@@ -82,7 +86,8 @@ pub(crate) fn root_derivative(
     z
 }
 
-/// Solves Y_ii Z + Z Y_jj + 2 Z = right for one block of `z`; Y is `z` itself if not given.
+/// Solves Y_ii Z + Z Y_jj + 2 Z = right for one block of `z`; `z` itself is Y if no other Y is
+/// given.
 fn solve_block(
     z: &mut DMatrix<f64>,
     y: Option<&DMatrix<f64>>,
@@ -95,7 +100,7 @@ fn solve_block(
         z[(row, start)] = right[(0, 0)] / (at(row, row) + at(start, start) + 2.0);
         return;
     }
-    // Unknown (i, j) stands at 2 i + j; places outside the block keep the equation z = 0.
+    // Unknown (i, j) has the index 2 i + j; indices outside the block keep the equation z = 0.
     let mut equations = Matrix4::identity();
     let mut sides = Vector4::zeros();
     for i in 0..height {
@@ -115,7 +120,7 @@ fn solve_block(
             }
         }
     }
-    // Y has eigenvalues right of −1, so the sum of two of them and 2 is never 0.
+    // The eigenvalues of Y have real parts above −1, so the sum of two of them and 2 is never 0.
     let solution = equations.full_piv_lu().solve(&sides).unwrap_or_default();
     for i in 0..height {
         for j in 0..width {

@@ -1,7 +1,7 @@
-//! The real Schur form of a matrix.
+//! Real Schur form of a matrix.
 //!
-//! nalgebra has one, but its shifts suffer from cancellation and are never exceptional: it goes
-//! round in circles for several eigenvalues that are equal to rounding.
+//! The implementation of nalgebra has shifts that suffer from cancellation, and no exceptional
+//! shifts: it does not converge if several eigenvalues are equal up to rounding.
 
 use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
@@ -27,17 +27,18 @@ pub struct RealSchur {
     pub q: DMatrix<f64>,
     /// T, square, zero below its diagonal blocks, in the unit of the matrix.
     pub t: DMatrix<f64>,
-    /// The diagonal blocks of T in order: first row, and size 1 or 2. A block of size 2 may also
-    /// hold two real eigenvalues.
+    /// Diagonal blocks of T in order: first row, and size 1 or 2. A block of size 2 may also have
+    /// two real eigenvalues.
     pub blocks: Vec<(usize, usize)>,
 }
 
 impl RealSchur {
-    /// The Schur form of the square matrix `a`, in any unit, by Francis' double-shift QR iteration,
-    /// with exceptional shifts.
+    /// Computes the Schur form of the square matrix `a`, in any unit, by Francis' double-shift QR
+    /// iteration, with exceptional shifts.
     ///
     /// # Errors
-    /// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
+    /// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`],
+    /// [`NumericsError::NotConverged`].
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
@@ -73,8 +74,8 @@ impl RealSchur {
         Ok(Self { q, t, blocks })
     }
 
-    /// The eigenvalues, in the unit of the matrix and the order of the blocks, of a conjugate pair
-    /// the one with Im λ > 0 first.
+    /// Returns the eigenvalues, in the unit of the matrix and the order of the blocks; in a
+    /// conjugate pair, the one with Im λ > 0 comes first.
     pub fn eigenvalues(&self) -> Vec<Complex<f64>> {
         self.blocks.iter().flat_map(|&(at, size)| self.block_eigenvalues(at, size)).collect()
     }
@@ -96,7 +97,8 @@ impl RealSchur {
     }
 }
 
-/// Goes up from `last` to the first negligible subdiagonal entry and clears it.
+/// Searches upwards from `last` for the first negligible subdiagonal entry, sets it to zero, and
+/// returns the row below it.
 fn first_of_unreduced(h: &mut DMatrix<f64>, last: usize, norm: f64) -> usize {
     for at in (1..=last).rev() {
         let neighbours = h[(at, at)].abs() + h[(at - 1, at - 1)].abs();
@@ -108,18 +110,19 @@ fn first_of_unreduced(h: &mut DMatrix<f64>, last: usize, norm: f64) -> usize {
     0
 }
 
-/// One double-shift step on rows and columns `start..=last`.
+/// Performs one double-shift step on rows and columns `start..=last`.
 fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, count: usize) {
     let (x, y, w) = if count.is_multiple_of(10) {
-        // An exceptional shift, of the size of the entries that do not converge.
+        // An exceptional shift has the size of the entries that do not converge.
         let size = h[(last, last - 1)].abs() + h[(last - 1, last - 2)].abs();
         (0.75 * size, 0.75 * size, -0.4375 * size * size)
     } else {
         let product = h[(last, last - 1)] * h[(last - 1, last)];
         (h[(last, last)], h[(last - 1, last - 1)], product)
     };
-    // The first column of H² − (x + y) H + (x y − w) I, over h21. Differences come first: the
-    // plain formula loses everything to cancellation when the eigenvalues are close together.
+    // This is the first column of H² − (x + y) H + (x y − w) I, divided by h21. Differences come
+    // first, because the plain formula loses all digits to cancellation when the eigenvalues are
+    // close together.
     let (r, s) = (x - h[(start, start)], y - h[(start, start)]);
     let mut bulge = Vector3::new(
         (r * s - w) / h[(start + 1, start)] + h[(start, start + 1)],
@@ -140,13 +143,15 @@ fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, 
         reflect_columns(h, axis, k, width, (k + 4).min(last + 1));
         reflect_columns(q, axis, k, width, q.nrows());
         if k > start {
-            // The entries that the reflection clears are exactly zero.
+            // Rounding must not leave small numbers in the entries that the reflection sets to
+            // zero.
             h.view_mut((k + 1, k - 1), (width - 1, 1)).fill(0.0);
         }
     }
 }
 
-/// Unit normal of the mirror that sends `v` to the first axis; `None` if it is there already.
+/// Returns the unit normal of the reflection that maps `v` to the first axis; `None` if `v` is on
+/// it already.
 fn mirror_axis(v: Vector3<f64>) -> Option<Vector3<f64>> {
     let largest = v.amax();
     if largest == 0.0 || (v.y == 0.0 && v.z == 0.0) {
@@ -157,7 +162,7 @@ fn mirror_axis(v: Vector3<f64>) -> Option<Vector3<f64>> {
     Some(axis.normalize())
 }
 
-/// Rows `at..at + width` of `a` ← (I − 2 u uᵀ) of them, from column `from` on.
+/// Replaces rows `at..at + width` of `a` by (I − 2 u uᵀ) times these rows, from column `from` on.
 fn reflect_rows(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, from: usize) {
     for mut column in a.columns_range_mut(from..).column_iter_mut() {
         let part: f64 = (0..width).map(|i| u[i] * column[at + i]).sum();
@@ -167,9 +172,10 @@ fn reflect_rows(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, 
     }
 }
 
-/// Columns `at..at + width` of the first `rows` rows of `a` ← those times (I − 2 u uᵀ).
+/// Replaces columns `at..at + width` of the first `rows` rows of `a` by these columns times (I − 2
+/// u uᵀ).
 fn reflect_columns(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, rows: usize) {
-    // Column by column, as they lie in memory.
+    // The loop follows the column-major order of the memory.
     let len = a.nrows();
     let columns = &mut a.as_mut_slice()[at * len..(at + width) * len];
     let (first, others) = columns.split_at_mut(len);

@@ -1,4 +1,4 @@
-//! Any number of rows reduced to one small triangle, block by block.
+//! Reduction of any number of rows to one small triangle, block by block.
 
 use std::ops::Range;
 
@@ -8,40 +8,40 @@ use rayon::prelude::*;
 
 use crate::limits::SMALLEST_NORM;
 
-/// Rows reduced at a time: a block of a dozen columns stays in the first-level cache.
+/// Number of rows reduced at a time: a block of a dozen columns fits into the first-level cache.
 const BLOCK_ROWS: usize = 256;
 
-/// Rows that one thread reduces on its own. Fixed, so that the numbers do not depend on how many
-/// threads there are.
+/// Number of rows that one thread reduces. It is fixed, so that the results do not depend on the
+/// number of threads.
 const SEGMENT_ROWS: usize = 16_384;
 
-/// The triangular factor R of A = Q R, built from row blocks of A; Q is never formed.
+/// Triangular factor R of A = Q R, computed from row blocks of A; Q is never formed.
 ///
 /// RᵀR = AᵀA, but without squaring the condition number: each block is rotated into R by
-/// Householder reflections of \[R; block\]. Memory is one block and R, however many rows pass.
+/// Householder reflections of \[R; block\]. The memory is one block and R for any number of rows.
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 5.2 (Householder QR);
-/// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (row-blocked QR).
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 5.2 (Householder QR); Demmel,
+/// Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (row-blocked QR).
 #[derive(Debug, Clone)]
 pub struct TriangularFactor {
     columns: usize,
     rows: usize,
     /// columns × columns, upper triangular.
     r: DMatrix<f64>,
-    /// One block, column after column.
+    /// One block, in columns.
     block: Vec<f64>,
-    /// Columns with a value whose square is 0 and with none that is larger.
+    /// `true` for columns with a value whose square underflows, and no larger value.
     vanished: Vec<bool>,
 }
 
 impl TriangularFactor {
-    /// Returns the factor of no rows yet, of so many columns.
+    /// Creates the factor of a matrix with this many columns and no rows yet.
     pub fn new(columns: usize) -> Self {
         Self { columns, rows: 0, r: DMatrix::zeros(0, 0), block: Vec::new(), vanished: Vec::new() }
     }
 
-    /// Makes room at the first rows, which are known to have this many columns.
+    /// Allocates memory when the first rows arrive, which are known to have this many columns.
     fn allocate(&mut self) {
         if self.r.ncols() != self.columns {
             self.r = DMatrix::zeros(self.columns, self.columns);
@@ -50,19 +50,19 @@ impl TriangularFactor {
         }
     }
 
-    /// Rows seen so far.
+    /// Returns the number of rows so far.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// R: columns × columns, upper triangular; 0 × 0 before the first rows.
+    /// Returns R: columns × columns, upper triangular; 0 × 0 before the first rows.
     pub fn r(&self) -> &DMatrix<f64> {
         &self.r
     }
 
-    /// Takes rows whose columns are spread over several matrices side by side.
+    /// Adds rows whose columns are distributed over several adjacent matrices.
     ///
-    /// False, and nothing taken, if a value is not finite or its square overflows.
+    /// Returns false, and adds no row, if a value is not finite or its square overflows.
     #[must_use]
     pub fn push(&mut self, parts: &[DMatrixView<'_, f64>]) -> bool {
         let rows = parts.first().map_or(0, |part| part.nrows());
@@ -71,9 +71,9 @@ impl TriangularFactor {
             return self.push_range(parts, 0..rows);
         }
         let segment = |start: usize| {
-            let mut own = Self::new(self.columns);
+            let mut factor = Self::new(self.columns);
             let range = start..rows.min(start + SEGMENT_ROWS);
-            own.push_range(parts, range).then_some(own)
+            factor.push_range(parts, range).then_some(factor)
         };
         let starts = (0..rows.div_ceil(SEGMENT_ROWS)).into_par_iter().map(|s| s * SEGMENT_ROWS);
         let Some(segments) = starts.map(segment).collect::<Option<Vec<_>>>() else { return false };
@@ -91,7 +91,7 @@ impl TriangularFactor {
             }
             self.absorb(len);
         }
-        // NaN and infinity do not leave a sum of squares: R shows them, and overflow, too.
+        // NaN and infinity persist in sums of squares, so R shows them, and overflow, too.
         if !self.r.iter().all(|v| v.is_finite()) {
             self.r = before;
             return false;
@@ -106,7 +106,7 @@ impl TriangularFactor {
         true
     }
 
-    /// Takes everything another factor has seen; false, and nothing taken, if a square overflows.
+    /// Adds all rows of another factor; returns false, and adds no row, if a square overflows.
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
         if other.r.is_empty() {
@@ -121,24 +121,25 @@ impl TriangularFactor {
         finite
     }
 
-    /// The first column whose squares are too small to be told from 0, and its largest entry in R.
+    /// Returns the first column whose squares are too small to be distinguished from 0, and its
+    /// largest entry in R.
     pub fn too_small(&self) -> Option<(usize, f64)> {
-        // The largest entry: the squares of what is too small vanish.
+        // The largest entry is used because the squares of small entries underflow.
         let sizes = self.r.column_iter().map(|column| column.amax()).enumerate();
         sizes.into_iter().find(|(at, size)| {
             if *size == 0.0 { self.vanished[*at] } else { *size < SMALLEST_NORM }
         })
     }
 
-    /// Counts the rows seen so far as `rows` from now on.
+    /// Sets the number of rows that the factor represents.
     pub fn stand_for(&mut self, rows: usize) {
         self.rows = rows;
     }
 
     /// Rotates the first `len` rows of the block buffer into R, two columns in one sweep.
     ///
-    /// Compiled once for every width of vector registers, and chosen as the processor allows; the
-    /// sums are split into the same lanes in each, so that the numbers do not depend on it.
+    /// It is compiled for every width of vector registers, and chosen at run time; the sums are
+    /// split into the same lanes in each, so that the results do not depend on the processor.
     fn absorb(&mut self, len: usize) {
         Arch::new().dispatch(Absorb { factor: self, len });
     }
@@ -146,20 +147,21 @@ impl TriangularFactor {
     #[inline(always)]
     fn reflect(&mut self, len: usize) {
         let columns = self.columns;
-        let mut rest = &mut self.block[..len * columns];
+        let mut remaining = &mut self.block[..len * columns];
         let mut j = 0;
         while j + 1 < columns {
-            let (pair, others) = rest.split_at_mut(2 * len);
+            let (pair, others) = remaining.split_at_mut(2 * len);
             let (x1, x2) = pair.split_at_mut(len);
-            rest = others;
+            remaining = others;
             let first = Reflection::new(&mut self.r, j, x1);
             let d = dot(x1, x2);
             let w = first.apply(&mut self.r, j + 1, d);
             subtract(x2, w, x1, 0.0, x1);
             let second = Reflection::new(&mut self.r, j + 1, x2);
-            // x1ᵀx2 after the change of x2, for the columns that see both reflections at once.
+            // This is x1ᵀx2 after the change of x2, for the columns to which both reflections are
+            // applied at once.
             let across = dot(x1, x2);
-            for (k, y) in rest.chunks_exact_mut(len).enumerate() {
+            for (k, y) in remaining.chunks_exact_mut(len).enumerate() {
                 let [d1, d2] = dots(x1, x2, y);
                 let w1 = first.apply(&mut self.r, j + 2 + k, d1);
                 let w2 = second.apply(&mut self.r, j + 2 + k, d2 - w1 * across);
@@ -168,12 +170,12 @@ impl TriangularFactor {
             j += 2;
         }
         if j < columns {
-            Reflection::new(&mut self.r, j, rest);
+            Reflection::new(&mut self.r, j, remaining);
         }
     }
 }
 
-/// The call that `pulp` compiles for each width of vector registers.
+/// Arguments of the function that `pulp` compiles for each width of vector registers.
 struct Absorb<'a> {
     factor: &'a mut TriangularFactor,
     len: usize,
@@ -196,7 +198,7 @@ struct Reflection {
 }
 
 impl Reflection {
-    /// Makes it for column `row` and puts the new diagonal entry into R.
+    /// Creates the reflection for column `row` and writes the new diagonal entry into R.
     #[inline(always)]
     fn new(r: &mut DMatrix<f64>, row: usize, x: &[f64]) -> Self {
         let square = dot(x, x);
@@ -204,14 +206,14 @@ impl Reflection {
             return Self { row, tau: 0.0, scale: 0.0 };
         }
         let alpha = r[(row, row)];
-        // The opposite sign, against cancellation.
+        // The opposite sign avoids cancellation.
         let beta = -(alpha * alpha + square).sqrt().copysign(alpha);
         r[(row, row)] = beta;
         Self { row, tau: (beta - alpha) / beta, scale: 1.0 / (alpha - beta) }
     }
 
-    /// Changes R in `column`, whose block part has the product `dot` with x; returns the multiple
-    /// of x to be taken from that part.
+    /// Changes R in `column`, whose part in the block has the product `dot` with x; returns the
+    /// multiple of x to be subtracted from that part.
     #[inline(always)]
     fn apply(&self, r: &mut DMatrix<f64>, column: usize, dot: f64) -> f64 {
         let w = self.tau * (r[(self.row, column)] + self.scale * dot);
@@ -220,10 +222,10 @@ impl Reflection {
     }
 }
 
-/// Partial sums of a product: enough that none waits for the one before.
+/// Number of partial sums of a product: enough to avoid waiting for the previous addition.
 const LANES: usize = 16;
 
-/// xᵀy.
+/// Returns xᵀy.
 #[inline(always)]
 fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
@@ -237,7 +239,7 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     total(sums) + rest(x_rest, y_rest)
 }
 
-/// x1ᵀy and x2ᵀy in one sweep.
+/// Returns x1ᵀy and x2ᵀy in one sweep.
 #[inline(always)]
 fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
     const HALF: usize = LANES / 2;
@@ -254,7 +256,7 @@ fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
     [total(first) + rest(x1_rest, y_rest), total(second) + rest(x2_rest, y_rest)]
 }
 
-/// Sum of the lanes, half onto half.
+/// Returns the sum of the lanes, by repeatedly adding one half to the other.
 #[inline(always)]
 fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
     let mut half = N / 2;
@@ -267,13 +269,13 @@ fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
     sums[0]
 }
 
-/// xᵀy of what does not fill the lanes.
+/// Returns xᵀy of the entries that do not fill the lanes.
 #[inline(always)]
 fn rest(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(a, b)| a * b).sum()
 }
 
-/// y ← y − f1·x1 − f2·x2.
+/// Computes y ← y − f1·x1 − f2·x2.
 #[inline(always)]
 fn subtract(y: &mut [f64], f1: f64, x1: &[f64], f2: f64, x2: &[f64]) {
     for ((y, x1), x2) in y.iter_mut().zip(x1).zip(x2) {

@@ -7,9 +7,9 @@ use crate::NumericsError;
 /// Value with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertain {
-    /// Value, in the unit its owner gives.
+    /// Value, in the unit that its field or function states.
     pub value: f64,
-    /// Standard error, in the same unit; infinite where the value has no derivative with respect to
+    /// Standard error, in the same unit; infinite if the value has no derivative with respect to
     /// the parameters (repeated eigenvalues).
     pub standard_error: f64,
     /// Degrees of freedom of the variance behind the standard error.
@@ -17,7 +17,8 @@ pub struct Uncertain {
 }
 
 impl Uncertain {
-    /// Returns the confidence interval [low, high] at `level` (0.95 for 95 %), in the unit of the value.
+    /// Returns the confidence interval [low, high] at `level` (0.95 for 95 %), in the unit of the
+    /// value.
     ///
     /// # Errors
     /// [`NumericsError::Level`] unless 0 < level < 1.
@@ -28,8 +29,8 @@ impl Uncertain {
     /// ```
     /// use mechid_numerics::Uncertain;
     ///
-    /// let found = Uncertain { value: 10.0, standard_error: 1.0, degrees_of_freedom: 4 };
-    /// let [low, high] = found.interval(0.95)?;
+    /// let stiffness = Uncertain { value: 10.0, standard_error: 1.0, degrees_of_freedom: 4 };
+    /// let [low, high] = stiffness.interval(0.95)?;
     /// assert!((low - 7.223_55).abs() < 1e-5 && (high - 12.776_45).abs() < 1e-5);
     /// # Ok::<(), mechid_numerics::NumericsError>(())
     /// ```
@@ -38,8 +39,8 @@ impl Uncertain {
     }
 }
 
-/// Returns the interval [low, high] at `level` around a value of known standard error, in its unit; the
-/// whole line for a standard error that is not finite or has no degree of freedom.
+/// Returns the interval [low, high] at `level` around a value of known standard error, in its unit;
+/// it is infinite for a standard error that is not finite or has no degrees of freedom.
 ///
 /// # Errors
 /// [`NumericsError::Level`] unless 0 < level < 1.

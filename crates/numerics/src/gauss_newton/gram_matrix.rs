@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use super::Linearisation;
 use crate::cholesky::Cholesky;
 
-/// Normal equations of a linearisation, their columns scaled to unit length.
+/// Normal equations of a linearisation, with columns scaled to unit length.
 ///
-/// They square the condition number of the Jacobian: coordinates should be nearly orthogonal.
+/// They square the condition number of the Jacobian, so the coordinates should be nearly
+/// orthogonal.
 #[derive(Debug, Clone)]
 pub struct GramMatrix {
     gram: DMatrix<f64>,
@@ -17,7 +18,7 @@ pub struct GramMatrix {
 }
 
 impl GramMatrix {
-    /// Takes JᵀJ (parameters × parameters) and Jᵀr.
+    /// Creates the linearisation from JᵀJ (parameters × parameters) and Jᵀr.
     pub fn new(gram: &DMatrix<f64>, gradient: &DVector<f64>) -> Self {
         let length = |square: f64| if square > 0.0 { square.sqrt() } else { 1.0 };
         let scale = gram.diagonal().map(length);

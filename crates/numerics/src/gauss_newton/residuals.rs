@@ -14,18 +14,18 @@ pub trait Residuals {
         self.len() == 0
     }
 
-    /// Writes the residuals at `parameters`; returns `false` where they do not exist.
-    /// Residuals are a list in any unit.
+    /// Writes the residuals at `parameters`; returns `false` if they do not exist there. Residuals
+    /// are a list in any unit.
     fn residual(&mut self, parameters: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
 
-    /// Writes their derivatives, residuals × parameters, where they were last evaluated.
-    /// Entries are in the unit of the residual over that of the parameter.
+    /// Writes their derivatives, residuals × parameters, at the most recent parameters. Entries are
+    /// in the unit of the residual divided by the unit of the parameter.
     fn jacobian(&self, jacobian: &mut DMatrix<f64>);
 }
 
-/// Searches the local minimum of the sum of squared residuals from `parameters` in at most `max_steps`, each
-/// linearisation by QR decomposition; `None` where the residuals do not exist at the start.
-/// Parameters are in any units, one for each column of the Jacobian.
+/// Searches for the local minimum of the sum of squared residuals from `parameters` in at most
+/// `max_steps` steps, each with a linearisation by QR decomposition; `None` if the residuals do not
+/// exist at the start. Parameters are in any units, one for each column of the Jacobian.
 ///
 /// # Source
 /// As [`minimise`].
@@ -44,7 +44,7 @@ pub fn minimise_residuals(
     minimise(&mut buffered, parameters, max_steps)
 }
 
-/// Residuals at the parameters last accepted and last tried.
+/// Residuals at the most recently accepted and tried parameters.
 struct Buffered<'a, R> {
     residuals: &'a mut R,
     accepted: DVector<f64>,
@@ -64,7 +64,8 @@ impl<R: Residuals> SumOfSquares for Buffered<'_, R> {
         std::mem::swap(&mut self.accepted, &mut self.tried);
     }
 
-    /// Follows an accepted trial, so that what was last evaluated is what was accepted.
+    /// The linearisation follows an accepted trial, so the most recent evaluation is the accepted
+    /// one.
     fn linearise(&mut self) -> Option<Triangle> {
         self.residuals.jacobian(&mut self.jacobian);
         Some(Triangle::new(&self.jacobian, &self.accepted))

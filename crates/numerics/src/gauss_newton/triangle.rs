@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::Linearisation;
 use crate::triangular::TriangularFactor;
 
-/// The triangle \[R q\] of \[J r\], the columns of J scaled to unit length: one QR decomposition, which every
-/// damping uses again.
+/// Triangle \[R q\] of \[J r\], with the columns of J scaled to unit length: one QR decomposition,
+/// which is used for every damping.
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; scaling after Moré (1978).
@@ -27,8 +27,8 @@ pub struct DampedTriangle {
 }
 
 impl Triangle {
-    /// Takes the Jacobian (residuals × parameters) and the residual; where one of them is not finite the
-    /// linearisation has no step.
+    /// Creates the linearisation from the Jacobian (residuals × parameters) and the residual; if
+    /// one of them is not finite, the linearisation has no step.
     pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Self {
         let columns = jacobian.ncols();
         let mut factor = TriangularFactor::new(columns + 1);
@@ -36,7 +36,7 @@ impl Triangle {
         let mut upper = if is_finite { factor.r().clone() } else { factor.r().map(|_| f64::NAN) };
         let mut scale = DVector::from_element(columns, 1.0);
         for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
-            // A rotation keeps lengths: those of R are those of J.
+            // The columns of R have the same lengths as the columns of J.
             if column.norm() > 0.0 {
                 *length = column.norm();
                 column /= *length;
@@ -78,7 +78,7 @@ impl Linearisation for Triangle {
 
     fn solve(&self, factor: &DampedTriangle, right: &DVector<f64>) -> DVector<f64> {
         let mut solution = right.clone();
-        // The factor exists: its diagonal has no zero.
+        // The factor exists, because its diagonal has no zero.
         let solved = factor.r.tr_solve_upper_triangular_mut(&mut solution)
             && factor.r.solve_upper_triangular_mut(&mut solution);
         debug_assert!(solved, "a factor has a regular triangle");

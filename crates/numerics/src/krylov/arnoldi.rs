@@ -1,4 +1,4 @@
-//! Arnoldi's iteration.
+//! Arnoldi iteration.
 
 use std::convert::Infallible;
 
@@ -7,28 +7,28 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::krylov::eigenvector::eigenvector;
 use crate::real_schur::RealSchur;
 
-/// An orthonormal basis V of the space of b, Φ b, Φ² b …, and Φ in this basis: Φ V = V H + a
-/// remainder outside the space. Vectors and Φ are in any consistent unit.
+/// Orthonormal basis V of the space of b, Φ b, Φ² b …, and Φ in this basis: Φ V = V H + a remainder
+/// outside the space. Vectors and Φ are in any consistent unit.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
 #[derive(Debug)]
 pub struct Arnoldi {
     basis: Vec<DVector<f64>>,
-    /// H with one more row, for the next vector; columns not computed yet are zero.
+    /// H with one more row, for the next vector; columns that are not computed yet are zero.
     pub(super) hessenberg: DMatrix<f64>,
     size: usize,
 }
 
 impl Arnoldi {
-    /// Creates the space of `start` (n entries) alone, without products; its dimension is at most
+    /// Creates the space of `start` (n entries) alone, without products; its maximum dimension is
     /// `most`.
     pub fn new(start: DVector<f64>, most: usize) -> Self {
         let hessenberg = DMatrix::zeros(most + 1, most);
         Self { basis: vec![start.normalize()], hessenberg, size: 0 }
     }
 
-    /// Number of products with Φ so far.
+    /// Returns the number of products with Φ so far.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -87,8 +87,8 @@ impl Arnoldi {
         vector
     }
 
-    /// Returns the eigenvalue of H of largest modulus with its eigenvector, an approximation of that
-    /// of Φ; `None` without products or if numbers overflow.
+    /// Returns the eigenvalue of H of largest modulus with its eigenvector, an approximation of the
+    /// eigenpair of Φ; `None` without products or if numbers overflow.
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
@@ -106,7 +106,7 @@ impl Arnoldi {
     }
 }
 
-/// An approximate eigenvalue of largest modulus.
+/// Approximate eigenvalue of largest modulus.
 #[derive(Debug, Clone)]
 pub struct Dominant {
     /// The eigenvalue μ, in the unit of Φ.

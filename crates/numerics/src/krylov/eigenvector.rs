@@ -1,4 +1,4 @@
-//! Eigenvectors of a matrix with few diagonals under the main one.
+//! Eigenvectors of a matrix with few diagonals below the main diagonal.
 
 use std::collections::VecDeque;
 
@@ -6,10 +6,10 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::krylov::start_vector::numbered_start_vector;
 
-/// Returns the eigenvector of norm 1 (pure numbers) of a square `matrix` to its eigenvalue `value`,
-/// in the unit of the matrix, by inverse iteration; `None` if numbers overflow. The matrix has at
-/// most `below` diagonals under the main one; for a multiple eigenvalue each `number` gives another
-/// eigenvector.
+/// Returns the eigenvector of norm 1 (pure numbers) of a square `matrix` for its eigenvalue
+/// `value`, in the unit of the matrix, by inverse iteration; `None` if numbers overflow. The matrix
+/// has at most `below` diagonals below the main diagonal; for a multiple eigenvalue each `number`
+/// gives another eigenvector.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.1.
@@ -20,7 +20,7 @@ pub fn eigenvector(
     number: usize,
 ) -> Option<DVector<Complex<f64>>> {
     let size = matrix.nrows();
-    // The shift differs from the eigenvalue by rounding, so that the factors exist.
+    // The shift differs from the eigenvalue by a rounding error, so that the factors exist.
     let shift = value + Complex::from(f64::EPSILON * matrix.norm().max(f64::MIN_POSITIVE));
     let factors = HessenbergFactors::new(matrix, below, shift);
     let mut vector = numbered_start_vector(size, number).map(Complex::from);
@@ -31,16 +31,16 @@ pub fn eigenvector(
     vector.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(vector)
 }
 
-/// L and U of A − σI with exchanges of rows, for a matrix with few diagonals under the main one:
-/// O(size²) operations for each of them.
+/// L and U of A − σI with row exchanges, for a matrix with few diagonals below the main diagonal:
+/// each needs O(size²) operations.
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.4.
 struct HessenbergFactors {
     below: usize,
-    /// Rows of U from the diagonal on, one after the other.
+    /// Rows of U from the diagonal on.
     upper: Vec<Vec<Complex<f64>>>,
-    /// For each column the row it was exchanged with, and the factors of the rows below.
+    /// For each column, the row with which it was exchanged, and the factors of the rows below.
     steps: Vec<(usize, Vec<Complex<f64>>)>,
 }
 
@@ -52,7 +52,7 @@ impl HessenbergFactors {
             if i == j { value_at - shift } else { value_at }
         };
         let row = |i: usize| (i.saturating_sub(below)..size).map(|j| entry(i, j)).collect();
-        // Rows that the elimination of a column changes; all begin with its entry.
+        // The elimination of a column changes these rows; all begin with its entry.
         let mut active: VecDeque<Vec<Complex<f64>>> = (0..size.min(below)).map(row).collect();
         let (mut upper, mut steps) = (Vec::with_capacity(size), Vec::with_capacity(size));
         for column in 0..size {
@@ -79,7 +79,7 @@ impl HessenbergFactors {
         Self { below, upper, steps }
     }
 
-    /// b ← (A − σI)⁻¹ b; the result is not finite if the matrix is singular.
+    /// Computes b ← (A − σI)⁻¹ b; the result is not finite if the matrix is singular.
     fn solve(&self, b: &mut DVector<Complex<f64>>) {
         for (column, (pivot, factors)) in self.steps.iter().enumerate() {
             b.swap_rows(column, column + pivot);

@@ -1,4 +1,4 @@
-//! Systems of equations solved in a Krylov space.
+//! Linear equations solved in a Krylov space.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,7 +15,7 @@ pub struct Solution {
     pub residual: f64,
     /// Number of products with Φ.
     pub products: usize,
-    /// Smallest singular value of I − Φ in the space, over the largest, a pure number.
+    /// Smallest singular value of I − Φ in the space relative to the largest, a pure number.
     pub reciprocal_condition: f64,
 }
 
@@ -65,7 +65,7 @@ pub fn solve<E: From<NumericsError>>(
 }
 
 /// Least squares with I − H, which has one more row than columns: rotations of neighbouring rows
-/// make it a triangle.
+/// make it triangular.
 struct Triangle {
     entries: DMatrix<f64>,
     /// Cosine and sine of each rotation.
@@ -80,7 +80,7 @@ impl Triangle {
         Self { entries, rotations: Vec::with_capacity(most), right: vec![norm] }
     }
 
-    /// Appends a column, whose last entry is the one under the diagonal.
+    /// Appends a column, whose last entry is below the diagonal.
     fn append(&mut self, mut column: Vec<f64>) {
         let j = self.rotations.len();
         for (i, [cos, sin]) in self.rotations.iter().enumerate() {
@@ -98,7 +98,7 @@ impl Triangle {
         self.right[j] *= cos;
     }
 
-    /// Norm of the least-squares residual.
+    /// Returns the norm of the least-squares residual.
     fn residual(&self) -> f64 {
         self.right[self.rotations.len()].abs()
     }

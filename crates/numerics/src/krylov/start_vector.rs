@@ -1,8 +1,8 @@
-//! Start vectors of an iteration: pseudo-random, and the same on every run.
+//! Pseudo-random start vectors of an iteration, the same in every run.
 
 use nalgebra::DVector;
 
-/// Returns a pseudo-random vector of `len` entries, pure numbers, and norm 1, the same on every
+/// Returns a pseudo-random vector of `len` entries, pure numbers, and norm 1, the same in every
 /// run.
 pub fn start_vector(len: usize) -> DVector<f64> {
     numbered_start_vector(len, 0)
@@ -14,7 +14,7 @@ pub fn numbered_start_vector(len: usize, number: usize) -> DVector<f64> {
     vector.normalize()
 }
 
-/// Pseudo-random pure numbers between −½ and ½, the same on every run; `number` chooses the
+/// Returns pseudo-random pure numbers between −½ and ½, the same in every run; `number` chooses the
 /// sequence.
 pub fn pseudo_random(number: usize) -> impl Iterator<Item = f64> {
     let mut seed = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(2 * number as u64 + 1);
