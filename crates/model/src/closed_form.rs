@@ -8,14 +8,14 @@ use crate::error::require;
 use crate::{ModelError, Response, Sdof};
 
 impl Sdof {
-    /// Free response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s).
+    /// Returns the free response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s).
     ///
-    /// With h the impulse response, x = x0 (ḣ + c/m h) + v0 h: oscillating, critically damped
-    /// or creeping, without a seam between them.
+    /// With h the impulse response, x = x0 (ḣ + c/m h) + v0 h: one expression for underdamped,
+    /// critically damped and overdamped systems.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] if `x0` or `v0` is not finite,
-    /// [`ModelError::Signal`] if an unstable motion overflows.
+    /// [`ModelError::Parameter`] if `x0` or `v0` is not finite, [`ModelError::Signal`] if an
+    /// unstable response overflows.
     ///
     /// # Source
     /// Meirovitch (1975), free vibration of a damped single-degree-of-freedom system.
@@ -29,11 +29,12 @@ impl Sdof {
         self.respond(sampling, |t| (self.free_motion(t, x0, v0), 0.0))
     }
 
-    /// Response from `x0`, `v0` to a force switched on at t = 0: F(t) = `force` (N) for t ≥ 0.
+    /// Returns the response from `x0`, `v0` to a force switched on at t = 0: F(t) = `force` (N) for
+    /// t ≥ 0.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] if `force`, `x0` or `v0` is not finite,
-    /// [`ModelError::Signal`] if an unstable motion overflows.
+    /// [`ModelError::Parameter`] if `force`, `x0` or `v0` is not finite, [`ModelError::Signal`] if
+    /// an unstable response overflows.
     ///
     /// # Source
     /// Meirovitch (1975), response of a damped single-degree-of-freedom system to a step.
@@ -54,15 +55,15 @@ impl Sdof {
         })
     }
 
-    /// Response from `x0`, `v0` to F(t) = Re(`force` exp(iωt)), transient included.
+    /// Returns the response from `x0`, `v0` to F(t) = Re(`force` exp(iωt)), transient included.
     ///
-    /// A force F cos(ωt + φ) has `force` = F exp(iφ). Resonance needs no exception: without
-    /// damping the amplitude grows in proportion to t. The error is of the order of ε
-    /// relative to the largest displacement.
+    /// A force F cos(ωt + φ) has `force` = F exp(iφ). Resonance needs no exception: without damping
+    /// the amplitude grows in proportion to t. The error is of the order of ε relative to the
+    /// largest displacement.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] if an argument is not finite,
-    /// [`ModelError::Signal`] if an unstable motion overflows.
+    /// [`ModelError::Parameter`] if an argument is not finite, [`ModelError::Signal`] if an
+    /// unstable response overflows.
     ///
     /// # Source
     /// Meirovitch (1975), response of a damped single-degree-of-freedom system to harmonic forces,
@@ -85,12 +86,12 @@ impl Sdof {
         })
     }
 
-    /// Steady-state response to F(t) = Re(`force` exp(iωt)), after the transient has died out:
-    /// x = Re(`force` exp(iωt) / (k − ω²m + iωc)).
+    /// Returns the steady-state response to F(t) = Re(`force` exp(iωt)), after the decay of the
+    /// transient: x = Re(`force` exp(iωt) / (k − ω²m + iωc)).
     ///
     /// # Errors
-    /// [`ModelError::SingularDynamicStiffness`] at an undamped resonance,
-    /// [`ModelError::Parameter`] if an argument is not finite.
+    /// [`ModelError::SingularDynamicStiffness`] at an undamped resonance, [`ModelError::Parameter`]
+    /// if an argument is not finite.
     ///
     /// # Source
     /// Dissertation eqs. (4.6.9)–(4.6.10).
@@ -109,7 +110,8 @@ impl Sdof {
         })
     }
 
-    /// Impulse response h(t) for t ≥ 0, in m/(N·s): the displacement after a unit impulse at rest.
+    /// Returns the impulse response h(t) for t ≥ 0, in m/(N·s): the displacement after a unit
+    /// impulse at rest.
     ///
     /// # Source
     /// Meirovitch (1975), impulse response of a damped single-degree-of-freedom system.
@@ -117,7 +119,7 @@ impl Sdof {
         self.integrated_impulse_response(0, t)
     }
 
-    /// The impulse response integrated `k` times from 0: tᵏ⁺¹ φ_k[λ₁t, λ₂t] / m.
+    /// Returns the impulse response integrated `k` times from 0: tᵏ⁺¹ φ_k[λ₁t, λ₂t] / m.
     ///
     /// k = 1 is the response to a unit step, k = 2 to the ramp F = t.
     pub(crate) fn integrated_impulse_response(&self, k: usize, t: f64) -> f64 {
@@ -125,9 +127,9 @@ impl Sdof {
         phi_divided(k, a, b).re * t.powi(k as i32 + 1) / self.mass()
     }
 
-    /// x and ẋ at `t` of the free response from `x0`, `v0`.
+    /// Returns x and ẋ at `t` of the free response from `x0`, `v0`.
     pub(crate) fn free_motion(&self, t: f64, x0: f64, v0: f64) -> (f64, f64) {
-        // The first real root is the fast one: these two sums do not cancel.
+        // The first real root is the faster one, which avoids cancellation in these two sums.
         let [fast, slow] = self.poles();
         let h = t * phi_divided(0, fast * t, slow * t);
         let h_dot = (fast * t).exp() + slow * h;
@@ -140,7 +142,7 @@ impl Sdof {
     /// exp(zt) over λ₁, λ₂ and μ, over m.
     fn forced_motion(&self, t: f64, mu: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
         let [p, q] = self.poles();
-        // Dividing by the distance to the farther root never cancels, not at resonance either.
+        // Division by the distance to the farther root avoids cancellation, also at resonance.
         let (near, far) = if (mu - p).norm() < (mu - q).norm() { (p, q) } else { (q, p) };
         let with_force = t * phi_divided(0, near * t, mu * t);
         let roots_only = t * phi_divided(0, near * t, far * t);
@@ -163,13 +165,13 @@ impl Sdof {
         to_response(sampling, samples)
     }
 
-    /// ẍ = (F − c ẋ − k x) / m.
+    /// Returns ẍ = (F − c ẋ − k x) / m.
     pub(crate) fn acceleration(&self, x: f64, v: f64, force: f64) -> f64 {
         (force - self.damping() * v - self.stiffness() * x) / self.mass()
     }
 }
 
-/// Records of one channel from x, ẋ, ẍ at each instant.
+/// Creates records of one channel from x, ẋ, ẍ at each instant.
 pub(crate) fn to_response(
     sampling: Sampling,
     samples: impl Iterator<Item = [f64; 3]>,

@@ -5,18 +5,18 @@ use std::str::FromStr;
 
 use crate::ModelError;
 
-/// Rule that carries the state equation from one sample to the next.
+/// Rule for the step of the state from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Discretisation {
-    /// z⁺ = z + Δt ż: Φ = I + AΔt, Γ = BΔt. Wrong by terms of order Δt.
+    /// z⁺ = z + Δt ż: Φ = I + AΔt, Γ = BΔt. The error is of order Δt.
     ///
     /// # Source
     /// Dissertation eqs. (4.5.9)–(4.5.12), (4.5.28).
     #[cfg_attr(feature = "serde", serde(rename = "euler"))]
     Euler,
-    /// The force is held from its sample to the next, as a digital converter drives a shaker:
-    /// Φ = exp(AΔt), Γ = ∫₀^Δt exp(As) ds B.
+    /// The force is constant from each sample to the next, as the output of a digital-to-analogue
+    /// converter: Φ = exp(AΔt), Γ = ∫₀^Δt exp(As) ds B.
     ///
     /// # Source
     /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (zero-order
@@ -30,7 +30,7 @@ pub enum Discretisation {
 }
 
 impl Discretisation {
-    /// All of them.
+    /// All assumptions.
     pub const ALL: [Self; 3] = [Self::Euler, Self::ZeroOrderHold, Self::FirstOrderHold];
 
     fn name(self) -> &'static str {
@@ -43,7 +43,7 @@ impl Discretisation {
 }
 
 impl fmt::Display for Discretisation {
-    /// `euler`, `held` or `linear`.
+    /// Writes `euler`, `held` or `linear`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }

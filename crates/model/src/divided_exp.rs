@@ -1,32 +1,33 @@
-//! Divided differences of the exponential, accurate whether the two roots of an oscillator are
-//! far apart, close together or equal.
+//! Divided differences of the exponential, accurate for roots of an oscillator that are far apart,
+//! close together or equal.
 //!
-//! φ₀(z) = exp z and φ_{k+1}(z) = (φ_k(z) − 1/k!) / z. The motions of an oscillator with roots
-//! λ₁, λ₂ are divided differences φ_k[λ₁t, λ₂t]: one expression for all regimes of damping, where
-//! the textbook has three and loses digits between them.
+//! φ₀(z) = exp z and φ_{k+1}(z) = (φ_k(z) − 1/k!) / z. The responses of an oscillator with roots
+//! λ₁, λ₂ are divided differences φ_k[λ₁t, λ₂t]: one expression for all values of the damping,
+//! whereas the three expressions of textbooks lose digits between them.
 //!
 //! # Source
-//! Higham (2008), Functions of Matrices, chapter 10 (the φ functions) and appendix B.16
-//! (divided differences).
+//! Higham (2008), Functions of Matrices, chapter 10 (the φ functions) and appendix B.16 (divided
+//! differences).
 
 use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Terms of a power series for |z| < 1: 1/20! < ε/2.
+/// Number of terms of a power series for |z| < 1: 1/20! < ε/2.
 const TERMS: usize = 20;
 
-/// φ_k(z).
+/// Returns φ_k(z).
 pub(crate) fn phi(k: usize, z: C) -> C {
     if k > 0 && z.norm() < 1.0 {
-        // Σ z^j / (j + k)!, from the small terms up.
+        // The series Σ z^j / (j + k)! is summed from the small terms up.
         return (0..TERMS).rev().fold(C::from(0.0), |sum, j| (sum * z + 1.0) / (j + k) as f64)
             / factorial(k - 1);
     }
     (0..k).fold(z.exp(), |lower, j| (lower - 1.0 / factorial(j)) / z)
 }
 
-/// The divided difference φ_k[a, b] = (φ_k(a) − φ_k(b)) / (a − b), its limit φ_k′(a) for a = b.
+/// Returns the divided difference φ_k[a, b] = (φ_k(a) − φ_k(b)) / (a − b), and its limit φ_k′(a)
+/// for a = b.
 pub(crate) fn phi_divided(k: usize, a: C, b: C) -> C {
     let (large, small) = if a.norm() < b.norm() { (b, a) } else { (a, b) };
     if k == 0 {
@@ -40,11 +41,11 @@ pub(crate) fn phi_divided(k: usize, a: C, b: C) -> C {
     if large.norm() < 1.0 {
         return series(k, large, small);
     }
-    // Leibniz: (z φ_k)[a, b] = a φ_k[a, b] + φ_k(b) = φ_{k−1}[a, b].
+    // The Leibniz rule gives (z φ_k)[a, b] = a φ_k[a, b] + φ_k(b) = φ_{k−1}[a, b].
     (phi_divided(k - 1, large, small) - phi(k, small)) / large
 }
 
-/// Σ_j h_j(a, b) / (j + k + 1)! with h_j the sum of all products of j factors a or b.
+/// Returns Σ_j h_j(a, b) / (j + k + 1)! with h_j the sum of all products of j factors a or b.
 fn series(k: usize, a: C, b: C) -> C {
     let mut sum = C::from(0.0);
     let (mut products, mut power) = (C::from(1.0), C::from(1.0));
@@ -58,7 +59,7 @@ fn series(k: usize, a: C, b: C) -> C {
     sum
 }
 
-/// sinh(z) / z.
+/// Returns sinh(z) / z.
 fn sinhc(z: C) -> C {
     // The next term, z²/6, is below ε.
     if z.norm() < 1e-8 { C::from(1.0) } else { z.sinh() / z }

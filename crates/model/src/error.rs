@@ -4,7 +4,8 @@ use mechid_signal::message;
 
 use crate::{Matrix, Parameter};
 
-/// A model that cannot be made or evaluated; every variant carries the offending numbers.
+/// Error of a model that cannot be created or evaluated; every variant has the numbers that explain
+/// it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -32,7 +33,7 @@ pub enum ModelError {
         row: usize,
         /// Column, counted from 1.
         column: usize,
-        /// The value found, in the unit of the matrix.
+        /// The value, in the unit of the matrix.
         value: f64,
     },
     /// A matrix entry was given for a degree of freedom that the system does not have.
@@ -92,7 +93,7 @@ pub enum ModelError {
         quantity: &'static str,
         /// Degree of freedom, counted from 1.
         dof: usize,
-        /// The value found, in m or m/s.
+        /// The value, in m or m/s.
         value: f64,
     },
     /// A force record does not have one channel per degree of freedom.
@@ -115,7 +116,7 @@ pub enum ModelError {
         /// 1 / ((‖K‖ + ω²‖M‖ + ω‖C‖) ‖D⁻¹‖) in the 1-norm; 0 if a pivot vanished.
         reciprocal_condition: f64,
     },
-    /// M⁻¹K or M⁻¹C is too large to compute eigenvalues with.
+    /// The entries of M⁻¹K or M⁻¹C are too large for the computation of eigenvalues.
     #[error("M⁻¹K or M⁻¹C has an entry of size {largest:.1e}: too large for eigenvalues")]
     StateMatrixOverflow {
         /// Largest modulus of an entry, in 1/s or its square.
@@ -127,17 +128,17 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// A word that names none of the choices.
+    /// A word is not one of the choices.
     #[error("there is no {what} `{name}`: {known}")]
     UnknownName {
-        /// Kind of thing to be named.
+        /// Kind of item to be named.
         what: &'static str,
         /// The word given.
         name: String,
         /// Known words, separated by commas.
         known: &'static str,
     },
-    /// An entry outside M, C and K.
+    /// An index is outside M, C and K.
     #[error(
         "{matrix} has no entry ({row}, {column}): the system has {}",
         message::count(*dof, "degree of freedom")
@@ -152,7 +153,7 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// A name that no entry of M, C and K has.
+    /// A name is not that of an entry of M, C or K.
     #[error(
         "a system of {} has no parameter `{name}`: {}",
         message::count(*dof, "degree of freedom"),
@@ -164,7 +165,7 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// A covariance has not one row and column per parameter.
+    /// A covariance does not have one row and column per parameter.
     #[error("the covariance is {rows}×{columns} for {}", message::count(*parameters, "parameter"))]
     CovarianceShape {
         /// Number of its rows.
@@ -174,7 +175,7 @@ pub enum ModelError {
         /// Number of parameters named.
         parameters: usize,
     },
-    /// A negative variance, or a covariance that is not finite.
+    /// A variance is negative, or a covariance is not finite.
     #[error(
         "{parameter} has the variance {variance} or a covariance that is not finite: \
          leave out the parameters that the data do not determine",
@@ -192,7 +193,7 @@ pub enum ModelError {
         /// Name of the parameter concerned.
         parameter: String,
     },
-    /// A text is not a nonlinear term, or the term does not belong to the system.
+    /// A text is not a nonlinear term, or the term does not fit the system.
     #[error("`{text}` is not usable as a nonlinear term: {reason}")]
     Term {
         /// The text of the term.
@@ -200,29 +201,30 @@ pub enum ModelError {
         /// Reason of the refusal.
         reason: String,
     },
-    /// Two nonlinear terms have one name.
+    /// Two nonlinear terms have the same name.
     #[error("two nonlinear terms are called `{name}`")]
     RepeatedTerm {
         /// The name.
         name: String,
     },
-    /// Nonlinear terms do not have one finite coefficient each.
+    /// The number of coefficients differs from the number of nonlinear terms, or a coefficient is
+    /// not finite.
     #[error("{} for {}: one finite number for each", message::count(*got, "coefficient"), message::count(*terms, "nonlinear term"))]
     Coefficients {
-        /// Coefficients found.
+        /// Number of finite coefficients.
         got: usize,
-        /// Terms.
+        /// Number of terms.
         terms: usize,
     },
-    /// A mode that the system does not have.
+    /// The system does not have this mode.
     #[error("there is no mode {mode}: {} without damping", message::count(*modes, "oscillating mode"))]
     NoSuchMode {
-        /// The one asked for, counted from 1.
+        /// Requested mode, counted from 1.
         mode: usize,
         /// Number of modes.
         modes: usize,
     },
-    /// A signal is not usable.
+    /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
     /// A decomposition fails.

@@ -6,11 +6,12 @@ use crate::error::require;
 use crate::{ModelError, SecondOrderSystem};
 
 impl SecondOrderSystem {
-    /// Dynamic stiffness D(ω) = K − ω²M + iωC, n×n, in N/m: D X = F for amplitudes of exp(iωt).
+    /// Returns the dynamic stiffness D(ω) = K − ω²M + iωC, n×n, in N/m: D X = F for amplitudes of
+    /// exp(iωt).
     ///
     /// # Source
-    /// Ewins (2000), the receptance matrix of a viscously damped system;
-    /// line by line it is Dissertation eqs. (4.6.9)–(4.6.10).
+    /// Ewins (2000), the receptance matrix of a viscously damped system; line by line it is
+    /// Dissertation eqs. (4.6.9)–(4.6.10).
     pub fn dynamic_stiffness(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let (m, c, k) = (self.mass(), self.damping(), self.stiffness());
         DMatrix::from_fn(self.dof(), self.dof(), |i, j| {
@@ -18,13 +19,13 @@ impl SecondOrderSystem {
         })
     }
 
-    /// Receptance H(ω) = D(ω)⁻¹, n×n, in m/N: X = H F for amplitudes of exp(iωt).
+    /// Returns the receptance H(ω) = D(ω)⁻¹, n×n, in m/N: X = H F for amplitudes of exp(iωt).
     ///
     /// Entry (i, j) is the displacement of degree of freedom i under a unit force on j.
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] if ω is not finite,
-    /// [`ModelError::SingularDynamicStiffness`] if D(ω) cannot be inverted in double precision.
+    /// [`ModelError::Parameter`] if ω is not finite, [`ModelError::SingularDynamicStiffness`] if
+    /// D(ω) cannot be inverted in double precision.
     ///
     /// # Source
     /// Ewins (2000), the receptance matrix of a viscously damped system.
@@ -39,8 +40,8 @@ impl SecondOrderSystem {
             .solve(&DMatrix::identity(self.dof(), self.dof()))
             .ok_or(ModelError::SingularDynamicStiffness { omega, reciprocal_condition: 0.0 })?;
         let reciprocal_condition = 1.0 / (terms * one_norm(&receptance));
-        // The terms of D cancel at a resonance and leave rounding of about 2ε of their size: below
-        // that, no digit of the inverse is right. The comparison also rejects NaN.
+        // The terms of D cancel at a resonance, with a rounding error of about 2ε of their size:
+        // below that, no digit of the inverse is right. The comparison also rejects NaN.
         if reciprocal_condition > 2.0 * f64::EPSILON {
             Ok(receptance)
         } else {
@@ -48,16 +49,16 @@ impl SecondOrderSystem {
         }
     }
 
-    /// Receptance at each of the given angular frequencies (rad/s).
+    /// Returns the receptance at each of the given angular frequencies (rad/s).
     ///
     /// # Errors
-    /// As [`receptance`](Self::receptance), at the first frequency that has none.
+    /// As [`receptance`](Self::receptance), at the first frequency without a receptance.
     pub fn receptances(&self, omegas: &[f64]) -> Result<Vec<DMatrix<Complex<f64>>>, ModelError> {
         omegas.iter().map(|&omega| self.receptance(omega)).collect()
     }
 }
 
-/// Largest column sum of moduli.
+/// Returns the largest column sum of moduli.
 fn one_norm<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> f64 {
     matrix.column_iter().map(|c| c.iter().map(|z| z.clone().modulus()).sum()).fold(0.0, f64::max)
 }

@@ -3,8 +3,8 @@
 
 // Modes
 
-/// Relative difference below which eigenvalues are one multiple eigenvalue: about √ε, the rounding
-/// of a defective pair.
+/// Maximum relative difference of eigenvalues that count as one multiple eigenvalue: about √ε, the
+/// rounding of a defective pair.
 pub(crate) const MULTIPLE_EIGENVALUE: f64 = 1e-7;
 
 /// Distance of the shift of inverse iteration from the eigenvalue, in units of its rounding. It
@@ -33,28 +33,28 @@ pub(crate) const HARMONICS: usize = 9;
 /// them, does not alias.
 pub(crate) const INSTANTS: usize = 128;
 
-/// Maximum number of Newton steps to one amplitude.
+/// Maximum number of Newton steps for one amplitude.
 pub(crate) const BACKBONE_NEWTON_STEPS: usize = 30;
 
-/// Newton step, relative to amplitude and frequency, at which the iteration ends.
+/// Newton step, relative to amplitude and frequency, that ends the iteration.
 pub(crate) const BACKBONE_STEP: f64 = 1e-11;
 
 /// Maximum number of attempts from one amplitude to the next; each failure halves the step.
 pub(crate) const BACKBONE_ATTEMPTS: usize = 16;
 
-/// Change of a parameter for a derivative, in standard errors.
+/// Change of a parameter for a numerical derivative, in standard errors.
 pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
-/// Real part of an eigenvalue, over its modulus, below which it is undamped.
+/// Maximum real part of an eigenvalue, relative to its modulus, for which it counts as undamped.
 pub(crate) const UNDAMPED: f64 = 1e-6;
 
-/// Highest exponent of a power law; the backbone resolves its harmonics up to it.
+/// Maximum exponent of a power law; the backbone resolves its harmonics up to this exponent.
 pub(crate) const HIGHEST_EXPONENT: u32 = 9;
 
 // Machines of named elements
 
-/// Largest order of a matrix of an element: all entries are held, of this order 0.8 GB.
+/// Maximum order of a matrix of an element: all entries are stored, 0.8 GB for this order.
 pub(crate) const MAX_MATRIX_ORDER: usize = 10_000;
 
-/// Number of names that a message lists; more would hide the one that is wrong.
+/// Maximum number of names in a message; more would hide the wrong one.
 pub(crate) const LISTED_NAMES: usize = 12;

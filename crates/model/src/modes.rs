@@ -8,11 +8,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
 
-/// Largest modulus of an eigenvalue, relative to the largest, that may be the rounding of a double
-/// zero, such as that of a free structure: about √ε (pure number).
+/// Largest modulus of an eigenvalue, relative to the largest eigenvalue, that may be the rounding
+/// of a double zero (rigid-body modes): about √ε (pure number).
 pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
-/// A mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
+/// Mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
 ///
 /// # Source
 /// Meirovitch (1975); Dissertation, Appendix E.
@@ -23,8 +23,9 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// Makes a mode of λ, in rad/s, and any multiple of its shape, one entry per degree of freedom;
-    /// of a conjugate pair either. `None` unless all are finite and not all of the shape zero.
+    /// Creates a mode from λ, in rad/s, and any multiple of its shape, one entry per degree of
+    /// freedom; for a conjugate pair, either of the two. `None` unless all are finite and the shape
+    /// is not zero.
     pub fn new(eigenvalue: Complex<f64>, shape: &DVector<Complex<f64>>) -> Option<Self> {
         let largest = largest_entry(shape);
         let finite = |z: &Complex<f64>| z.re.is_finite() && z.im.is_finite();
@@ -83,7 +84,7 @@ fn largest_entry(shape: &DVector<Complex<f64>>) -> Complex<f64> {
     })
 }
 
-/// A growing free response exp(λt), Re λ > 0.
+/// Growing free response exp(λt), Re λ > 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instability {
     eigenvalue: Complex<f64>,
@@ -112,8 +113,8 @@ impl Instability {
 }
 
 impl std::fmt::Display for Instability {
-    /// `pole 0.1 ± 6.28i rad/s: the free response at 1 Hz grows at 0.1 1/s and doubles every 6.93
-    /// s`.
+    /// Writes `pole 0.1 ± 6.28i rad/s: the free response at 1 Hz grows at 0.1 1/s and doubles every
+    /// 6.93 s`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let number = |value: f64| format!("{}", message::number(rounded(value)));
         write!(f, "pole {}", number(self.eigenvalue.re))?;
@@ -133,13 +134,13 @@ impl std::fmt::Display for Instability {
     }
 }
 
-/// A positive number to four significant digits.
+/// Rounds a positive number to four significant digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 impl SecondOrderSystem {
-    /// A of the first-order form ż = A z + [0; M⁻¹] F with z = [x; ẋ], 2n×2n.
+    /// Returns A of the first-order form ż = A z + [0; M⁻¹] F with z = [x; ẋ], 2n×2n.
     ///
     /// ```text
     /// A = ┌    0        I   ┐
@@ -171,7 +172,7 @@ impl SecondOrderSystem {
 
     fn decomposition(&self) -> Result<Decomposition, ModelError> {
         let mut a = self.state_matrix();
-        // Balancing squares the entries, and does not end on infinite ones.
+        // Balancing squares the entries, and does not end for infinite ones.
         let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
         if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
             return Err(ModelError::StateMatrixOverflow { largest });
@@ -183,10 +184,10 @@ impl SecondOrderSystem {
         Ok(Decomposition { size: schur.t.norm(), balance, schur })
     }
 
-    /// The fastest growing free response; `None` of a system all of whose free responses decay or
-    /// persist.
+    /// Returns the fastest growing free response; `None` for a system whose free responses all
+    /// decay or persist.
     ///
-    /// Growth within [`EIGENVALUE_ROUNDING`] of zero is rounding.
+    /// Growth within [`EIGENVALUE_ROUNDING`] of zero counts as rounding.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
@@ -195,7 +196,7 @@ impl SecondOrderSystem {
         let largest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let fastest = eigenvalues.into_iter().max_by(|p, q| p.re.total_cmp(&q.re));
         let unstable = fastest.filter(|l| l.re > EIGENVALUE_ROUNDING * largest);
-        // Either eigenvalue of a conjugate pair may come last.
+        // The last eigenvalue may be either one of a conjugate pair.
         Ok(unstable.map(|l| Instability { eigenvalue: Complex::new(l.re, l.im.abs()) }))
     }
 
@@ -204,12 +205,12 @@ impl SecondOrderSystem {
     ///
     /// The n degrees of freedom have n modes if all of them oscillate, up to 2n otherwise. A
     /// repeated eigenvalue with enough independent shapes gives orthonormal directions of their
-    /// space (each then scaled). If it has fewer (it is defective, like critical damping), a shape
-    /// is repeated. Rounding splits a defective pair by about √ε: the free motion of an unsupported
-    /// body has |λ| of about 1e-7 rad/s instead of 0.
+    /// space (each then scaled). If it has fewer (it is defective, as in critical damping), a shape
+    /// is repeated. Rounding splits a defective pair by about √ε: a rigid-body mode has |λ| of
+    /// about 1e-7 rad/s instead of 0.
     ///
-    /// The shapes come from the Schur form that has the eigenvalues, O(n²) each; where only
-    /// frequencies and damping are wanted [`eigenvalues`](Self::eigenvalues) takes a little less.
+    /// The shapes come from the same Schur form as the eigenvalues, O(n²) each; if only frequencies
+    /// and damping are needed, [`eigenvalues`](Self::eigenvalues) is a little faster.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
@@ -242,7 +243,7 @@ impl SecondOrderSystem {
     }
 }
 
-/// B⁻¹A B = Q T Qᵀ of the state matrix A, B diagonal.
+/// Decomposition B⁻¹A B = Q T Qᵀ of the state matrix A, with diagonal B.
 struct Decomposition {
     /// Diagonal of B.
     balance: DVector<f64>,
@@ -252,7 +253,7 @@ struct Decomposition {
 }
 
 impl Decomposition {
-    /// Sorts by modulus; in a conjugate pair the eigenvalue with Im λ > 0 comes first.
+    /// Returns the eigenvalues by modulus; in a conjugate pair the one with Im λ > 0 comes first.
     fn eigenvalues(&self) -> Vec<Complex<f64>> {
         let mut eigenvalues = self.schur.eigenvalues();
         eigenvalues.sort_by(|p, q| {
@@ -261,7 +262,7 @@ impl Decomposition {
         eigenvalues
     }
 
-    /// Returns a shape φ to the eigenvalue λ, of any length, by inverse iteration; for a repeated
+    /// Returns a shape φ for the eigenvalue λ, of any length, by inverse iteration; for a repeated
     /// eigenvalue each `copy` gives another one.
     fn shape(&self, eigenvalue: Complex<f64>, copy: usize) -> DVector<Complex<f64>> {
         let len = self.balance.len();
@@ -283,7 +284,7 @@ impl Decomposition {
         &half / Complex::from(half.camax())
     }
 
-    /// y ← (T − σI)⁻¹ y.
+    /// Computes y ← (T − σI)⁻¹ y.
     fn solve(&self, shift: Complex<f64>, y: &mut DVector<Complex<f64>>) {
         let t = &self.schur.t;
         let smallest = f64::EPSILON * self.size.max(f64::MIN_POSITIVE);
@@ -298,7 +299,8 @@ impl Decomposition {
                     [shifted, t[(at, at + 1)].into(), y[at]],
                     [t[(at + 1, at)].into(), t[(at + 1, at + 1)] - shift, y[at + 1]],
                 ];
-                // Elimination; Cramer's rule would lose the direction of a nearly singular block.
+                // Cramer's rule would lose the direction of a nearly singular block, so this is
+                // elimination.
                 if rows[0][0].norm() < rows[1][0].norm() {
                     rows.swap(0, 1);
                 }
@@ -318,8 +320,8 @@ impl Decomposition {
     }
 }
 
-/// Pseudo-random entries between −1 and 1, the same on every run: the fractions of multiples of the
-/// square root of an integer.
+/// Returns pseudo-random entries between −1 and 1, the same in every run: the fractional parts of
+/// multiples of the square root of an integer.
 fn start_vector(len: usize, number: usize) -> DVector<Complex<f64>> {
     let step = ((number + 2) as f64 + 0.3).sqrt();
     let entry = |i: usize| 2.0 * (((i * i) as f64 + 1.0) * step).fract() - 1.0;

@@ -1,4 +1,4 @@
-//! Entries of M, C and K, by place and by name.
+//! Entries of M, C and K, by index and by name.
 
 use std::fmt;
 
@@ -24,10 +24,11 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Entry (`row`, `column`), counted from 0, of a matrix of order `dof`.
+    /// Creates the parameter of entry (`row`, `column`), counted from 0, of a matrix of order
+    /// `dof`.
     ///
     /// # Errors
-    /// [`ModelError::NoSuchEntry`] if it lies outside the matrix.
+    /// [`ModelError::NoSuchEntry`] if it is outside the matrix.
     pub fn new(matrix: Matrix, row: usize, column: usize, dof: usize) -> Result<Self, ModelError> {
         if row >= dof || column >= dof {
             let (row, column) = (row.saturating_add(1), column.saturating_add(1));
@@ -36,8 +37,8 @@ impl Parameter {
         Ok(Self { matrix, row, column, dof })
     }
 
-    /// Every entry for `dof` degrees of freedom, in the order of every covariance: M, C, K, each
-    /// row by row.
+    /// Returns every entry for `dof` degrees of freedom, in the order of every covariance: M, C, K,
+    /// each row by row.
     pub fn all(dof: usize) -> impl Iterator<Item = Self> {
         Matrix::ALL.into_iter().flat_map(move |matrix| {
             let entry = move |at| Self { matrix, row: at / dof, column: at % dof, dof };
@@ -55,7 +56,7 @@ impl Parameter {
             .ok_or_else(|| ModelError::NoSuchParameter { name: name.to_owned(), dof })
     }
 
-    /// Returns the entry of a name, for any way of writing its numbers.
+    /// Returns the entry with a name, for both forms of its numbers.
     fn read(name: &str, dof: usize) -> Option<Self> {
         let matrix = Matrix::ALL.into_iter().find(|matrix| name.starts_with(matrix.letter()))?;
         let numbers = &name[matrix.letter().len_utf8()..];
@@ -68,7 +69,7 @@ impl Parameter {
         Self::new(matrix, index(row)?, index(column)?, dof).ok()
     }
 
-    /// The matrix it is an entry of.
+    /// Returns the matrix of the entry.
     pub fn matrix(&self) -> Matrix {
         self.matrix
     }
@@ -90,7 +91,7 @@ impl Parameter {
 }
 
 impl fmt::Display for Parameter {
-    /// `k12`; with one degree of freedom `k`; with ten or more `k1,12`.
+    /// Writes `k12`; with one degree of freedom `k`; with ten or more `k1,12`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (letter, row, column) = (self.matrix.letter(), self.row + 1, self.column + 1);
         let name = match self.dof {

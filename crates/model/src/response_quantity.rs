@@ -30,15 +30,16 @@ pub enum ResponseQuantity {
 }
 
 impl ResponseQuantity {
-    /// All three, by rising order of the derivative.
+    /// All three, in rising order of the derivative.
     pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
 
-    /// Order d of the time derivative of the displacement: 0, 1 or 2.
+    /// Returns the order d of the time derivative of the displacement: 0, 1 or 2.
     pub fn derivative_order(self) -> usize {
         self as usize
     }
 
-    /// Amplitude per unit of displacement at `omega` (rad/s): (iω)^d, which is 1, iω or −ω².
+    /// Returns the amplitude per unit of displacement at `omega` (rad/s): (iω)^d, which is 1, iω or
+    /// −ω².
     pub fn per_displacement(self, omega: f64) -> Complex<f64> {
         match self {
             Self::Displacement => Complex::new(1.0, 0.0),
@@ -47,7 +48,7 @@ impl ResponseQuantity {
         }
     }
 
-    /// SI unit (translational degrees of freedom): m, m/s or m/s².
+    /// Returns the SI unit (translational degrees of freedom): m, m/s or m/s².
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",
@@ -66,7 +67,7 @@ impl ResponseQuantity {
 }
 
 impl fmt::Display for ResponseQuantity {
-    /// `displacement`, `velocity` or `acceleration`.
+    /// Writes `displacement`, `velocity` or `acceleration`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }

@@ -36,10 +36,11 @@ impl Step {
 }
 
 impl Sdof {
-    /// Response from `x0` (m), `v0` (m/s) to a force (N, one channel) held between samples.
+    /// Returns the response from `x0` (m), `v0` (m/s) to a force (N, one channel) that is constant
+    /// between samples.
     ///
-    /// The force jumps at the samples and the acceleration with it: ẍ is the limit from the
-    /// right, under the force that begins there.
+    /// The force jumps at the samples, and the acceleration with it: ẍ is the limit from the right,
+    /// under the force that begins there.
     ///
     /// ```
     /// use mechid_model::Sdof;
@@ -54,13 +55,13 @@ impl Sdof {
     /// ```
     ///
     /// # Errors
-    /// [`ModelError::ForceChannels`] if the force has not one channel,
-    /// [`ModelError::Parameter`] if `x0` or `v0` is not finite,
-    /// [`ModelError::Signal`] if an unstable response overflows.
+    /// [`ModelError::ForceChannels`] if the force does not have one channel,
+    /// [`ModelError::Parameter`] if `x0` or `v0` is not finite, [`ModelError::Signal`] if an
+    /// unstable response overflows.
     ///
     /// # Source
     /// Nigam & Jennings (1969), Bull. Seismological Society of America 59(2), 909–922, with the
-    /// force held instead of linear.
+    /// force constant instead of linear.
     pub fn held_force_response(
         &self,
         force: &Record,
@@ -70,7 +71,7 @@ impl Sdof {
         self.sampled(force, x0, v0, |left, _| left)
     }
 
-    /// Response from `x0` (m), `v0` (m/s) to a force (N, one channel) linear
+    /// Returns the response from `x0` (m), `v0` (m/s) to a force (N, one channel) that is linear
     /// between samples.
     ///
     /// # Errors
@@ -87,8 +88,8 @@ impl Sdof {
         self.sampled(force, x0, v0, |_, right| right)
     }
 
-    /// `end` gives the value of the force at the end of a step from its samples on the left and
-    /// right.
+    /// Computes the response; `end` returns the force at the end of a step from the samples on its
+    /// left and right.
     fn sampled(
         &self,
         force: &Record,

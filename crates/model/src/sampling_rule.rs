@@ -1,4 +1,4 @@
-//! Time step and length of a record, chosen from the system's natural frequency.
+//! Time step and length of a record, chosen from the natural frequency of the system.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,8 @@ use mechid_signal::Sampling;
 use crate::ModelError;
 use crate::error::require;
 
-/// One period of `len` samples that holds `npi` cycles of the natural frequency `omega_n` (rad/s).
+/// Returns the time axis of one period of `len` samples that has `npi` cycles of the natural
+/// frequency `omega_n` (rad/s).
 ///
 /// NPI = ωn/ω0 is the line of the spectrum at the natural frequency, so
 ///
@@ -15,8 +16,8 @@ use crate::error::require;
 /// Δt = 2π NPI / (Nt ωn),      ω0 = 2π / (Nt Δt) = ωn / NPI
 /// ```
 ///
-/// A large NPI resolves the resonance in frequency, a small one in time:
-/// a natural period has Nt/NPI samples.
+/// A large NPI resolves the resonance in frequency, a small one in time: a natural period has
+/// Nt/NPI samples.
 ///
 /// ```
 /// use mechid_model::npi_sampling;
@@ -27,15 +28,15 @@ use crate::error::require;
 /// ```
 ///
 /// # Errors
-/// [`ModelError::Parameter`] if NPI or ωn is not positive and finite,
-/// [`ModelError::Signal`] if the resulting time axis is impossible.
+/// [`ModelError::Parameter`] if NPI or ωn is not positive and finite, [`ModelError::Signal`] if the
+/// resulting time axis is impossible.
 ///
 /// # Source
 /// Dissertation eqs. (5.2.2)–(5.2.4).
 pub fn npi_sampling(npi: f64, len: usize, omega_n: f64) -> Result<Sampling, ModelError> {
     require("NPI", npi, "positive and finite", npi > 0.0)?;
     require("natural frequency", omega_n, "positive and finite", omega_n > 0.0)?;
-    // `len` = 0 is refused by `Sampling`; the step must not be infinite before that.
+    // `Sampling` refuses `len` = 0, but the step must not be infinite before that.
     Ok(Sampling::new(TAU * npi / (len.max(1) as f64 * omega_n), len)?)
 }
 

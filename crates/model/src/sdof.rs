@@ -5,10 +5,10 @@ use nalgebra::{Complex, dmatrix};
 use crate::error::require;
 use crate::{ModelError, SecondOrderSystem};
 
-/// A mass on a spring and a viscous damper: m ẍ + c ẋ + k x = F.
+/// Mass on a spring and a viscous damper: m ẍ + c ẋ + k x = F.
 ///
-/// Mass and stiffness are positive. The damping may have any sign: a negative one
-/// is an unstable machine or a bad estimate, and both have to be computed with.
+/// Mass and stiffness are positive. The damping may have any sign: a negative one belongs to an
+/// unstable system or an inaccurate estimate, for which responses are needed, too.
 ///
 /// ```
 /// use mechid_model::Sdof;
@@ -29,10 +29,10 @@ pub struct Sdof {
 }
 
 impl Sdof {
-    /// An oscillator from m (kg, positive), c (N·s/m) and k (N/m, positive).
+    /// Creates an oscillator from m (kg, positive), c (N·s/m) and k (N/m, positive).
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] naming the one that is out of range.
+    /// [`ModelError::Parameter`] with the name of the one that is out of range.
     pub fn new(mass: f64, damping: f64, stiffness: f64) -> Result<Self, ModelError> {
         require("mass", mass, "positive and finite", mass > 0.0)?;
         require("damping", damping, "finite", true)?;
@@ -40,11 +40,11 @@ impl Sdof {
         Ok(Self { mass, damping, stiffness })
     }
 
-    /// An oscillator from m (kg), the damping ratio ζ and the natural frequency ωn (rad/s):
+    /// Creates an oscillator from m (kg), the damping ratio ζ and the natural frequency ωn (rad/s):
     /// c = 2 ζ m ωn, k = m ωn².
     ///
     /// # Errors
-    /// [`ModelError::Parameter`] naming the one that is out of range.
+    /// [`ModelError::Parameter`] with the name of the one that is out of range.
     ///
     /// # Source
     /// Meirovitch (1975), viscous damping factor and undamped natural frequency.
@@ -95,14 +95,14 @@ impl Sdof {
         self.poles()[0].im
     }
 
-    /// The two roots of m s² + c s + k = 0, in rad/s.
+    /// Returns the two roots of m s² + c s + k = 0, in rad/s.
     ///
-    /// Oscillating: the one with positive imaginary part first. Otherwise both are
-    /// real, the one farther from zero first.
+    /// For an underdamped system, the one with positive imaginary part comes first. Otherwise both
+    /// are real, and the one farther from zero comes first.
     pub fn poles(&self) -> [Complex<f64>; 2] {
         let sigma = 0.5 * self.damping / self.mass;
         let omega_n = self.natural_frequency();
-        // ζ² − 1 as a product: no cancellation near critical damping.
+        // The product for ζ² − 1 avoids cancellation near critical damping.
         let excess = (sigma.abs() - omega_n) * (sigma.abs() + omega_n);
         if excess < 0.0 {
             let omega_d = (-excess).sqrt();
@@ -112,7 +112,7 @@ impl Sdof {
         [Complex::from(fast), Complex::from(omega_n * (omega_n / fast))]
     }
 
-    /// Dynamic stiffness k − ω²m + iωc at ω (rad/s), in N/m.
+    /// Returns the dynamic stiffness k − ω²m + iωc at ω (rad/s), in N/m.
     pub fn dynamic_stiffness(&self, omega: f64) -> Complex<f64> {
         Complex::new(self.stiffness - omega * omega * self.mass, omega * self.damping)
     }

@@ -25,7 +25,7 @@ impl Matrix {
     /// M, C, K, in the order of every covariance.
     pub const ALL: [Self; 3] = [Self::Mass, Self::Damping, Self::Stiffness];
 
-    /// The letter of its entries: `m`, `c` or `k`.
+    /// Returns the letter of its entries: `m`, `c` or `k`.
     pub fn letter(self) -> char {
         match self {
             Matrix::Mass => 'm',
@@ -34,7 +34,7 @@ impl Matrix {
         }
     }
 
-    /// SI unit of its entries (translational degrees of freedom).
+    /// Returns the SI unit of its entries (translational degrees of freedom).
     pub fn unit(self) -> &'static str {
         match self {
             Matrix::Mass => "kg",
@@ -54,7 +54,8 @@ impl fmt::Display for Matrix {
     }
 }
 
-/// M ẍ + C ẋ + K x = F with n degrees of freedom; M invertible, C and K of any symmetry.
+/// Linear system M ẍ + C ẋ + K x = F with n degrees of freedom; M invertible, C and K of any
+/// symmetry.
 ///
 /// ```text
 /// ┌ m11 … m1n ┐ ┌ ẍ1 ┐   ┌ c11 … c1n ┐ ┌ ẋ1 ┐   ┌ k11 … k1n ┐ ┌ x1 ┐   ┌ F1 ┐
@@ -77,12 +78,12 @@ pub struct SecondOrderSystem {
 }
 
 impl SecondOrderSystem {
-    /// A system from its n×n matrices M (kg), C (N·s/m) and K (N/m).
+    /// Creates a system from its n×n matrices M (kg), C (N·s/m) and K (N/m).
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
     /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades (beyond
-    /// 64 degrees of freedom their largest and smallest are estimated by iteration).
+    /// 64 degrees of freedom, their largest and smallest are estimated by iteration).
     pub fn new(
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
@@ -97,7 +98,8 @@ impl SecondOrderSystem {
         {
             check(matrix, entries, dof)?;
         }
-        // Solvers factor M by LU: a matrix that passes here must not have a vanishing pivot there.
+        // Solvers factor M by LU, so a matrix that is accepted here must not have a vanishing pivot
+        // there.
         let factored = mass.clone().lu();
         let reciprocal_condition = reciprocal_condition(&mass, &factored);
         let invertible = factored.is_invertible();
@@ -127,7 +129,7 @@ impl SecondOrderSystem {
         &self.stiffness
     }
 
-    /// Returns the same system with one entry larger by `by` (kg, N·s/m or N/m).
+    /// Returns the same system with one entry increased by `by` (kg, N·s/m or N/m).
     ///
     /// # Errors
     /// [`ModelError::NoSuchParameter`] if the entry belongs to a system of another size; otherwise
@@ -147,7 +149,7 @@ impl SecondOrderSystem {
         Self::new(m, c, k)
     }
 
-    /// One of the three matrices, n×n, in kg, N·s/m or N/m.
+    /// Returns one of the three matrices, n×n, in kg, N·s/m or N/m.
     pub fn matrix(&self, which: Matrix) -> &DMatrix<f64> {
         match which {
             Matrix::Mass => &self.mass,
@@ -157,7 +159,7 @@ impl SecondOrderSystem {
     }
 }
 
-/// Ratio of the smallest to the largest singular value of M.
+/// Returns the ratio of the smallest to the largest singular value of M.
 fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f64 {
     let n = mass.nrows();
     if n <= limits::SINGULAR_VALUES_DOF {
@@ -170,7 +172,7 @@ fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f6
     let (lower, upper) = (factored.l(), factored.u());
     let mut large = DVector::from_fn(n, |i, _| 1.0 + 0.37 * (i % 5) as f64);
     let mut small = large.clone();
-    // A handful settles the order of magnitude.
+    // A few iterations are enough for the order of magnitude.
     for _ in 0..6 {
         large = mass.tr_mul(&(mass * large.normalize()));
         small.normalize_mut();

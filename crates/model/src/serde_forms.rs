@@ -77,7 +77,7 @@ impl TryFrom<UncertainForm> for UncertainSystem {
     }
 }
 
-/// A linear system, its nonlinear terms as they are written, and their coefficients.
+/// Linear system, its nonlinear terms as text, and their coefficients.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NonlinearForm {
@@ -108,8 +108,8 @@ fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// Creates a square matrix of this order from its rows; returns the length of a row that does not
-/// fit.
+/// Creates a square matrix of this order from its rows; the error is the length of the first row
+/// that does not fit.
 fn matrix(rows: &[Vec<f64>], order: usize) -> Result<DMatrix<f64>, usize> {
     match rows.iter().find(|row| row.len() != order) {
         Some(row) => Err(row.len()),

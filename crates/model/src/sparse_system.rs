@@ -5,7 +5,7 @@ use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::{Matrix, ModelError, SecondOrderSystem};
 
-/// M ẍ + C ẋ + K x = F with n degrees of freedom and sparse matrices of any symmetry.
+/// Linear system M ẍ + C ẋ + K x = F with n degrees of freedom and sparse matrices of any symmetry.
 ///
 /// ```
 /// use mechid_model::{SparseSystem, band, triplets};
@@ -19,7 +19,7 @@ use crate::{Matrix, ModelError, SecondOrderSystem};
 /// # Ok::<(), mechid_model::ModelError>(())
 /// ```
 ///
-/// A [`CsrMatrix`] also comes from a dense matrix: `CsrMatrix::from(&dense)`.
+/// A [`CsrMatrix`] can also be created from a dense matrix: `CsrMatrix::from(&dense)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseSystem {
     mass: CsrMatrix<f64>,
@@ -32,12 +32,12 @@ impl SparseSystem {
     /// Default limit of the memory of the factors of its matrices, in bytes.
     pub const FACTOR_LIMIT: u64 = 4_000_000_000;
 
-    /// Checks and takes the n×n matrices M (kg), C (N·s/m) and K (N/m).
+    /// Creates a system from the n×n matrices M (kg), C (N·s/m) and K (N/m).
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
     /// [`ModelError::SingularMass`] if M has a row or a column of zeros, or is diagonal with
-    /// entries that span more than 15 decades. Whether any other M is singular shows when it is
+    /// entries that span more than 15 decades. Any other singular M is detected when it is
     /// factored.
     pub fn new(
         mass: CsrMatrix<f64>,
@@ -64,13 +64,13 @@ impl SparseSystem {
         Ok(Self { mass, damping, stiffness, factor_limit: Self::FACTOR_LIMIT })
     }
 
-    /// Returns the system with another limit, in bytes, of the memory of the factors of its
-    /// matrices: the factors of three-dimensional bodies fill in, which also takes time.
+    /// Returns the system with another memory limit, in bytes, for the factors of its matrices:
+    /// fill-in makes the factors of three-dimensional bodies large and slow.
     pub fn with_factor_limit(self, bytes: u64) -> Self {
         Self { factor_limit: bytes, ..self }
     }
 
-    /// Memory that factors of its matrices may take, in bytes.
+    /// Returns the memory that factors of its matrices may use, in bytes.
     pub fn factor_limit(&self) -> u64 {
         self.factor_limit
     }
@@ -80,7 +80,7 @@ impl SparseSystem {
         self.mass.nrows()
     }
 
-    /// One of the three matrices by name, n×n, in kg, N·s/m or N/m.
+    /// Returns one of the three matrices by name, n×n, in kg, N·s/m or N/m.
     pub fn matrix(&self, which: Matrix) -> &CsrMatrix<f64> {
         match which {
             Matrix::Mass => &self.mass,
@@ -91,7 +91,7 @@ impl SparseSystem {
 }
 
 impl From<&SecondOrderSystem> for SparseSystem {
-    /// Drops the zeros of the dense matrices.
+    /// Converts a dense system; zeros are not stored.
     fn from(dense: &SecondOrderSystem) -> Self {
         Self {
             mass: CsrMatrix::from(dense.mass()),
@@ -145,7 +145,7 @@ pub fn band(dof: usize, diagonals: &[(isize, f64)]) -> CsrMatrix<f64> {
     CsrMatrix::from(&coo)
 }
 
-/// The first entry that is not finite as an error; rows and columns count from 0.
+/// Returns an error for the first entry that is not finite; rows and columns count from 0.
 fn check_finite(
     matrix: Matrix,
     entries: impl IntoIterator<Item = (usize, usize, f64)>,

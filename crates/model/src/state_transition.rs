@@ -1,12 +1,12 @@
-//! The state from one sample to the next.
+//! Transition of the state from one sample to the next.
 
 use nalgebra::DMatrix;
 
 use crate::{ModelError, SecondOrderSystem};
 use mechid_numerics::linear_algebra::exponential;
 
-/// Transition of the state over one step Δt:
-/// z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with Γ₁ only for a linear input.
+/// Transition of the state over one step Δt: z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with
+/// Γ₁ only for a linear input.
 ///
 /// Step units: the state is z = \[x; Δt ẋ\] and time is τ = t/Δt, so that no entry is large unless
 /// the step is long for the system:
@@ -17,7 +17,7 @@ use mechid_numerics::linear_algebra::exponential;
 /// dτ└ Δt ẋ ┘   └ −Δt² M⁻¹K   −Δt M⁻¹C   ┘ └ Δt ẋ ┘   └ B ┘
 /// ```
 ///
-/// B = Δt² M⁻¹ makes the input u the force F, B = I makes it Δt² M⁻¹ F.
+/// With B = Δt² M⁻¹ the input u is the force F, with B = I it is Δt² M⁻¹ F.
 ///
 /// ```
 /// use mechid_model::{SecondOrderSystem, StateTransition};
@@ -36,8 +36,8 @@ use mechid_numerics::linear_algebra::exponential;
 pub struct StateTransition {
     /// Φ, 2n × 2n, a pure number.
     pub state: DMatrix<f64>,
-    /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input held over the step at its
-    /// value at the start.
+    /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input that keeps its initial value
+    /// over the step.
     pub held: DMatrix<f64>,
     /// Γ₁, 2n × inputs, in the same unit: effect of the rise of the input over the step, from 0
     /// to 1.
@@ -45,11 +45,11 @@ pub struct StateTransition {
 }
 
 impl StateTransition {
-    /// Exact transition at any step, for the input matrix B (n × inputs, in m per unit of the
-    /// input): one matrix exponential of order 2(n + inputs).
+    /// Computes the exact transition for any step, for the input matrix B (n × inputs, in m per
+    /// unit of the input): one matrix exponential of order 2(n + inputs).
     ///
     /// # Errors
-    /// [`ModelError::ForceChannels`] if B has not one row per degree of freedom;
+    /// [`ModelError::ForceChannels`] if B does not have one row per degree of freedom;
     /// [`ModelError::Numerics`] if the step is so long that Φ overflows.
     ///
     /// # Source
@@ -77,8 +77,8 @@ impl StateTransition {
         })
     }
 
-    /// Transition under a held input with the exponential series cut after `order` terms, for B = I
-    /// (n inputs, in m); order 1 is Euler's rule.
+    /// Computes the transition for a constant input with the exponential series truncated after
+    /// `order` terms, for B = I (n inputs, in m); order 1 is Euler's rule.
     ///
     /// ```text
     /// Φ = Σ_{j=0}^{p} Aʲ/j!      Γ₀ = Σ_{j=0}^{p−1} Aʲ B/(j+1)!
@@ -100,7 +100,7 @@ impl StateTransition {
         Self { state, held, ramp: DMatrix::zeros(2 * n, n) }
     }
 
-    /// The rate matrix A in step units, 2n×2n, a pure number.
+    /// Returns the rate matrix A in step units, 2n×2n, a pure number.
     ///
     /// # Source
     /// Dissertation eqs. (4.5.8) and (4.5.26), there in s⁻¹ and s⁻².

@@ -1,17 +1,18 @@
-//! The steady state of a linear system, line by line.
+//! Steady state of a linear system, line by line.
 
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::{ModelError, Response, SecondOrderSystem};
 
-/// Computes the response that repeats with a `force` of samples × n (N), which is band-limited
-/// between its samples, line by line: X_n = (K − ω²M + iωC)⁻¹ F_n. It is exact to rounding, without
-/// a time step.
+/// Computes the periodic response to a `force` of samples × n (N), which is band-limited between
+/// its samples, line by line: X_n = (K − ω²M + iωC)⁻¹ F_n. It is exact up to rounding, without a
+/// time step.
 ///
-/// For an unstable system the equations have a solution, too, but no motion reaches it.
+/// For an unstable system the equations have a solution, too, but no real response converges to it.
 ///
-/// Lines without force have no response; that spares DC for a system free to drift.
+/// Lines without force have no response, so that a system with rigid-body modes is allowed if the
+/// force has no mean.
 ///
 /// ```
 /// use mechid_model::{Sdof, exact_periodic};
@@ -28,8 +29,8 @@ use crate::{ModelError, Response, SecondOrderSystem};
 /// ```
 ///
 /// # Errors
-/// [`ModelError::ForceChannels`] if the force has not one channel per degree of freedom;
-/// [`ModelError::SingularDynamicStiffness`] if a line drives an undamped system at its natural
+/// [`ModelError::ForceChannels`] if the force does not have one channel per degree of freedom;
+/// [`ModelError::SingularDynamicStiffness`] if a line excites an undamped system at its natural
 /// frequency; [`ModelError::Signal`] if the response overflows.
 ///
 /// # Source

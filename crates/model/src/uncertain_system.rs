@@ -1,10 +1,10 @@
-//! Systems whose entries are uncertain.
+//! Systems with uncertain entries.
 
 use nalgebra::DMatrix;
 
 use crate::{ModelError, Parameter, SecondOrderSystem};
 
-/// A system with some uncertain entries, and their covariance; all other entries are known.
+/// System with some uncertain entries, and their covariance; all other entries are known.
 ///
 /// ```
 /// use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
@@ -33,8 +33,8 @@ pub struct UncertainSystem {
 }
 
 impl UncertainSystem {
-    /// A system and the covariance of these entries, one row and column each, in the products of
-    /// their units (kg, N·s/m, N/m).
+    /// Creates a system with the covariance of these entries, one row and column each, in the
+    /// products of their units (kg, N·s/m, N/m).
     ///
     /// # Errors
     /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,

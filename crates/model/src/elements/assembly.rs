@@ -1,4 +1,4 @@
-//! Terms, sensors, inputs and unknowns of a machine by index.
+//! Terms, sensors, inputs and unknowns of a machine, by index.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -6,20 +6,20 @@ use super::channels::{InputColumn, SensorRow, unbalance};
 use super::{MachineError, Pattern, Power, Prior, Speed, Term};
 use crate::{Matrix, ModelError, SecondOrderSystem};
 
-/// An unknown of a machine.
+/// Unknown of a machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineParameter {
-    /// Name: that of the shared parameter, or of the element and the coefficient.
+    /// Name of the shared parameter, or of the element and its coefficient.
     pub name: String,
-    /// SI unit at translations; a rotation has N·m/rad in place of N/m, and so on.
+    /// SI unit for translations; for rotations it is N·m/rad instead of N/m, and so on.
     pub unit: &'static str,
-    /// First value of the search, in the unit of the parameter.
+    /// Initial value of the search, in the unit of the parameter.
     pub start: f64,
     /// Lower bound, in the unit of the parameter; −∞ without one.
     pub min: f64,
     /// Upper bound, in the unit of the parameter; ∞ without one.
     pub max: f64,
-    /// Knowledge from elsewhere.
+    /// Prior knowledge.
     pub prior: Option<Prior>,
 }
 
@@ -28,15 +28,15 @@ pub struct MachineParameter {
 pub(super) struct OwnLoad {
     pub(super) at: [usize; 2],
     pub(super) scale: Complex<f64>,
-    /// `None` for a known unbalance.
+    /// Index of the parameter; `None` for a known unbalance.
     pub(super) parameter: Option<usize>,
 }
 
-/// Load (N) of an unknown unbalance per unit of its parameter, by degree of freedom; known loads have no
-/// parameter.
+/// Load (N) of an unknown unbalance per unit of its parameter, by degree of freedom; for a known
+/// load the parameter is `None`.
 pub type ParameterLoad = (Option<usize>, Vec<(usize, Complex<f64>)>);
 
-/// A machine that was checked: its dynamic stiffness is Σ of [`Term`]s.
+/// Machine whose description was checked: its dynamic stiffness is the sum of its [`Term`]s.
 ///
 /// ```text
 /// D(ω) x = F − D_g(ω) x_g
@@ -56,12 +56,12 @@ pub struct Assembly {
 }
 
 impl Assembly {
-    /// Takes terms, sensors and inputs by index, for models that are not drawn element by element: entries
-    /// of M, C and K.
+    /// Creates an assembly from terms, sensors and inputs by index, for models without named
+    /// elements: entries of M, C and K.
     ///
     /// # Errors
-    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist, counted from
-    /// 1.
+    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist,
+    /// counted from 1.
     pub fn from_terms(
         dofs: Vec<String>,
         terms: Vec<Term>,
@@ -77,7 +77,7 @@ impl Assembly {
                 Pattern::Dyad { left, right } => left.iter().chain(right).map(|e| e.0).collect(),
                 Pattern::Block { dofs, .. } => dofs.clone(),
             };
-            // The support is one beyond the degrees of freedom.
+            // The index of the support is the number of degrees of freedom.
             if let Some(at) = entries.into_iter().find(|at| *at > n) {
                 return Err(outside(at).into());
             }
@@ -142,17 +142,17 @@ impl Assembly {
         &self.measured
     }
 
-    /// Returns the first values of the search, one for each parameter, in its unit.
+    /// Returns the initial values of the search, one for each parameter, in its unit.
     pub fn start(&self) -> Vec<f64> {
         self.parameters.iter().map(|parameter| parameter.start).collect()
     }
 
-    /// Returns whether any element has unbalance of its own.
+    /// Returns whether any element is an unbalance.
     pub fn has_own_loads(&self) -> bool {
         !self.loads.is_empty()
     }
 
-    /// Returns the loads of unbalance that no input measures, at `omega` (rad/s).
+    /// Returns the loads of the unbalance of elements, at `omega` (rad/s).
     pub fn own_loads(&self, omega: f64) -> Vec<ParameterLoad> {
         let load = |own: &OwnLoad| {
             let forces = unbalance(own.at, omega, self.speed);
@@ -161,7 +161,7 @@ impl Assembly {
         self.loads.iter().map(load).collect()
     }
 
-    /// Returns D(ω) (n × n, N/m) and the column D_g of the support as the last one, n × (n + 1),
+    /// Returns D(ω) (n × n, N/m) with the column D_g of the support as the last one, n × (n + 1),
     /// summed over the terms that `included` accepts.
     ///
     /// # Source
@@ -181,11 +181,11 @@ impl Assembly {
         sum
     }
 
-    /// Returns M, C + Ω G and K, n × n each, at a speed (rad/s) of the rotor; hysteresis has no
-    /// place in them.
+    /// Returns M, C + Ω G and K, n × n each, at a speed (rad/s) of the rotor; they do not contain
+    /// hysteretic damping.
     ///
     /// # Errors
-    /// [`ModelError::SingularMass`] and whatever else [`SecondOrderSystem::new`] refuses.
+    /// [`ModelError::SingularMass`] and other errors of [`SecondOrderSystem::new`].
     ///
     /// # Source
     /// Bathe (1982), the direct stiffness method.

@@ -1,4 +1,4 @@
-//! Steps from the description of a machine to its terms.
+//! Conversion of the description of a machine to its terms.
 
 use std::collections::HashMap;
 
@@ -70,7 +70,7 @@ fn check_names(machine: &Machine, instruments: &Instruments) -> Result<(), Machi
     Ok(())
 }
 
-/// Names with commas between; of many the first ones.
+/// Returns the names separated by commas; if there are many, the first ones.
 fn listed(names: &[String]) -> String {
     match names.get(..LISTED_NAMES) {
         Some(first) if names.len() > LISTED_NAMES => format!("{} …", first.join(", ")),
@@ -78,14 +78,14 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// A coefficient, or the index of the unknown that it is.
+/// Known coefficient, or index of an unknown.
 #[derive(Clone, Copy)]
 pub(super) enum Factor {
     Known(f64),
     Unknown(usize),
 }
 
-/// What the elements seen so far make of the machine.
+/// Terms of the elements so far.
 pub(super) struct Builder<'a> {
     pub(super) machine: &'a Machine,
     index: HashMap<&'a str, usize>,
@@ -96,7 +96,7 @@ pub(super) struct Builder<'a> {
     pub(super) loads: Vec<OwnLoad>,
     parameters: Vec<MachineParameter>,
     shared: HashMap<String, usize>,
-    /// Elements at each degree of freedom, and whether one of them is a mass.
+    /// Elements at each degree of freedom, and `true` if one of them is a mass.
     touched: Vec<(Vec<String>, bool)>,
     pub(super) alpha: Factor,
     pub(super) beta: Factor,
@@ -136,7 +136,7 @@ impl<'a> Builder<'a> {
         Ok(builder)
     }
 
-    /// Index of a degree of freedom that something names.
+    /// Returns the index of a degree of freedom that an element, sensor or input names.
     pub(super) fn dof(
         &self,
         what: &'static str,
@@ -151,7 +151,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// e_i − e_j of two ends, one of which may be the support, which moves in its direction only.
+    /// Returns e_i − e_j for two ends. One may be the support, which moves only in its direction.
     pub(super) fn difference(
         &self,
         what: &'static str,
@@ -218,7 +218,7 @@ impl<'a> Builder<'a> {
         Ok(self.parameters.len() - 1)
     }
 
-    /// Adds pattern × power × factors unless that is zero.
+    /// Adds the term pattern × power × factors unless it is zero.
     pub(super) fn push(&mut self, pattern: &Pattern, power: Power, factors: &[Factor]) {
         let (mut scale, mut parameters) = (1.0, Vec::new());
         for factor in factors {
@@ -260,7 +260,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Every degree of freedom needs an element and a mass, even one of 0.
+    /// Checks that every degree of freedom has an element and a mass, which may be 0.
     fn check_masses(&self, machine: &Machine) -> Result<(), MachineError> {
         for (dof, (elements, has_mass)) in machine.dofs.iter().zip(&self.touched) {
             if machine.measured.contains(dof) {

@@ -16,7 +16,7 @@ impl Builder<'_> {
         let at = self.dof("element", name, at)?;
         let factor = self.factor(name, "kg", mass)?;
         let entries = vec![(at, 1.0)];
-        // A mass of 0 says that there is none; it does not hold a degree of freedom.
+        // A mass of 0 declares a degree of freedom without mass.
         if mass.is_zero() {
             self.allow_no_mass(at);
         } else {
@@ -49,9 +49,10 @@ impl Builder<'_> {
         };
         let k = self.factor(&named("k"), "N/m", stiffness)?;
         let c = self.factor(&named("c"), "N·s/m", damping)?;
-        let eta = match loss_factor.is_zero() {
-            true => self.loss_factor,
-            false => self.factor(&named("eta"), "", loss_factor)?,
+        let eta = if loss_factor.is_zero() {
+            self.loss_factor
+        } else {
+            self.factor(&named("eta"), "", loss_factor)?
         };
         let pattern = Pattern::Dyad { left: entries.clone(), right: entries };
         self.push(&pattern, Power::Stiffness, &[k]);
@@ -64,8 +65,12 @@ impl Builder<'_> {
     pub(super) fn bearing(&mut self, name: &str, bearing: &Bearing) -> Result<(), MachineError> {
         let mut ends = Vec::new();
         for direction in 0..2 {
-            let other = bearing.to.as_ref().map_or(SUPPORT, |to| to[direction].as_str());
-            ends.push(self.difference("element", name, [bearing.at[direction].as_str(), other])?);
+            let opposite = bearing.to.as_ref().map_or(SUPPORT, |to| to[direction].as_str());
+            ends.push(self.difference(
+                "element",
+                name,
+                [bearing.at[direction].as_str(), opposite],
+            )?);
             self.touch(name, &ends[direction], false);
         }
         let matrices = [
@@ -149,7 +154,8 @@ impl Builder<'_> {
         }
     }
 
-    /// A matrix that acts on the motion, or on that relative to the support.
+    /// Returns the pattern of a matrix that acts on the absolute motion, or on the motion relative
+    /// to the support.
     fn block(&self, dofs: &[usize], matrix: &DMatrix<f64>, relative: bool) -> Pattern {
         let support = matrix.row_iter().map(|row| {
             let moved = row.iter().zip(dofs).map(|(value, at)| value * self.direction[*at]);

@@ -1,4 +1,4 @@
-//! Sensors and inputs by the index of their degrees of freedom.
+//! Sensors and inputs, by the index of their degrees of freedom.
 
 use nalgebra::Complex;
 
@@ -6,27 +6,29 @@ use super::build::{Builder, Factor};
 use super::{Input, MachineError, Sensor, Speed};
 use crate::ResponseQuantity;
 
-/// Reading of a sensor: a sum of motions; index n is the support.
+/// Reading of a sensor: a weighted sum of the motions of degrees of freedom; index n is the
+/// support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorRow {
     /// Name of the channel.
     pub name: String,
-    /// Degrees of freedom with their weights, the gain included.
+    /// Degrees of freedom with their weights, which include the gain.
     pub entries: Vec<(usize, f64)>,
-    /// Quantity measured.
+    /// Measured quantity.
     pub quantity: ResponseQuantity,
     /// Known delay, in s.
     pub delay: f64,
-    /// Parameter that is a delay (s), if it is unknown.
+    /// Index of the parameter for the delay (s), if it is unknown.
     pub delay_parameter: Option<usize>,
 }
 
 impl SensorRow {
-    /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m, with the
-    /// delay by `parameters` in their units.
+    /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m,
+    /// with the delay from `parameters` in their units.
     ///
     /// # Source
-    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 2.2 (a delay τ turns the phase by −ωτ).
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 2.2 (a delay τ changes the phase by
+    /// −ωτ).
     pub fn factor(&self, parameters: &[f64], omega: f64) -> Complex<f64> {
         let unknown = self.delay_parameter.map_or(0.0, |at| parameters[at]);
         let phase = omega * (self.delay + unknown);
@@ -35,7 +37,7 @@ impl SensorRow {
     }
 }
 
-/// Action of an input.
+/// Effect of an input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InputColumn {
     /// Forces on degrees of freedom, per unit of the input.
@@ -47,8 +49,8 @@ pub enum InputColumn {
 }
 
 impl InputColumn {
-    /// Returns the load per unit of the input at `omega` (rad/s): forces (N) by degree of freedom, and the
-    /// displacement (m) of the support at index `dof`.
+    /// Returns the load per unit of the input at `omega` (rad/s): forces (N) by degree of freedom,
+    /// and the displacement (m) of the support at index `dof`.
     pub fn load(&self, dof: usize, omega: f64, speed: Speed) -> Vec<(usize, Complex<f64>)> {
         match self {
             Self::Force(entries) => {
@@ -60,7 +62,8 @@ impl InputColumn {
     }
 }
 
-/// Forces in x and y per kg·m of unbalance on a rotor that turns from x to y; backwards at a negative speed.
+/// Returns the forces in x and y per kg·m of unbalance on a rotor that turns from x to y; backwards
+/// at a negative speed.
 pub(super) fn unbalance(
     [x, y]: [usize; 2],
     omega: f64,

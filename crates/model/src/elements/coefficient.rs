@@ -1,8 +1,8 @@
-//! Knowledge of a coefficient of an element beforehand.
+//! Known and unknown coefficients of elements, with bounds and prior knowledge.
 
 use super::MachineError;
 
-/// Knowledge of an unknown coefficient from elsewhere: a normal distribution.
+/// Prior knowledge of an unknown coefficient: a normal distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -13,12 +13,13 @@ pub struct Prior {
     pub standard_deviation: f64,
 }
 
-/// An unknown coefficient: where its search starts, its bounds and its prior, all in its own unit.
+/// Unknown coefficient: initial value of the search, bounds and prior, all in the unit of the
+/// coefficient.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct FreeCoefficient {
-    /// First value of the search, in the unit of the coefficient; without one the mean of the
+    /// Initial value of the search, in the unit of the coefficient; by default the mean of the
     /// prior, or a value between the bounds.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub start: Option<f64>,
@@ -28,36 +29,36 @@ pub struct FreeCoefficient {
     /// Upper bound, in the unit of the coefficient.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub max: Option<f64>,
-    /// Mean and standard deviation known from elsewhere.
+    /// Mean and standard deviation of prior knowledge.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub prior: Option<Prior>,
 }
 
 impl FreeCoefficient {
-    /// Takes an unknown coefficient without bounds, with the first value of its search.
+    /// Creates an unknown coefficient without bounds, with the initial value of its search.
     pub fn from_start(start: f64) -> Self {
         Self { start: Some(start), ..Self::default() }
     }
 
-    /// Returns the same with a lower bound.
+    /// Returns the coefficient with a lower bound.
     #[must_use]
     pub fn at_least(self, min: f64) -> Self {
         Self { min: Some(min), ..self }
     }
 
-    /// Returns the same with an upper bound.
+    /// Returns the coefficient with an upper bound.
     #[must_use]
     pub fn at_most(self, max: f64) -> Self {
         Self { max: Some(max), ..self }
     }
 
-    /// Returns the same with a mean and a standard deviation known from elsewhere.
+    /// Returns the coefficient with prior knowledge: a mean and a standard deviation.
     #[must_use]
     pub fn with_prior(self, mean: f64, standard_deviation: f64) -> Self {
         Self { prior: Some(Prior { mean, standard_deviation }), ..self }
     }
 
-    /// Checks the numbers against one another and returns where the search starts.
+    /// Checks that the numbers are consistent and returns the initial value of the search.
     pub(super) fn checked_start(&self, name: &str) -> Result<f64, MachineError> {
         let name = || name.to_owned();
         let prior = self.prior.map(|prior| [prior.mean, prior.standard_deviation]);
@@ -88,15 +89,15 @@ impl FreeCoefficient {
     }
 }
 
-/// A coefficient of an element.
+/// Coefficient of an element.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Coefficient {
     /// A known value, in the unit of the coefficient.
     Known(f64),
-    /// An unknown of its own.
+    /// A separate unknown.
     Free(FreeCoefficient),
-    /// The unknown of this name among [`Machine::parameters`](super::Machine::parameters), which several
-    /// coefficients may share.
+    /// The unknown of this name among [`Machine::parameters`](super::Machine::parameters), which
+    /// several coefficients may share.
     Shared(String),
 }
 
@@ -119,7 +120,7 @@ impl From<FreeCoefficient> for Coefficient {
 }
 
 impl Coefficient {
-    /// Returns whether this is a known zero, as if the element did not have the coefficient.
+    /// Returns whether this is a known zero, which has the same effect as no coefficient.
     pub fn is_zero(&self) -> bool {
         *self == Self::Known(0.0)
     }
@@ -151,7 +152,7 @@ mod form {
         }
     }
 
-    /// Reads a number, a name or an unknown.
+    /// Visitor that reads a number, a name or an unknown.
     struct AnyForm;
 
     impl<'de> Visitor<'de> for AnyForm {

@@ -4,22 +4,22 @@ use nalgebra::DMatrix;
 
 use super::Coefficient;
 
-/// Name that stands for the ground or the moving support in place of a degree of freedom.
+/// Name that refers to the ground or the moving support instead of a degree of freedom.
 pub const SUPPORT: &str = "support";
 
-/// A part of a machine; degrees of freedom are given by name, and [`SUPPORT`] stands for the ground.
+/// Part of a machine; degrees of freedom are given by name, and [`SUPPORT`] is the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Element {
-    /// A mass (kg), or a moment of inertia (kg·m²) at a rotation.
+    /// Mass (kg), or moment of inertia (kg·m²) for a rotation.
     Mass {
         /// Degree of freedom.
         at: String,
         /// Mass.
         mass: Coefficient,
     },
-    /// A spring, a damper or both between two degrees of freedom, or one and the support.
+    /// Spring, damper or both between two degrees of freedom, or one and the support.
     Link {
-        /// Both ends.
+        /// Degrees of freedom at the two ends.
         between: [String; 2],
         /// Stiffness k, in N/m.
         stiffness: Coefficient,
@@ -28,9 +28,9 @@ pub enum Element {
         /// Loss factor η of the stiffness: k (1 + iη).
         loss_factor: Coefficient,
     },
-    /// A general 2 × 2 block between two directions at one place and at another: a bearing.
+    /// General 2 × 2 block between two directions at one point and at another point: a bearing.
     Bearing(Box<Bearing>),
-    /// Known matrices of a part of the machine, each times a factor.
+    /// Known matrices of a part of the machine, each multiplied by a factor.
     Matrices(Box<MatrixElement>),
     /// Unknown residual unbalance, m e, of a rotor at speed Ω: the force Ω² U in x and −iΩ² U in y.
     Unbalance {
@@ -58,7 +58,7 @@ pub struct Bearing {
     pub mass: [Coefficient; 4],
 }
 
-/// Matrices over some degrees of freedom, d × d; those not given are zero.
+/// Matrices over some degrees of freedom, d × d; missing ones are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixElement {
     /// Degrees of freedom of the rows and columns.
@@ -74,7 +74,8 @@ pub struct MatrixElement {
 }
 
 impl MatrixElement {
-    /// Takes known matrices M (kg), C (N·s/m) and K (N/m) over these degrees of freedom.
+    /// Creates an element of known matrices M (kg), C (N·s/m) and K (N/m) over these degrees of
+    /// freedom.
     pub fn new(
         dofs: Vec<String>,
         mass: DMatrix<f64>,
@@ -86,7 +87,7 @@ impl MatrixElement {
         Self { dofs, mass, damping, stiffness, gyroscopic: None }
     }
 
-    /// Returns the same with a known gyroscopic matrix G of the force Ω G ẋ.
+    /// Returns the element with a known gyroscopic matrix G of the force Ω G ẋ.
     #[must_use]
     pub fn with_gyroscopic(self, gyroscopic: DMatrix<f64>) -> Self {
         Self { gyroscopic: Some((gyroscopic, Coefficient::Known(1.0))), ..self }
@@ -109,7 +110,7 @@ impl Element {
         Self::spring_damper(between, 0.0, damping)
     }
 
-    /// Returns a spring (N/m) beside a damper (N·s/m) between two degrees of freedom.
+    /// Returns a spring (N/m) and a damper (N·s/m), in parallel between two degrees of freedom.
     pub fn spring_damper(
         between: [&str; 2],
         stiffness: impl Into<Coefficient>,
@@ -123,8 +124,8 @@ impl Element {
         }
     }
 
-    /// Returns a bearing to the support with stiffness (N/m) and damping (N·s/m) in the order xx, xy, yx,
-    /// yy.
+    /// Returns a bearing to the support with stiffness (N/m) and damping (N·s/m) in the order xx,
+    /// xy, yx, yy.
     pub fn bearing(at: [&str; 2], stiffness: [Coefficient; 4], damping: [Coefficient; 4]) -> Self {
         Self::Bearing(Box::new(Bearing {
             at: at.map(str::to_owned),

@@ -4,8 +4,8 @@ use mechid_signal::message;
 
 use crate::ModelError;
 
-/// A description of a machine that does not make sense; every variant names the element, the sensor or
-/// the parameter concerned.
+/// Error in the description of a machine; every variant names the element, the sensor or the
+/// parameter concerned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MachineError {
@@ -35,7 +35,7 @@ pub enum MachineError {
         /// Degrees of freedom of the machine.
         known: String,
     },
-    /// An element or a sensor has twice the same end.
+    /// The two ends of an element or a sensor are the same.
     #[error("{what} {name:?} has both ends at {dof:?}")]
     SameEnds {
         /// `"element"` or `"sensor"`.
@@ -91,7 +91,7 @@ pub enum MachineError {
         /// Upper bound, in the unit of the coefficient.
         max: f64,
     },
-    /// The search would start outside the bounds.
+    /// The initial value of the search is outside the bounds.
     #[error(
         "\"start\" {} of {name:?} is outside its bounds, {} to {}",
         message::number(*start),
@@ -101,14 +101,14 @@ pub enum MachineError {
     StartOutside {
         /// Name of the coefficient.
         name: String,
-        /// First value, in the unit of the coefficient.
+        /// Initial value, in the unit of the coefficient.
         start: f64,
         /// Lower bound, in the unit of the coefficient.
         min: f64,
         /// Upper bound, in the unit of the coefficient.
         max: f64,
     },
-    /// An unknown has no value from which the search could start.
+    /// An unknown has no initial value for the search.
     #[error("{name:?} is unknown: give \"start\", both \"min\" and \"max\", or \"prior\"")]
     NoStart {
         /// Name of the coefficient.
@@ -133,10 +133,10 @@ pub enum MachineError {
     NoMass {
         /// Degree of freedom.
         dof: String,
-        /// Elements that touch it.
+        /// Elements at this degree of freedom.
         elements: String,
     },
-    /// No element touches a degree of freedom.
+    /// A degree of freedom has no element.
     #[error("no element holds degree of freedom {dof:?}")]
     Detached {
         /// Degree of freedom.

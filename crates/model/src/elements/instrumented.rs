@@ -1,4 +1,4 @@
-//! A machine together with what is measured on it.
+//! Machine with its sensors and inputs.
 
 use super::{Assembly, Input, Instruments, Machine, MachineError};
 
@@ -33,7 +33,7 @@ use super::{Assembly, Input, Instruments, Machine, MachineError};
 pub struct InstrumentedMachine {
     /// Degrees of freedom and elements.
     pub machine: Machine,
-    /// Sensors and inputs, whose names are those of their channels, and the speed of the rotor.
+    /// Sensors and inputs, whose names are the names of their channels, and the speed of the rotor.
     pub instruments: Instruments,
     /// Sensors and forces that could be added to the test.
     pub candidates: Candidates,
@@ -44,26 +44,27 @@ pub struct InstrumentedMachine {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct Candidates {
-    /// Sensors, each as noisy as those of its quantity.
+    /// Sensors; each has the noise level of the sensors with the same quantity.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub sensors: Vec<super::Sensor>,
-    /// Forces of a second test, each as large as those of the first.
+    /// Forces of a second test; each has the level of the forces in the first test.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub forces: Vec<Input>,
 }
 
 impl Candidates {
-    /// Returns whether there is none.
+    /// Returns whether there are no candidates.
     pub fn is_empty(&self) -> bool {
         self.sensors.is_empty() && self.forces.is_empty()
     }
 }
 
 impl InstrumentedMachine {
-    /// Returns the terms of the dynamic stiffness, the sensors, the inputs and the unknowns by index.
+    /// Returns the terms of the dynamic stiffness, the sensors, the inputs and the unknowns, by
+    /// index.
     ///
     /// # Errors
-    /// [`MachineError`] with the name of the element, sensor, input or parameter that does not make sense.
+    /// [`MachineError`] with the name of the wrong element, sensor, input or parameter.
     pub fn assembly(&self) -> Result<Assembly, MachineError> {
         self.machine.assembly(&self.instruments)
     }

@@ -3,57 +3,59 @@
 use super::{Coefficient, SUPPORT};
 use crate::ResponseQuantity;
 
-/// A sensor at a degree of freedom.
+/// Sensor at a degree of freedom.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Sensor {
-    /// Name, that of the channel; in JSON that of the degree of freedom if it is left out.
+    /// Name of the sensor and its channel; by default in JSON, the name of the degree of freedom.
     #[cfg_attr(feature = "serde", serde(default))]
     pub name: String,
     /// Degree of freedom.
     pub at: String,
-    /// Degree of freedom whose motion is subtracted: a probe on a housing, or [`SUPPORT`] for a response
-    /// relative to the moving support.
+    /// Degree of freedom whose motion is subtracted: for a probe on a housing, or [`SUPPORT`] for a
+    /// response relative to the moving support.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub relative_to: Option<String>,
-    /// Quantity measured.
+    /// Measured quantity.
     pub quantity: ResponseQuantity,
     /// Reading per unit of the quantity.
     #[cfg_attr(feature = "serde", serde(default = "one", skip_serializing_if = "is_one"))]
     pub gain: f64,
-    /// Delay behind the inputs, in s: of a logger with a clock of its own, or of a filter.
+    /// Delay relative to the inputs, in s: of a filter, or of a logger with a separate clock.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Coefficient::is_zero"))]
     pub delay: Coefficient,
 }
 
-/// A measured input.
+/// Measured input.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", tag = "kind"))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Input {
-    /// A force (N), or a moment (N·m) at a rotation.
+    /// Force (N), or moment (N·m) for a rotation.
     Force {
-        /// Name, that of the channel; in JSON that of the degree of freedom if it is left out.
+        /// Name of the input and its channel; by default in JSON, the name of the degree of
+        /// freedom.
         #[cfg_attr(feature = "serde", serde(default))]
         name: String,
         /// Degree of freedom.
         at: String,
-        /// Degree of freedom that the opposite force acts on: a shaker between two of them.
+        /// Degree of freedom on which the opposite force acts: for a shaker between two degrees of
+        /// freedom.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         against: Option<String>,
     },
-    /// Prescribed motion of the support, the same for all that is connected to it.
+    /// Prescribed motion of the support, equal for all its connections.
     Support {
-        /// Name, that of the channel.
+        /// Name of the input and its channel.
         name: String,
-        /// Quantity measured.
+        /// Measured quantity.
         quantity: ResponseQuantity,
     },
     /// Trial unbalance m e (kg·m) with its phase: the force Ω² U in x and −iΩ² U in y.
     Unbalance {
-        /// Name, that of the channel.
+        /// Name of the input and its channel.
         name: String,
         /// Degrees of freedom of x and y; the rotor turns from x to y.
         at: [String; 2],
@@ -68,7 +70,7 @@ pub enum Speed {
     /// No part turns.
     #[default]
     None,
-    /// The same on all lines, in rad/s.
+    /// The same speed on all lines, in rad/s.
     Constant(f64),
     /// Each line is the synchronous response at its own speed, Ω = ω.
     Synchronous,
@@ -81,7 +83,7 @@ pub enum Speed {
 pub struct Instruments {
     /// Sensors, one per output.
     pub sensors: Vec<Sensor>,
-    /// Inputs, one per measured input; none for an unbalance that is unknown.
+    /// Inputs, one per measured input; an unknown unbalance is not an input.
     pub inputs: Vec<Input>,
     /// Speed of the rotor.
     #[cfg_attr(feature = "serde", serde(default))]
@@ -99,20 +101,20 @@ fn is_one(value: &f64) -> bool {
 }
 
 impl Sensor {
-    /// Takes a sensor of unit gain with the name of its degree of freedom.
+    /// Creates a sensor of unit gain with the name of its degree of freedom.
     pub fn new(at: &str, quantity: ResponseQuantity) -> Self {
         let name = at.to_owned();
         let delay = Coefficient::default();
         Self { at: name.clone(), name, relative_to: None, quantity, gain: 1.0, delay }
     }
 
-    /// Returns the same, reading the motion relative to another degree of freedom.
+    /// Returns the sensor with a reading relative to another degree of freedom.
     #[must_use]
     pub fn relative_to(self, dof: &str) -> Self {
         Self { relative_to: Some(dof.to_owned()), ..self }
     }
 
-    /// Returns the same, reading the motion relative to the support.
+    /// Returns the sensor with a reading relative to the support.
     #[must_use]
     pub fn relative_to_support(self) -> Self {
         self.relative_to(SUPPORT)
@@ -121,7 +123,7 @@ impl Sensor {
 
 #[cfg(feature = "serde")]
 impl Sensor {
-    /// The same with the name of its degree of freedom if it has none.
+    /// Returns the sensor with the name of its degree of freedom if it has no name.
     pub(super) fn named(self) -> Self {
         if self.name.is_empty() { Self { name: self.at.clone(), ..self } } else { self }
     }
@@ -129,7 +131,7 @@ impl Sensor {
 
 #[cfg(feature = "serde")]
 impl Input {
-    /// The same with the name of its degree of freedom if it is a force without one.
+    /// Returns the input with the name of its degree of freedom if it is a force without a name.
     pub(super) fn named(self) -> Self {
         match self {
             Self::Force { name, at, against } if name.is_empty() => {
@@ -146,7 +148,7 @@ impl Input {
         Self::Force { name: at.to_owned(), at: at.to_owned(), against: None }
     }
 
-    /// Returns the name, that of the channel.
+    /// Returns the name of the input and its channel.
     pub fn name(&self) -> &str {
         match self {
             Self::Force { name, .. }
@@ -157,7 +159,7 @@ impl Input {
 }
 
 impl Speed {
-    /// Returns the speed Ω on a line at `omega`, both in rad/s; 0 if nothing turns.
+    /// Returns the speed Ω on a line at `omega`, both in rad/s; 0 if no part turns.
     pub fn at(self, omega: f64) -> f64 {
         match self {
             Self::None => 0.0,

@@ -1,11 +1,11 @@
-//! The description of a machine.
+//! Description of a machine.
 
 use super::{Assembly, Coefficient, Element, FreeCoefficient, Instruments, MachineError, build};
 
 /// Damping in proportion to masses and stiffnesses: C = αM + βK, and K (1 + iη).
 ///
-/// It applies to masses, links and matrices; bearings and other 2 × 2 blocks have their own damping. α acts
-/// on the motion relative to the support.
+/// It applies to masses, links and matrices; bearings and other 2 × 2 blocks have separate damping.
+/// α acts on the motion relative to the support.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -16,13 +16,13 @@ pub struct ProportionalDamping {
     /// β, in s.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Coefficient::is_zero"))]
     pub beta: Coefficient,
-    /// Loss factor η of all links and matrices that do not have their own.
+    /// Loss factor η of all links and matrices without a separate one.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Coefficient::is_zero"))]
     pub loss_factor: Coefficient,
 }
 
 impl ProportionalDamping {
-    /// Returns whether there is none.
+    /// Returns whether there is no such damping.
     pub fn is_zero(&self) -> bool {
         [&self.alpha, &self.beta, &self.loss_factor].into_iter().all(Coefficient::is_zero)
     }
@@ -42,36 +42,37 @@ pub struct Machine {
     pub parameters: Vec<(String, FreeCoefficient)>,
     /// Damping in proportion to masses and stiffnesses.
     pub damping: ProportionalDamping,
-    /// Degrees of freedom that lie in the direction of the motion of the support; all without it.
+    /// Degrees of freedom in the direction of the motion of the support; by default all.
     pub support_direction: Option<Vec<String>>,
     /// Degrees of freedom of a part whose receptance was measured: they need no mass here.
     pub measured: Vec<String>,
 }
 
 impl Machine {
-    /// Takes the names of the degrees of freedom, without any element.
+    /// Creates a machine with these names of the degrees of freedom, and without elements.
     pub fn new<S: Into<String>>(dofs: impl IntoIterator<Item = S>) -> Self {
         Self { dofs: dofs.into_iter().map(Into::into).collect(), ..Self::default() }
     }
 
-    /// Returns the machine with one element more.
+    /// Returns the machine with another element.
     #[must_use]
     pub fn with(mut self, name: &str, element: Element) -> Self {
         self.elements.push((name.to_owned(), element));
         self
     }
 
-    /// Returns the machine with one unknown more that coefficients may share.
+    /// Returns the machine with another unknown that coefficients may share.
     #[must_use]
     pub fn with_parameter(mut self, name: &str, parameter: FreeCoefficient) -> Self {
         self.parameters.push((name.to_owned(), parameter));
         self
     }
 
-    /// Returns the terms of the dynamic stiffness, the sensors, the inputs and the unknowns by index.
+    /// Returns the terms of the dynamic stiffness, the sensors, the inputs and the unknowns, by
+    /// index.
     ///
     /// # Errors
-    /// [`MachineError`] with the name of the element, sensor, input or parameter that does not make sense.
+    /// [`MachineError`] with the name of the wrong element, sensor, input or parameter.
     pub fn assembly(&self, instruments: &Instruments) -> Result<Assembly, MachineError> {
         build::assembly(self, instruments)
     }

@@ -1,11 +1,11 @@
-//! A machine as its engineer draws it: degrees of freedom with names, elements between them, sensors and
-//! inputs anywhere, every coefficient known or unknown.
+//! Machines of named elements: degrees of freedom with names, elements between them, sensors and
+//! inputs at any degree of freedom, and coefficients that are known or unknown.
 //!
 //! ```
 //! use mechid_model::ResponseQuantity;
 //! use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
 //!
-//! // Two masses on a spring of unknown stiffness; a force on the first, an accelerometer on the second.
+//! // Two masses, a force on the first, an accelerometer on the second, an unknown spring.
 //! let k = FreeCoefficient::from_start(3e4).at_least(0.0);
 //! let machine = Machine::new(["x1", "x2"])
 //!     .with("m1", Element::mass("x1", 2.0))
@@ -22,8 +22,9 @@
 //! # Ok::<(), mechid_model::elements::MachineError>(())
 //! ```
 //!
-//! With the feature `serde` a machine and its instruments are read from and written to JSON. A coefficient is
-//! a number, an unknown (`start`, `min`, `max`, `prior`), or the name of one of the `parameters`:
+//! With the feature `serde` a machine and its instruments are read from and written to JSON. A
+//! coefficient is a number, an unknown (`start`, `min`, `max`, `prior`), or the name of one of the
+//! `parameters`:
 //!
 //! ```json
 //! {
@@ -42,8 +43,9 @@
 //! }
 //! ```
 //!
-//! Rows and columns of sparse matrices are counted from 1. Other kinds are `unbalance` (`at` two degrees of
-//! freedom, `real`, `imaginary`); links at one place end at the support.
+//! Rows and columns of sparse matrices are counted from 1. Another kind is `unbalance` (`at` two
+//! degrees of freedom, `real`, `imaginary`); links with a single degree of freedom end at the
+//! support.
 
 mod assembly;
 mod build;

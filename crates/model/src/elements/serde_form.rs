@@ -1,4 +1,4 @@
-//! The description of a machine as it is written in JSON.
+//! JSON form of the description of a machine.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ pub(super) enum MatrixForm {
     Sparse { size: usize, rows: Vec<usize>, columns: Vec<usize>, values: Vec<f64> },
 }
 
-/// Any element; what does not belong to its kind is absent.
+/// Any element; fields of other kinds are absent.
 #[derive(Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ElementForm {
@@ -130,7 +130,7 @@ impl ElementForm {
         MachineError::Element { name: self.name.clone(), problem: problem.into() }
     }
 
-    /// Names of the fields that are given, besides the name and the kind.
+    /// Returns the names of the given fields, except name and kind.
     fn given(&self) -> Vec<&'static str> {
         let mut given = Vec::new();
         for (name, present) in [
@@ -196,7 +196,7 @@ impl ElementForm {
         }
     }
 
-    /// The kind, which follows from the fields where it is not given.
+    /// Returns the kind, which follows from the fields if it is not given.
     fn kind(&self) -> Result<Kind, MachineError> {
         if let Some(kind) = self.kind {
             return Ok(kind);

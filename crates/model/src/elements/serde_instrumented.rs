@@ -1,4 +1,4 @@
-//! The description of a machine with its sensors and inputs as it is written in JSON.
+//! JSON form of the description of a machine with its sensors and inputs.
 
 use std::collections::BTreeMap;
 

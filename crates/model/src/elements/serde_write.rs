@@ -1,4 +1,4 @@
-//! The JSON form of a machine from its description.
+//! Conversion of the description of a machine to its JSON form.
 
 use nalgebra::DMatrix;
 
@@ -18,7 +18,7 @@ impl From<Machine> for MachineForm {
     }
 }
 
-/// A coefficient that is not a known zero.
+/// Returns a coefficient unless it is a known zero.
 fn given(coefficient: Coefficient) -> Option<Coefficient> {
     (!coefficient.is_zero()).then_some(coefficient)
 }
@@ -27,7 +27,7 @@ fn written(part: Option<(DMatrix<f64>, Coefficient)>) -> (Option<MatrixForm>, Op
     let Some((matrix, factor)) = part else { return (None, None) };
     let factor = (factor != Coefficient::Known(1.0)).then_some(factor);
     let filled = matrix.iter().filter(|value| **value != 0.0).count();
-    // A sparse entry takes three numbers.
+    // A sparse entry needs three numbers.
     if matrix.is_square() && 3 * filled < matrix.len() {
         let size = matrix.nrows();
         let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());

@@ -18,7 +18,7 @@ pub enum Power {
 }
 
 impl Power {
-    /// Returns the factor at `omega` and the rotor's speed `speed`, both in rad/s.
+    /// Returns the factor at `omega` and the rotor speed `speed`, both in rad/s.
     pub fn factor(self, omega: f64, speed: f64) -> Complex<f64> {
         match self {
             Self::Stiffness => Complex::new(1.0, 0.0),
@@ -29,7 +29,7 @@ impl Power {
         }
     }
 
-    /// Returns the factor at an eigenvalue `s` and the rotor's speed `speed`, both in rad/s.
+    /// Returns the factor at an eigenvalue `s` and the rotor speed `speed`, both in rad/s.
     pub fn at_eigenvalue(self, s: Complex<f64>, speed: f64) -> Complex<f64> {
         match self {
             Self::Stiffness => Complex::new(1.0, 0.0),
@@ -41,11 +41,11 @@ impl Power {
     }
 }
 
-/// Entries of the dynamic stiffness that a term fills. Index n, one beyond the degrees of freedom, is the
-/// support, whose motion is prescribed.
+/// Entries of the dynamic stiffness to which a term contributes. Index n, one beyond the degrees of
+/// freedom, is the support, whose motion is prescribed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
-    /// a bᵀ, by the non-zero entries of a and b.
+    /// a bᵀ, from the non-zero entries of a and b.
     Dyad {
         /// Entries of a, pure numbers.
         left: Vec<(usize, f64)>,
@@ -66,13 +66,13 @@ pub enum Pattern {
 /// Pattern × frequency factor × scale × product of parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Entries that it fills.
+    /// Entries to which it contributes.
     pub pattern: Pattern,
     /// Frequency factor.
     pub power: Power,
     /// Known factor.
     pub scale: f64,
-    /// Parameters whose product is the unknown factor; none of a term that is known.
+    /// Parameters whose product is the unknown factor; empty for a known term.
     pub parameters: Vec<usize>,
 }
 
@@ -83,25 +83,28 @@ impl Term {
     }
 
     /// Returns each parameter with the derivative of [`Term::value`] with respect to it, in the
-    /// unit of the value over the unit of the parameter.
+    /// unit of the value divided by the unit of the parameter.
     pub fn derivatives<'a>(
         &'a self,
         parameters: &'a [f64],
     ) -> impl Iterator<Item = (usize, f64)> + 'a {
         self.parameters.iter().enumerate().map(move |(place, at)| {
-            let others =
+            let other_factors =
                 self.parameters.iter().enumerate().filter(move |(other, _)| *other != place);
-            (*at, others.fold(self.scale, |product, (_, other)| product * parameters[*other]))
+            (
+                *at,
+                other_factors.fold(self.scale, |product, (_, other)| product * parameters[*other]),
+            )
         })
     }
 
-    /// Returns whether no parameter is in it.
+    /// Returns whether it has no parameter.
     pub fn is_known(&self) -> bool {
         self.parameters.is_empty()
     }
 
-    /// Calls `add` with every entry (row, column, value) of the pattern; column n is the support's, and rows
-    /// of the support are left out, for its motion is prescribed.
+    /// Calls `add` with every entry (row, column, value) of the pattern. Column n belongs to the
+    /// support; rows of the support are omitted, because its motion is prescribed.
     pub fn for_each_entry(&self, dof: usize, mut add: impl FnMut(usize, usize, f64)) {
         match &self.pattern {
             Pattern::Dyad { left, right } => {

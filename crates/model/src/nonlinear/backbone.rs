@@ -16,19 +16,19 @@ pub struct BackbonePoint {
     pub amplitude: f64,
     /// Frequency of the free vibration, in rad/s.
     pub omega: f64,
-    /// Standard error of the frequency by the covariance of the parameters, in rad/s.
+    /// Standard error of the frequency from the covariance of the parameters, in rad/s.
     pub standard_error: f64,
 }
 
 impl UncertainNonlinearSystem {
     /// Computes the backbone of a mode: its frequency without damping at each amplitude (m,
-    /// ascending), with the standard error from the covariance (delta method). The amplitude is
-    /// that of the fundamental, at the degree of freedom with the largest motion in the linear
+    /// ascending), with the standard error from the covariance (delta method). The amplitude is the
+    /// amplitude of the fundamental, at the degree of freedom with the largest motion in the linear
     /// mode.
     ///
-    /// Modes are counted from 0 in ascending order of frequency, those of M and K. The motion is a
+    /// Modes are those of M and K, counted from 0 in ascending order of frequency. The motion is a
     /// Fourier series of a mean and nine harmonics in balance with the forces; terms of the
-    /// velocities are omitted together with the damping. The list ends early if no such motion was
+    /// velocities are omitted together with the damping. The list ends early if no such motion is
     /// found: a softening spring may have none.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl UncertainNonlinearSystem {
     ) -> Result<Vec<BackbonePoint>, ModelError> {
         let (mut motion, dof) = start(self.system(), mode)?;
         let balance = Balance::new(self.system());
-        // The start is a mode of no amplitude in particular.
+        // The initial motion is a linear mode, which has no particular amplitude.
         let (mut points, mut reached) = (Vec::new(), 0.0);
         for &amplitude in amplitudes {
             require("amplitude of a backbone", amplitude, "positive", amplitude > 0.0)?;
@@ -72,14 +72,15 @@ impl UncertainNonlinearSystem {
         Ok(points)
     }
 
-    /// Variance of the frequency; `None` at a fold, where it has no derivative.
+    /// Returns the variance of the frequency; `None` at a fold, where it has no derivative.
     fn variance(
         &self,
         balance: &Balance<'_>,
         motion: &Motion,
         dof: usize,
     ) -> Result<Option<f64>, ModelError> {
-        // ω changes by −(last row of J⁻¹) ∂R/∂θ: one solution with the transpose serves all.
+        // ω changes by −(last row of J⁻¹) ∂R/∂θ, so one solution with the transpose is enough for
+        // all parameters.
         let jacobian = balance.jacobian(motion, dof);
         let mut last = DVector::zeros(jacobian.nrows());
         last[jacobian.nrows() - 1] = 1.0;
@@ -111,7 +112,7 @@ struct Motion {
     omega: f64,
 }
 
-/// The mode of M and K as a motion of 1 m at the degree of freedom with the largest motion.
+/// Returns the mode of M and K as a motion of 1 m at the degree of freedom with the largest motion.
 fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), ModelError> {
     let linear = system.linear();
     let none = DMatrix::zeros(linear.dof(), linear.dof());
@@ -144,7 +145,7 @@ impl<'a> Balance<'a> {
         Self { system, waves: DMatrix::from_fn(limits::INSTANTS, limits::HARMONICS + 1, wave) }
     }
 
-    /// The motion of another amplitude that continues one of this; `None` if none is found.
+    /// Continues one motion to another amplitude; `None` if no motion is found.
     fn reach(
         &self,
         from: &Motion,
@@ -164,7 +165,7 @@ impl<'a> Balance<'a> {
         None
     }
 
-    /// Newton's method from a guess.
+    /// Applies Newton's method to an initial motion.
     fn solve(&self, mut motion: Motion, dof: usize, amplitude: f64) -> Option<Motion> {
         for _ in 0..limits::BACKBONE_NEWTON_STEPS {
             let forces = self.forces(&motion);
@@ -189,7 +190,8 @@ impl<'a> Balance<'a> {
         None
     }
 
-    /// Residuals (K − h²ω²M) a_h plus the h-th harmonic of the terms, for every h, in N.
+    /// Returns the residuals (K − h²ω²M) a_h plus the h-th harmonic of the terms, for every h, in
+    /// N.
     fn forces(&self, motion: &Motion) -> DVector<f64> {
         let linear = self.system.linear();
         let mut forces = linear.stiffness() * &motion.cosines;
@@ -213,8 +215,8 @@ impl<'a> Balance<'a> {
         DVector::from_column_slice(forces.as_slice())
     }
 
-    /// Derivatives of the forces and of the amplitude with respect to the harmonics and the
-    /// frequency.
+    /// Returns the derivatives of the forces and of the amplitude with respect to the harmonics and
+    /// the frequency.
     fn jacobian(&self, motion: &Motion, dof: usize) -> DMatrix<f64> {
         let (n, linear) = (self.system.dof(), self.system.linear());
         let last = n * (limits::HARMONICS + 1);
@@ -252,7 +254,7 @@ impl<'a> Balance<'a> {
     }
 }
 
-/// Weight of each instant in the harmonic.
+/// Returns the weight of each instant in the harmonic.
 fn share(harmonic: usize) -> f64 {
     if harmonic == 0 { 1.0 / limits::INSTANTS as f64 } else { 2.0 / limits::INSTANTS as f64 }
 }

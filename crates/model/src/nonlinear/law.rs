@@ -1,4 +1,4 @@
-//! Force laws: how a nonlinear force depends on one displacement and its velocity.
+//! Force laws: the dependence of a nonlinear force on one displacement and its velocity.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,19 +13,19 @@ use crate::limits;
 /// The coefficient of a law is a parameter of the system; [`Law::constants`] are constants inside
 /// the law, on which the force depends nonlinearly.
 pub trait Law: fmt::Debug + Send + Sync {
-    /// f(q, q̇), in powers of m and m/s: see [`Law::dimension`].
+    /// Returns f(q, q̇), in powers of m and m/s: see [`Law::dimension`].
     fn value(&self, q: f64, v: f64) -> f64;
 
-    /// \[∂f/∂q, ∂f/∂q̇\], in the unit of f per m and per m/s.
+    /// Returns \[∂f/∂q, ∂f/∂q̇\], in the unit of f per m and per m/s.
     fn slopes(&self, q: f64, v: f64) -> [f64; 2];
 
-    /// Powers of metre and second in the unit of f: \[1, −1\] for a velocity.
+    /// Returns the powers of metre and second in the unit of f: \[1, −1\] for a velocity.
     fn dimension(&self) -> [i32; 2];
 
     /// Returns the law in the syntax of the parser, with these names for q and q̇.
     fn expression(&self, q: &str, v: &str) -> String;
 
-    /// Constants inside the law, with name, unit and value; none for most laws.
+    /// Returns the constants inside the law, with name, unit and value; none for most laws.
     fn constants(&self) -> Vec<Constant> {
         Vec::new()
     }
@@ -62,7 +62,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// q^`displacement` · q̇^`velocity`.
+    /// Creates the law q^`displacement` · q̇^`velocity`.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] for an exponent above 9 or a linear law, which is an entry of K or
@@ -113,7 +113,7 @@ impl Law for Power {
     }
 }
 
-/// |q̇| q̇: turbulent drag, and the first guess for any damping that rises with the amplitude.
+/// |q̇| q̇: turbulent drag, and a first approximation of damping that increases with the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QuadraticDamping;
 
@@ -136,14 +136,14 @@ impl Law for QuadraticDamping {
 }
 
 /// q̇³ / (1 + (q̇/b)²): cubic damping for small velocities that becomes linear above b, so that it
-/// does not run away beyond the amplitudes it was identified at.
+/// remains moderate beyond the amplitudes of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SaturatingDamping {
     velocity: f64,
 }
 
 impl SaturatingDamping {
-    /// Saturating damper with the velocity b (m/s) at which it bends.
+    /// Creates a saturating damper with the velocity b (m/s) above which it becomes linear.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless b is positive and finite.
@@ -190,7 +190,7 @@ pub struct Gap {
 }
 
 impl Gap {
-    /// A stop with the clearance a (m) on either side.
+    /// Creates a stop with the clearance a (m) on either side.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless a is positive and finite.
@@ -227,15 +227,15 @@ impl Law for Gap {
     }
 }
 
-/// tanh(q̇/b): Coulomb friction that is regularised, whose coefficient is the force of sliding;
-/// below the velocity b it creeps where dry friction sticks.
+/// tanh(q̇/b): regularised Coulomb friction, whose coefficient is the force of sliding; below the
+/// velocity b it creeps whereas dry friction sticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     velocity: f64,
 }
 
 impl Friction {
-    /// Friction with the velocity b (m/s) above which it slides.
+    /// Creates a friction with the velocity b (m/s) above which it slides.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless b is positive and finite.

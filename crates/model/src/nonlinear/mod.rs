@@ -64,7 +64,7 @@ impl NonlinearSystem {
         Ok(Self { linear, terms, coefficients })
     }
 
-    /// M, C and K: the system at small amplitudes, apart from terms with a slope at zero.
+    /// Returns M, C and K: the system at small amplitudes, except for terms with a slope at zero.
     pub fn linear(&self) -> &SecondOrderSystem {
         &self.linear
     }
@@ -84,8 +84,8 @@ impl NonlinearSystem {
         self.linear.dof()
     }
 
-    /// C ẋ + K x + Σ θ f(q, q̇), in N, of displacements (m) and velocities (m/s); all with one
-    /// entry per degree of freedom.
+    /// Computes C ẋ + K x + Σ θ f(q, q̇), in N, from displacements (m) and velocities (m/s); all
+    /// with one entry per degree of freedom.
     ///
     /// # Panics
     /// If one of the three has another length.
@@ -107,8 +107,8 @@ impl NonlinearSystem {
         }
     }
 
-    /// ∂/∂x and ∂/∂ẋ of [`NonlinearSystem::restoring_force`]: K and C of small motions about a
-    /// displacement (m) and velocity (m/s), n × n, in N/m and N·s/m.
+    /// Returns ∂/∂x and ∂/∂ẋ of [`NonlinearSystem::restoring_force`]: K and C of small motions
+    /// about a displacement (m) and velocity (m/s), n × n, in N/m and N·s/m.
     ///
     /// # Panics
     /// If one of the two has fewer than n entries.
@@ -128,7 +128,7 @@ impl NonlinearSystem {
         tangents
     }
 
-    /// The force (N, samples × degrees of freedom) under which the system responds so.
+    /// Returns the force (N, samples × degrees of freedom) that causes this response.
     ///
     /// # Errors
     /// [`ModelError::StateLength`] if the response has another number of degrees of freedom,

@@ -1,4 +1,4 @@
-//! Terms from text.
+//! Parser of nonlinear terms.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use super::{
 };
 use crate::ModelError;
 
-/// A law and the coordinate it is of.
+/// Coordinate and its law.
 type Factor = (Coordinate, Arc<dyn Law>);
 
 impl FromStr for Terms {
@@ -64,10 +64,10 @@ impl FromStr for Term {
     }
 }
 
-/// Displacement or velocity of a coordinate.
+/// Letter (displacement or velocity) and coordinate.
 type Variable = (char, Coordinate);
 
-/// Exponents found in a product, all of one coordinate.
+/// Exponents in a product whose factors all have one coordinate.
 #[derive(Default)]
 struct Product {
     coordinate: Option<Coordinate>,
@@ -143,7 +143,7 @@ impl Parser {
         self.take(')').then_some((coordinate, text))
     }
 
-    /// The text before the next parenthesis that closes, or to the end.
+    /// Returns the text before the next closing parenthesis, or to the end.
     fn until_closed(&mut self) -> String {
         let start = self.at;
         while self.peek().is_some_and(|c| c != ')') {
@@ -160,7 +160,7 @@ impl Parser {
         begins
     }
 
-    /// `x1`, `v1^3`, `(x1-x2)^2`, `|v1|`, with a `*` before or after it.
+    /// Parses `x1`, `v1^3`, `(x1-x2)^2`, `|v1|`, with a `*` before or after it.
     fn factor(&mut self, product: &mut Product) -> Result<(), String> {
         let absolute = self.take('|');
         let (letter, coordinate) = self.variable()?;
@@ -183,7 +183,7 @@ impl Parser {
         Ok(())
     }
 
-    /// `x`, `v2` or `(x1-x2)`.
+    /// Parses `x`, `v2` or `(x1-x2)`.
     fn variable(&mut self) -> Result<Variable, String> {
         if !self.take('(') {
             let (letter, dof) = self.single()?;
@@ -215,7 +215,7 @@ impl Parser {
         }
     }
 
-    /// b of `(1+(v1/b)^2)`.
+    /// Returns b of `(1+(v1/b)^2)`.
     fn saturation(&mut self, coordinate: Coordinate) -> Result<f64, String> {
         let form = || "after / stands (1 + (v/b)^2) with the v of v^3".to_owned();
         for c in ['(', '1', '+', '('] {

@@ -1,4 +1,4 @@
-//! Nonlinear terms: a named coefficient, a force law, and where it acts.
+//! Nonlinear terms: a named coefficient, a force law, and its coordinate.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::Law;
 use crate::{ModelError, Parameter};
 
-/// The displacement of a force law, and the degrees of freedom of its force, counted from 0.
+/// Displacement on which a force law depends, and the degrees of freedom of its force, counted from
+/// 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Coordinate {
     /// x_i: between a degree of freedom and the ground.
@@ -17,8 +18,8 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    /// x_i, or x_i − x_j, of displacements or velocities with one entry per degree of freedom, in
-    /// their unit.
+    /// Returns x_i, or x_i − x_j, from displacements or velocities with one entry per degree of
+    /// freedom, in their unit.
     ///
     /// # Panics
     /// If there is no such degree of freedom.
@@ -29,7 +30,8 @@ impl Coordinate {
         }
     }
 
-    /// Factor of the force in the equation of motion of a degree of freedom: 1, −1 or 0.
+    /// Returns the factor of the force in the equation of motion of a degree of freedom: 1, −1 or
+    /// 0.
     pub fn sign(self, dof: usize) -> f64 {
         match self {
             Self::Dof(i) | Self::Difference(i, _) if i == dof => 1.0,
@@ -38,7 +40,7 @@ impl Coordinate {
         }
     }
 
-    /// The degrees of freedom with a factor other than 0, each with it.
+    /// Returns the degrees of freedom whose factor is not 0, with their factors.
     pub fn signs(self) -> impl Iterator<Item = (usize, f64)> {
         let (first, second) = match self {
             Self::Dof(i) => (i, None),
@@ -54,7 +56,7 @@ impl Coordinate {
         }
     }
 
-    /// Names of the displacement and of the velocity in an expression.
+    /// Returns the names of the displacement and of the velocity in an expression.
     fn names(self) -> [String; 2] {
         ["x", "v"].map(|letter| match self {
             Self::Dof(i) => format!("{letter}{}", i + 1),
@@ -63,7 +65,7 @@ impl Coordinate {
     }
 }
 
-/// θ f(q, q̇): a named coefficient θ, a [`Law`] f, and the [`Coordinate`] q.
+/// Term θ f(q, q̇): a named coefficient θ, a [`Law`] f, and the [`Coordinate`] q.
 ///
 /// Two terms are equal if their expressions are.
 #[derive(Debug, Clone)]
@@ -74,11 +76,11 @@ pub struct Term {
 }
 
 impl Term {
-    /// A term from the name of its coefficient, where it acts, and its law.
+    /// Creates a term from the name of its coefficient, its coordinate, and its law.
     ///
     /// # Errors
-    /// [`ModelError::Term`] unless the name begins with a letter, has letters, digits and `_` only,
-    /// and the difference is of two different degrees of freedom.
+    /// [`ModelError::Term`] unless the name begins with a letter, has only letters, digits and `_`,
+    /// and the difference is between two different degrees of freedom.
     pub fn new(
         name: impl Into<String>,
         coordinate: Coordinate,
@@ -127,13 +129,13 @@ impl Term {
         Some(Self { law: self.law.with_constants(values)?, ..self.clone() })
     }
 
-    /// f(q, q̇) for displacements (m) and velocities (m/s) with one entry per degree of freedom, in
-    /// the unit of force (N) over that of the coefficient.
+    /// Returns f(q, q̇) for displacements (m) and velocities (m/s) with one entry per degree of
+    /// freedom, in the unit of force (N) divided by the unit of the coefficient.
     pub fn value(&self, displacement: &[f64], velocity: &[f64]) -> f64 {
         self.law.value(self.coordinate.of(displacement), self.coordinate.of(velocity))
     }
 
-    /// SI unit of the coefficient, such as `N/m³`.
+    /// Returns the SI unit of the coefficient, such as `N/m³`.
     pub fn unit(&self) -> String {
         let [metre, second] = self.law.dimension();
         let power = |letter: &str, exponent: i32| match exponent {
@@ -194,7 +196,7 @@ impl PartialEq for Term {
 pub struct Terms(Vec<Term>);
 
 impl Terms {
-    /// A list of terms.
+    /// Creates a list of terms.
     ///
     /// # Errors
     /// [`ModelError::RepeatedTerm`] if two have the same name.
@@ -207,12 +209,12 @@ impl Terms {
         Ok(Self(terms))
     }
 
-    /// No terms: a linear system.
+    /// Returns an empty list: a linear system.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// The terms in their order.
+    /// Returns the terms in their order.
     pub fn iter(&self) -> std::slice::Iter<'_, Term> {
         self.0.iter()
     }
@@ -222,7 +224,7 @@ impl Terms {
         self.0.len()
     }
 
-    /// Returns true if there are none.
+    /// Returns whether there are no terms.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

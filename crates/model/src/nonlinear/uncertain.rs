@@ -1,4 +1,4 @@
-//! Nonlinear systems whose parameters are uncertain.
+//! Nonlinear systems with uncertain parameters.
 
 use nalgebra::DMatrix;
 
@@ -23,8 +23,8 @@ pub enum NonlinearParameter {
 }
 
 impl NonlinearParameter {
-    /// Parameter of this name: `k12`, the name of a term, or `c3.b` for the constant b inside a
-    /// term.
+    /// Returns the parameter of this name: `k12`, the name of a term, or `c3.b` for the constant b
+    /// inside a term.
     ///
     /// # Errors
     /// [`ModelError::NoSuchParameter`] if the system has no parameter of this name.
@@ -62,10 +62,10 @@ impl NonlinearParameter {
 }
 
 impl NonlinearSystem {
-    /// Returns the same system with one parameter larger by `by`, in the unit of the parameter.
+    /// Returns the same system with one parameter increased by `by`, in the unit of the parameter.
     ///
     /// # Errors
-    /// [`ModelError`] if there is no such system: a singular M, or a constant out of range.
+    /// [`ModelError`] if the changed system is invalid: a singular M, or a constant out of range.
     pub fn changed(&self, parameter: NonlinearParameter, by: f64) -> Result<Self, ModelError> {
         let mut changed = self.clone();
         match parameter {
@@ -96,7 +96,7 @@ impl NonlinearSystem {
     }
 }
 
-/// A nonlinear system with some uncertain parameters, and their covariance; all others are known.
+/// Nonlinear system with some uncertain parameters, and their covariance; all others are known.
 ///
 /// ```
 /// use mechid_model::{NonlinearParameter, NonlinearSystem, Sdof, UncertainNonlinearSystem};
@@ -117,14 +117,14 @@ pub struct UncertainNonlinearSystem {
 }
 
 impl UncertainNonlinearSystem {
-    /// A system and the covariance of these parameters, one row and column each, in the products of
-    /// their units.
+    /// Creates a system with the covariance of these parameters, one row and column each, in the
+    /// products of their units.
     ///
     /// # Errors
     /// [`ModelError::CovarianceShape`] if it is not one row and column per parameter,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
     /// [`ModelError::RepeatedParameter`] if a parameter is named twice, and as
-    /// [`NonlinearSystem::changed`] if the system has not this parameter.
+    /// [`NonlinearSystem::changed`] if the system does not have this parameter.
     pub fn new(
         system: NonlinearSystem,
         parameters: Vec<NonlinearParameter>,
