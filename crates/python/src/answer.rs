@@ -1,4 +1,4 @@
-//! Results that are told, drawn, and nothing else.
+//! Results with a text and a picture, and no further methods.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -9,22 +9,22 @@ use serde::Serialize;
 
 use crate::{failure, work};
 
-/// A result as JSON, as text and as a drawing.
-pub trait Told: Send + Sync {
+/// Result as JSON, as text and as a figure.
+pub trait ResultOutput: Send + Sync {
     /// Returns the JSON that the program prints.
     fn json(&self, py: Python<'_>) -> PyResult<String>;
 
     /// Returns the text that the program prints.
     fn text(&self) -> String;
 
-    /// Returns the picture that the program draws.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self) -> Result<String, ReportError>;
 
-    /// Returns the picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self) -> Result<String, ReportError>;
 }
 
-impl<T: Serialize + Display + ToFigure + Send + Sync> Told for T {
+impl<T: Serialize + Display + ToFigure + Send + Sync> ResultOutput for T {
     fn json(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, self)
     }
@@ -42,45 +42,45 @@ impl<T: Serialize + Display + ToFigure + Send + Sync> Told for T {
     }
 }
 
-/// Draws a result off the lock.
-pub fn svg(py: Python<'_>, told: Arc<impl Told + ?Sized + 'static>) -> PyResult<String> {
-    work::watched(py, None, || Ok(()), move || told.svg())
+/// Draws a result without the interpreter's lock.
+pub fn svg(py: Python<'_>, result: Arc<impl ResultOutput + ?Sized + 'static>) -> PyResult<String> {
+    work::watched(py, None, || Ok(()), move || result.svg())
 }
 
-/// Makes the page of a result off the lock.
-pub fn html(py: Python<'_>, told: Arc<impl Told + ?Sized + 'static>) -> PyResult<String> {
-    work::watched(py, None, || Ok(()), move || told.html())
+/// Creates the HTML page of a result without the interpreter's lock.
+pub fn html(py: Python<'_>, result: Arc<impl ResultOutput + ?Sized + 'static>) -> PyResult<String> {
+    work::watched(py, None, || Ok(()), move || result.html())
 }
 
-/// A result that is told and drawn.
+/// Result with JSON, text and figure.
 #[pyclass(frozen, module = "mechid._mechid")]
-pub struct Answer(pub Arc<dyn Told>);
+pub struct Answer(pub Arc<dyn ResultOutput>);
 
 impl Answer {
-    /// Keeps a result.
-    pub fn of(told: impl Told + 'static) -> Self {
-        Self(Arc::new(told))
+    /// Creates an answer from a result.
+    pub fn new(result: impl ResultOutput + 'static) -> Self {
+        Self(Arc::new(result))
     }
 }
 
 #[pymethods]
 impl Answer {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         self.0.json(py)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.text()
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         svg(py, Arc::clone(&self.0))
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         html(py, Arc::clone(&self.0))
     }

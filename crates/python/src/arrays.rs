@@ -1,4 +1,4 @@
-//! Arrays in and out: copied in, owned arrays handed out.
+//! NumPy arrays: inputs are copied, outputs are owned by Python.
 
 use mechid::io::ParameterCovariance;
 use mechid::model::ResponseQuantity;
@@ -7,36 +7,36 @@ use nalgebra::DMatrix;
 use numpy::{Element, IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-/// Returns an array of rows × columns of its own.
+/// Returns a new array of rows × columns.
 pub fn matrix<'py, T: Element + nalgebra::Scalar>(
     py: Python<'py>,
     matrix: DMatrix<T>,
 ) -> PyResult<Bound<'py, PyArray2<T>>> {
     let (rows, columns) = matrix.shape();
     let values: Vec<T> = matrix.data.into();
-    // nalgebra stores column by column.
+    // The storage order of nalgebra is column-major.
     let transposed = values.into_pyarray(py).reshape([columns, rows])?;
     transposed.transpose()
 }
 
-/// Copies an array of any layout.
+/// Copies an array with any memory layout.
 pub fn copied(given: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
     let given = given.as_array();
-    // nalgebra stores column by column.
+    // The storage order of nalgebra is column-major.
     DMatrix::from_iterator(given.nrows(), given.ncols(), given.t().iter().copied())
 }
 
-/// Returns an array of samples × channels of its own.
+/// Returns a new array of samples × channels.
 pub fn record(py: Python<'_>, record: Record) -> PyResult<Bound<'_, PyArray2<f64>>> {
     matrix(py, record.into_data())
 }
 
-/// Returns a vector of its own.
+/// Returns a new vector.
 pub fn vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
     values.into_pyarray(py)
 }
 
-/// Name of a kind of response, and its samples × degrees of freedom.
+/// Kind of a response by name, and its samples × degrees of freedom.
 pub type Named<'py> = (String, Bound<'py, PyArray2<f64>>);
 
 /// Returns records with their names.

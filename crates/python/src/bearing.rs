@@ -9,7 +9,7 @@ use crate::measurement::Measurement;
 use crate::responses::ResponseTable;
 use crate::{failure, work};
 
-/// Identifies a bearing from records, less baseline records if there are any; settings are JSON.
+/// Identifies a bearing from records, minus baseline records if there are any; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (tests, baseline, settings, threads))]
 pub fn bearing(
@@ -27,10 +27,11 @@ pub fn bearing(
         let dry = (!baseline.is_empty()).then(|| BearingData::of_records(&baseline, &how));
         identify_bearing(&BearingData::of_records(&tests, &how)?, dry.transpose()?.as_ref(), &how)
     };
-    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+    work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
-/// Identifies a bearing from tables of frequency responses likewise.
+/// Identifies a bearing from tables of frequency responses, minus baseline tables if there are any;
+/// settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (tests, baseline, settings, threads))]
 pub fn bearing_of_responses(
@@ -48,5 +49,5 @@ pub fn bearing_of_responses(
         let dry = (!baseline.is_empty()).then(|| BearingData::of_responses(&baseline, &how));
         identify_bearing(&BearingData::of_responses(&tests, &how)?, dry.transpose()?.as_ref(), &how)
     };
-    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+    work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }

@@ -13,12 +13,12 @@ use crate::measurement::Measurement;
 use crate::responses::ResponseTable;
 use crate::{answer, arrays, failure, work};
 
-/// Identified coefficients of a machine.
+/// Identified coefficients of a machine of named elements.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct IdentifiedElements(Arc<mechid::IdentifiedElements>);
 
-/// Reads the description of a machine (its name in messages, its JSON, the folder of its matrices):
-/// the settings of its identification, and the columns of its records, as JSON.
+/// Reads the description of a machine (its name in messages, its JSON, the folder of its matrices);
+/// returns the settings of its identification, and the columns of its records, as JSON.
 #[pyfunction]
 pub fn described_machine(
     py: Python<'_>,
@@ -40,7 +40,7 @@ pub fn described_machine(
 }
 
 /// Identifies a machine from records, tables of frequency responses or tables over the speed (their
-/// names and columns), and from the responses of its measured parts; settings are JSON.
+/// names and columns), and from the measured receptances of its parts; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (records, tables, speeds, parts, settings, threads))]
 pub fn identify_elements(
@@ -76,32 +76,32 @@ pub fn identify_elements(
 
 #[pymethods]
 impl IdentifiedElements {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, &*self.0)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.to_string()
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
     }
 
-    /// Names of the unknowns, and their covariance.
+    /// Returns the names of the unknowns, and their covariance.
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<arrays::Covariance<'py>> {
         arrays::covariance(py, &self.0.summary().parameter_covariance)
     }
 
-    /// M, C and K with the covariance of their entries.
+    /// Returns M, C and K with the covariance of their entries.
     fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
         work::brief(py, || self.0.machine()).map(Machine)
     }

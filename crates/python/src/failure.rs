@@ -1,4 +1,4 @@
-//! Failures as the exception `MechidError` of the Python package.
+//! Conversion of failures to the exception `MechidError` of the Python package.
 
 use std::error::Error;
 
@@ -18,9 +18,9 @@ use serde::de::DeserializeOwned;
 
 static EXCEPTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
-/// A failure of a library crate.
+/// Error of a library crate.
 pub trait Failure: Error {
-    /// Name of the crate, as the layers of nested failures are called.
+    /// Name of the crate, which identifies the layers of nested errors.
     const CRATE: &'static str;
 }
 
@@ -56,18 +56,18 @@ impl Failure for SimulateError {
     const CRATE: &'static str = "Simulate";
 }
 
-/// Returns the exception for a failure: its message, and crate and variant with all numbers, from which
-/// the Python class takes `code` and `fields`.
+/// Returns the exception for an error: its message, and crate and variant with all numbers; the
+/// Python class derives `code` and `fields` from them.
 pub fn exception<E: Failure>(py: Python<'_>, failure: &E) -> PyErr {
     raised(py, failure.to_string(), format!("{}({failure:?})", E::CRATE))
 }
 
-/// Returns the exception for threads that the system does not give.
+/// Returns the exception for threads that the system does not provide.
 pub fn no_threads(py: Python<'_>, failure: &ThreadPoolBuildError) -> PyErr {
     raised(py, failure.to_string(), "Threads".into())
 }
 
-/// Returns the exception for a panic, which only a defect of the program causes.
+/// Returns the exception for a panic, which is always a defect of the library.
 pub fn panicked(py: Python<'_>, message: &str) -> PyErr {
     raised(py, format!("internal error, please report it: {message}"), "Internal".into())
 }
@@ -79,7 +79,7 @@ pub fn panicked(py: Python<'_>, message: &str) -> PyErr {
 pub fn settings<T: DeserializeOwned>(py: Python<'_>, json: &str) -> PyResult<T> {
     serde_json::from_str(json).map_err(|wrong| {
         let message = wrong.to_string();
-        // The place in a text that the caller has not written helps nobody.
+        // A position in JSON that the caller did not write is not useful.
         let message = message.split(" at line ").next().unwrap_or_default().to_owned();
         raised(py, message, "Settings".into())
     })

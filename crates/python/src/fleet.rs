@@ -1,4 +1,4 @@
-//! Many records by one saved analysis: one part at a time, and the summary of all.
+//! Many records by one saved analysis: one part at a time, and the summary of all parts.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -14,17 +14,17 @@ use pyo3::types::PyBytes;
 
 use crate::{failure, work};
 
-/// Arguments with which the interpreter works for a fleet.
+/// Arguments with which the interpreter runs a worker process for a fleet.
 const WORKER: [&str; 3] = ["-m", "mechid", "fleet-worker"];
 
-/// A record of a fleet: its file and, of a file of many records, its name and its rows (from, to).
+/// Record of a fleet: its file and, in a file of many records, its name and its rows (from, to).
 type Place = (PathBuf, Option<(String, usize, usize)>);
 
 /// Values with their names.
 type Named<T> = Vec<(String, T)>;
 
-/// Checks an analysis (JSON), creates the folder of results, and returns the records of each part, and the paths
-/// that are left out.
+/// Checks an analysis (JSON) and creates the folder of results; returns the records of each part,
+/// and the excluded paths.
 #[pyfunction]
 pub fn fleet_begin(
     py: Python<'_>,
@@ -36,25 +36,25 @@ pub fn fleet_begin(
     let analysis: SavedAnalysis = failure::settings(py, analysis)?;
     let fleet = work::brief(py, || Fleet::new(analysis, &records, &folder, part_records))?;
     work::brief(py, || create_folder(folder))?;
-    let place = |FleetRecord { path, rows }: &FleetRecord| {
+    let location = |FleetRecord { path, rows }: &FleetRecord| {
         let rows =
             rows.as_ref().map(|record| (record.id.clone(), record.rows.start, record.rows.end));
         (path.clone(), rows)
     };
-    let parts = fleet.parts().iter().map(|part| part.records().iter().map(place).collect());
+    let parts = fleet.parts().iter().map(|part| part.records().iter().map(location).collect());
     Ok((parts.collect(), fleet.left_out().to_vec()))
 }
 
-/// Checks an analysis (JSON); returns the column that tells the records of a file apart.
+/// Checks an analysis (JSON); returns the column that identifies the records of a file.
 #[pyfunction]
 pub fn fleet_record_column(py: Python<'_>, analysis: &str) -> PyResult<Option<String>> {
     let analysis: SavedAnalysis = failure::settings(py, analysis)?;
     Ok(analysis.reading.record_column)
 }
 
-/// Computes the rows of some records unless they are there; returns what was done as JSON. The analysis
-/// is JSON, too. `isolation` is the interpreter of the processes that work on the records, and the memory, in
-/// GB, and the time, in s, that a record may take; without, they are worked on in this process.
+/// Computes the rows of some records unless they exist; returns a report as JSON. The analysis is
+/// JSON, too. `isolation` is the interpreter of the worker processes, with the memory, in GB, and
+/// the time, in s, per record; without it, the records are processed in this process.
 #[pyfunction]
 #[pyo3(signature = (records, analysis, folder, isolation))]
 pub fn fleet_part(
@@ -80,12 +80,12 @@ pub fn fleet_part(
             Isolation { record_memory_gb, record_seconds, ..Isolation::new(python, words) };
         part.run_isolated(&mut Worker::new(isolation, analysis)?, &folder)
     };
-    // One thread: the engine above decides how many parts there are at a time.
+    // One thread is used, because the engine that calls this decides how many parts run at a time.
     let done = work::watched(py, Some(1), || Ok(()), compute)?;
     failure::json(py, &done)
 }
 
-/// Identifies records, of which a name and named columns are given; returns their rows as the bytes of a
+/// Identifies records given by a name and named columns; returns their rows as the bytes of a
 /// Parquet file. The analysis is JSON.
 #[pyfunction]
 pub fn fleet_rows<'py>(
@@ -114,7 +114,7 @@ pub fn fleet_rows<'py>(
     Ok(PyBytes::new(py, &rows))
 }
 
-/// Gathers parts (JSON) that took so many seconds; returns the summary as text and as JSON.
+/// Combines parts (JSON) that took this many seconds; returns the summary as text and as JSON.
 #[pyfunction]
 pub fn fleet_summary(
     py: Python<'_>,

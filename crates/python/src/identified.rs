@@ -17,11 +17,11 @@ use crate::machine::Machine;
 use crate::measurement::Measurement;
 use crate::{answer, arrays, failure, work};
 
-/// An identified machine, and what it was identified from.
+/// Identified machine with the records of its identification.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Identified(pub Arc<mechid::Identified>);
 
-/// Identifies the machine behind the records; settings and the window to validate with are JSON.
+/// Identifies the machine from the records; settings and the window for validation are JSON.
 #[pyfunction]
 #[pyo3(signature = (records, settings, validate, threads))]
 pub fn identify(
@@ -43,15 +43,15 @@ pub fn identify(
     let find = move || -> Result<mechid::Identified, AnalysisError> {
         let mut identified = mechid::identify(&records, &how)?;
         if let Some((other, samples)) = validate {
-            let other = identified.validation_window(other, &samples)?;
-            identified.add_validation(&other)?;
+            let validation = identified.validation_window(other, &samples)?;
+            identified.add_validation(&validation)?;
         }
         Ok(identified)
     };
     work::watched(py, threads, || Ok(()), find).map(|identified| Identified(Arc::new(identified)))
 }
 
-/// A kind of response, measured and predicted.
+/// Kind of a response, measured values and predicted values.
 type Compared<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// Frequencies, force and displacement.
@@ -61,7 +61,7 @@ type Spectra<'py> = (
     Bound<'py, PyArray2<Complex<f64>>>,
 );
 
-/// Samples to predict.
+/// Samples of the record for validation.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Samples {
@@ -77,38 +77,38 @@ impl From<Samples> for ValidationWindow {
 
 #[pymethods]
 impl Identified {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, &*self.0)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.to_string()
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
     }
 
-    /// The page of the program's report, as HTML.
+    /// Returns the report of the program, as an HTML page.
     fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
         let settings = PageSettings { title, reconstruct_force: force, ..PageSettings::default() };
         let identified = Arc::clone(&self.0);
         work::watched(py, None, || Ok(()), move || page(&identified, &settings))
     }
 
-    /// Measured and predicted response of the first record.
+    /// Returns the measured and predicted responses of the first record.
     fn compared<'py>(&self, py: Python<'py>) -> PyResult<Vec<Compared<'py>>> {
         let identified = Arc::clone(&self.0);
-        let all = work::watched(py, None, || Ok(()), move || identified.compared())?;
-        let all = all.into_iter().map(|one| {
+        let compared = work::watched(py, None, || Ok(()), move || identified.compared())?;
+        let compared = compared.into_iter().map(|one| {
             let [measured, predicted] = [one.measured, one.predicted];
             Ok((
                 one.kind.to_string(),
@@ -116,10 +116,11 @@ impl Identified {
                 arrays::record(py, predicted)?,
             ))
         });
-        all.collect()
+        compared.collect()
     }
 
-    /// Frequencies in rad/s, and amplitudes of force and displacement on the lines fitted, in N and m.
+    /// Returns the frequencies in rad/s, and the amplitudes of force and displacement on the fitted
+    /// lines, in N and m.
     fn spectra<'py>(&self, py: Python<'py>) -> PyResult<Option<Spectra<'py>>> {
         let Some(data) = self.0.spectra() else { return Ok(None) };
         Ok(Some((
@@ -129,8 +130,8 @@ impl Identified {
         )))
     }
 
-    /// Frequencies in rad/s, and receptances of frequencies × motions · forces in m/N: measured where one
-    /// force acts alone, NaN elsewhere, and of the identified system.
+    /// Returns the frequencies in rad/s, and the receptances of frequencies × motions · forces in
+    /// m/N: measured (NaN unless only one force acts), and of the identified system.
     fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
         let identified = Arc::clone(&self.0);
         let compare = move || -> Result<_, AnalysisError> {
@@ -143,7 +144,7 @@ impl Identified {
             };
             let (n, model) = (data.dof(), identified.estimate().system()?);
             let models = model.receptances(data.omega())?;
-            // Without scale only the responses to the forces that acted are known.
+            // The scale is unknown, so only the responses to the forces that acted are known.
             let unknown: &[usize] = match &identified.summary().unscaled {
                 Some(unscaled) => &unscaled.degrees_of_freedom,
                 None => &[],
@@ -165,24 +166,24 @@ impl Identified {
         Ok((arrays::vector(py, omega), arrays::matrix(py, measured)?, arrays::matrix(py, model)?))
     }
 
-    /// Confidence interval of a parameter.
+    /// Returns the confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
         work::brief(py, || {
             Ok::<_, EstimateError>(self.0.estimate().parameter(name)?.interval(level)?)
         })
     }
 
-    /// Names of the parameters that were estimated, and their covariance.
+    /// Returns the names of the estimated parameters, and their covariance.
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<arrays::Covariance<'py>> {
         arrays::covariance(py, &self.0.covariance())
     }
 
-    /// The identified system with the covariance of its parameters.
+    /// Returns the identified system with the covariance of its parameters.
     fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
         work::brief(py, || self.0.machine()).map(Machine)
     }
 
-    /// Prediction of a record that was not fitted, as JSON.
+    /// Predicts a record that was not fitted, and returns the comparison as JSON.
     fn validate(
         &self,
         py: Python<'_>,
@@ -192,8 +193,8 @@ impl Identified {
         let samples: Samples = failure::settings(py, samples)?;
         let (identified, other) = (Arc::clone(&self.0), other.0.clone());
         let predict = move || {
-            let other = identified.validation_window(other, &samples.into())?;
-            identified.validate(&other)
+            let window = identified.validation_window(other, &samples.into())?;
+            identified.validate(&window)
         };
         failure::json(py, &work::watched(py, None, || Ok(()), predict)?)
     }

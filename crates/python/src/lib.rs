@@ -1,10 +1,10 @@
-//! The compiled half of the Python package `mechid`: the facade and the program, for `python/mechid`,
-//! which gives them the shape that users of NumPy expect.
+//! Compiled part of the Python package `mechid`: it exposes the facade and the program, and
+//! `python/mechid` gives them the interface that users of NumPy expect.
 //!
-//! Settings come and results go as the JSON that the program reads and prints; arrays are copied in
-//! and owned arrays handed out. Nothing is computed here. Work runs without the interpreter's lock, in
-//! a pool of threads of this process (`work`); failures and panics become `MechidError`
-//! (`failure`).
+//! Settings and results are the JSON that the program reads and prints; input arrays are copied,
+//! and output arrays are owned by Python. This crate contains no numerical method. Long calls run
+//! without the interpreter's lock, in a thread pool of this process (`work`); errors and panics
+//! become `MechidError` (`failure`).
 
 #![allow(unnameable_types, reason = "the classes are named from Python")]
 

@@ -1,4 +1,4 @@
-//! M, C and K, and how well they are known.
+//! Matrices M, C and K with their covariance.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -15,13 +15,13 @@ use pyo3::prelude::*;
 
 use crate::{arrays, failure, work};
 
-/// A system with the covariance of its parameters, where it was identified.
+/// System with the covariance of its parameters, if it was identified.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Machine(pub mechid::Machine);
 
 #[pymethods]
 impl Machine {
-    /// Takes M, C and K as exactly known.
+    /// Creates a machine with exactly known M, C and K.
     #[staticmethod]
     fn known(
         py: Python<'_>,
@@ -66,20 +66,21 @@ impl Machine {
         arrays::matrix(py, self.0.system().stiffness().clone())
     }
 
-    /// Rate matrix A and input matrix B of z = [x; ẋ], ż = A z + B F.
+    /// Returns the rate matrix A and input matrix B of z = [x; ẋ], ż = A z + B F.
     fn state_matrices<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 2]> {
         let system = self.0.system();
         let (rate, input) = py.detach(|| {
             let n = system.dof();
             let mut input = DMatrix::zeros(2 * n, n);
-            // In step units of one second.
+            // The step units are SI units for a step of one second.
             input.view_mut((n, 0), (n, n)).copy_from(&StateTransition::force_input(system, 1.0));
             (StateTransition::rate(system, 1.0), input)
         });
         Ok([arrays::matrix(py, rate)?, arrays::matrix(py, input)?])
     }
 
-    /// Receptances x_i / F_j at frequencies in rad/s, of frequencies × motions · forces.
+    /// Returns the receptances x_i / F_j at frequencies in rad/s, as frequencies × motions ·
+    /// forces.
     fn receptances<'py>(
         &self,
         py: Python<'py>,
@@ -94,21 +95,21 @@ impl Machine {
         arrays::matrix(py, flat)
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         let machine = self.0.clone();
         let draw = move || -> Result<String, ReportError> { Ok(machine.figure()?.to_svg()?) };
         work::watched(py, None, || Ok(()), draw)
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         let machine = self.0.clone();
         let draw = move || machine.styled_page(FigureStyle::default());
         work::watched(py, None, || Ok(()), draw)
     }
 
-    /// Modes as the program tells them: JSON and text.
+    /// Returns the modes as the program prints them: JSON and text.
     fn modal(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let machine = self.0.clone();
         let find = move || -> Result<_, AnalysisError> { ModalSummary::of(&machine) };
@@ -117,7 +118,7 @@ impl Machine {
     }
 }
 
-/// Finds some modes of a described machine of any size (its JSON): JSON and text.
+/// Computes some modes of a described machine of any size (its JSON); returns JSON and text.
 #[pyfunction]
 #[pyo3(signature = (description, count, near_hz))]
 pub fn selected_modes(

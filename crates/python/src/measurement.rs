@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use crate::arrays::{self, Named};
 use crate::{failure, work};
 
-/// Finds the column that a name means, with its unit or without, by its index counted from 0; `None` if none does.
+/// Returns the index, counted from 0, of the column with this name, with or without its unit;
+/// `None` if there is none.
 #[pyfunction]
 pub fn find_column(py: Python<'_>, names: Vec<String>, wanted: &str) -> PyResult<Option<usize>> {
     let columns = names.into_iter().map(|name| (name, vec![0.0]));
@@ -22,7 +23,7 @@ pub fn find_column(py: Python<'_>, names: Vec<String>, wanted: &str) -> PyResult
     })
 }
 
-/// Finds the first column that is called time, by its index counted from 0.
+/// Returns the index, counted from 0, of the first column that is called time.
 #[pyfunction]
 pub fn time_column(names: Vec<String>) -> Option<usize> {
     let columns = names.iter().map(|name| (name.clone(), vec![0.0]));
@@ -31,7 +32,8 @@ pub fn time_column(names: Vec<String>) -> Option<usize> {
     names.iter().position(|name| name == time)
 }
 
-/// Sampling rate, in Hz, of equally spaced instants in the unit that the name of their column states.
+/// Returns the sampling rate, in Hz, of equally spaced instants in the unit that the name of their
+/// column states.
 #[pyfunction]
 pub fn rate_of(py: Python<'_>, name: &str, instants: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
     let values = instants.as_array().to_vec();
@@ -39,7 +41,7 @@ pub fn rate_of(py: Python<'_>, name: &str, instants: PyReadonlyArray1<'_, f64>) 
     work::brief(py, || Ok::<_, IoError>(table.sampling(&TimeAxis::Column("1"), &["1"])?.rate_hz()))
 }
 
-/// Forces and responses of a machine, from a file or from arrays, and the window of them to use.
+/// Forces and responses of a machine, from a file or from arrays, and the window to use.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Measurement(pub mechid::Measurement);
 
@@ -77,7 +79,7 @@ impl Measurement {
         .map(Self)
     }
 
-    /// Takes another window (JSON) of the same record.
+    /// Returns the same record with another window (JSON).
     fn window(&self, py: Python<'_>, window: &str) -> PyResult<Self> {
         let window: Window = failure::settings(py, window)?;
         let whole = self.0.clone();
@@ -99,19 +101,19 @@ impl Measurement {
         self.0.sampling().rate_hz()
     }
 
-    /// Window as JSON.
+    /// Returns the window as JSON.
     #[getter]
     fn window_settings(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, self.0.window_settings())
     }
 
-    /// Columns as JSON.
+    /// Returns the columns as JSON.
     #[getter]
     fn channels(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, self.0.channels())
     }
 
-    /// Saved plan as JSON; `None` for arrays.
+    /// Returns the saved plan as JSON; `None` for arrays.
     #[getter]
     fn plan(&self, py: Python<'_>) -> PyResult<Option<String>> {
         self.0.plan().map(|plan| failure::json(py, &plan)).transpose()

@@ -1,4 +1,4 @@
-//! The response of a machine to the force of a record.
+//! Response of a machine to the force of a record.
 
 use mechid::Predict;
 use mechid::model::ResponseQuantity;
@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::measurement::Measurement;
 use crate::{failure, work};
 
-/// A predicted response, and its error against what was measured.
+/// Predicted response, and its error relative to the measured one.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Predicted(mechid::Predicted);
 
@@ -29,17 +29,17 @@ pub fn predict_record(
 
 #[pymethods]
 impl Predicted {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         failure::json(py, &self.0)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.to_string()
     }
 
-    /// Every kind of response.
+    /// Returns every kind of response.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
         let of = |kind| (kind, self.0.response().quantity(kind).clone());
         arrays::responses(py, ResponseQuantity::ALL.map(of).into())

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use pyo3::prelude::*;
 
-/// Runs the program with these arguments, the first of which is its name, and returns its exit code;
+/// Runs the program with these arguments, beginning with its name, and returns its exit code;
 /// `python` is the interpreter that runs it again for the records of a fleet.
 #[pyfunction]
 #[pyo3(signature = (arguments, python))]

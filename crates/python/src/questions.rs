@@ -1,4 +1,5 @@
-//! The questions whose answers are told and drawn: frequency responses, free decays, sweeps, inspection.
+//! Analyses whose results are an [`Answer`]: frequency responses, free decays, modes, sweeps,
+//! inspection.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,10 +30,10 @@ pub fn frf(
     let how: FrfSettings = failure::settings(py, settings)?;
     let records: Vec<mechid::Measurement> = records.iter().map(|record| record.0.clone()).collect();
     let find = move || mechid::frf_of_records(&records, &how);
-    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+    work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
-/// Finds the modes of a free decay; settings are JSON.
+/// Identifies the modes of a free decay; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (record, settings, threads))]
 pub fn decay(
@@ -43,11 +44,11 @@ pub fn decay(
 ) -> PyResult<Answer> {
     let how: DecaySettings = failure::settings(py, settings)?;
     let record = record.0.clone();
-    work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::of)
+    work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::new)
 }
 
-/// Finds the modes of a test with forces, of an ambient record, or of tables of frequency responses;
-/// settings are JSON, and diagrams are added on demand.
+/// Identifies the modes of a test with forces, of an ambient record, or of tables of frequency
+/// responses; settings are JSON, and diagrams are added on demand.
 #[pyfunction]
 #[pyo3(signature = (records, tables, settings, diagrams, threads))]
 pub fn modes(
@@ -72,10 +73,11 @@ pub fn modes(
         }
         Ok::<_, mechid::analysis::AnalysisError>(modes)
     };
-    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+    work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
-/// Compares two sets of modes, each a file, or a name and the JSON of a result: JSON and text.
+/// Compares two sets of modes, each given as a file, or as a name and the JSON of a result; returns
+/// JSON and text.
 #[pyfunction]
 pub fn compare_modes(
     py: Python<'_>,
@@ -104,11 +106,11 @@ pub fn inspect(py: Python<'_>, plan: &str, settings: &str) -> PyResult<Answer> {
     let plan: RecordPlan = failure::settings(py, plan)?;
     let how: InspectSettings = failure::settings(py, settings)?;
     let look = move || mechid::inspect(&plan.path, &plan.reading, &plan.window, &how);
-    work::watched(py, None, || Ok(()), look).map(Answer::of)
+    work::watched(py, None, || Ok(()), look).map(Answer::new)
 }
 
-/// Identifies a record, or a described experiment (a JSON file, or a name and a JSON text), at many sampling steps, and
-/// calls `progress` with the number of steps done.
+/// Identifies a record, or a described experiment (a JSON file, or a name and a JSON text), at many
+/// sampling steps, and calls `progress` with the number of completed steps.
 #[pyfunction]
 #[pyo3(signature = (record, experiment, settings, reference, progress, threads))]
 pub fn sweep(
@@ -150,5 +152,5 @@ pub fn sweep(
             work::watched(py, threads, tell, move || mechid::sweep(&experiment, &how, &step))?
         }
     };
-    Ok(Answer::of(answer))
+    Ok(Answer::new(answer))
 }

@@ -8,16 +8,16 @@ use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::answer::{self, Told as _};
+use crate::answer::{self, ResultOutput as _};
 use crate::machine::Machine;
 use crate::measurement::Measurement;
 use crate::{arrays, failure, work};
 
-/// The force that drove a machine, and how it was found.
+/// Reconstructed force, with the method and its settings.
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Reconstructed(Arc<mechid::Reconstructed>);
 
-/// Reconstructs the force that drove a machine; settings are JSON.
+/// Reconstructs the force that acted on a machine; settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (record, machine, settings, threads))]
 pub fn reconstruct(
@@ -38,22 +38,22 @@ type Lines<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<Complex<f64>>>
 
 #[pymethods]
 impl Reconstructed {
-    /// The result as the program prints it with `--json`.
+    /// Returns the JSON that the program prints with `--json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         self.0.json(py)
     }
 
-    /// The result as a person reads it.
+    /// Returns the text that the program prints.
     fn text(&self) -> String {
         self.0.text()
     }
 
-    /// The picture of the program, as SVG.
+    /// Returns the figure of the program, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
 
-    /// The picture as a page that answers, as HTML.
+    /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
     }
@@ -69,7 +69,7 @@ impl Reconstructed {
         error.map(|error| arrays::record(py, error.clone())).transpose()
     }
 
-    /// Frequencies in Hz, and complex amplitudes of the force.
+    /// Returns the frequencies in Hz, and the complex amplitudes of the force.
     fn spectrum<'py>(&self, py: Python<'py>) -> PyResult<Lines<'py>> {
         let spectrum = self.0.force().spectrum();
         let lines: Vec<usize> = match self.0.lines() {

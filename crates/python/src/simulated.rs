@@ -1,5 +1,5 @@
-//! Responses: of a described experiment, of a machine to a force by a scheme, and exactly between
-//! samples; and excitations.
+//! Simulations: of a described experiment, of the response to a force by a scheme, and of the exact
+//! response between samples; and excitations.
 
 use std::path::{Path, PathBuf};
 
@@ -17,15 +17,15 @@ use crate::arrays::{self, Named};
 use crate::machine::Machine;
 use crate::{failure, work};
 
-/// Record of a simulated experiment: scheme, sampling rate, machine (none of a sparse one), then force and responses as the
-/// sensors tell them, then without their noise.
+/// Record of a simulated experiment: scheme, sampling rate, machine (`None` for a sparse one), then
+/// measured force and responses, then the same without noise.
 type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py>);
 
-/// The force, and each kind of response.
+/// Force, and each kind of response.
 type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
 
-/// Reads a described experiment: a JSON file, from whose folder on it names other files, or a JSON text and
-/// its name in messages.
+/// Reads a described experiment: a JSON file, to whose folder the names of other files are
+/// relative, or a JSON text and its name in messages.
 pub fn described(file: &Path, text: Option<&str>) -> Result<Experiment, IoError> {
     match text {
         Some(text) => Experiment::parse(file.display().to_string(), text),
@@ -68,8 +68,8 @@ pub fn integrate<'py>(
     responses(py, work::watched(py, None, || Ok(()), step)?)
 }
 
-/// Computes the exact response of a machine to a force that is held or linear between its samples;
-/// assumption and extent are JSON.
+/// Computes the exact response of a machine to a force that is constant or linear between its
+/// samples; assumption and extent are JSON.
 #[pyfunction]
 #[pyo3(signature = (machine, force, fs, between_samples, extent, start))]
 pub fn predict<'py>(
@@ -97,7 +97,8 @@ pub fn predict<'py>(
     responses(py, work::watched(py, None, || Ok(()), step)?)
 }
 
-/// One period, its lines, amplitudes and phases, RMS value, peak between samples too, crest factor.
+/// One period, its lines, amplitudes and phases, RMS value, peak including values between samples,
+/// and crest factor.
 type Sampled<'py> = (
     Bound<'py, PyArray1<f64>>,
     Vec<usize>,
@@ -106,8 +107,8 @@ type Sampled<'py> = (
     (f64, f64, f64),
 );
 
-/// Makes a multisine: phases by a law, searched for a low crest factor from so many starts; its level
-/// is a quantity (`amplitude`, `rms` or `peak`) and its value.
+/// Creates a multisine: with phases by a law, or optimised for a low crest factor from this many
+/// starting points; its level is a quantity (`amplitude`, `rms` or `peak`) and its value.
 #[pyfunction]
 pub fn multisine<'py>(
     py: Python<'py>,

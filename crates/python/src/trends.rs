@@ -1,4 +1,4 @@
-//! Studies by simulation, and the results of many records side by side.
+//! Studies by simulation, and comparison of the results of many records.
 
 use std::path::PathBuf;
 
@@ -11,8 +11,9 @@ use pyo3::prelude::*;
 
 use crate::{failure, work};
 
-/// Simulates the runs of a study into a Parquet file: an experiment (a JSON file, or a name and a JSON text),
-/// and so many seeds or the values of some fields. Returns the summary as text and as JSON.
+/// Simulates the runs of a study into a Parquet file: an experiment (a JSON file, or a name and a
+/// JSON text), and a number of seeds or the values of some fields. Returns the summary as text and
+/// as JSON.
 #[pyfunction]
 #[pyo3(signature = (file, text, runs, fields, out))]
 pub fn fleet_simulate(

@@ -1,4 +1,5 @@
-//! Work without the interpreter's lock, in threads of this process, that Ctrl-C ends.
+//! Computation without the interpreter's lock, in threads of this process, which Ctrl-C can
+//! interrupt.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,14 +13,14 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::{self, Failure};
 
-/// Time between two looks at the signals that the interpreter has received.
+/// Time between two checks for signals that the interpreter has received.
 const POLL: Duration = Duration::from_millis(50);
 
-/// The pool of the process of this number. A forked child inherits the record of a pool whose threads
-/// it does not have, and makes its own.
+/// Pool of the process with this identifier. A forked child inherits the record of a pool whose
+/// threads it does not have, and therefore creates another pool.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Does short work on the calling thread, without the interpreter's lock.
+/// Runs a short computation on the calling thread, without the interpreter's lock.
 ///
 /// # Errors
 /// `MechidError` for a failure or a panic of `work`.
@@ -30,14 +31,14 @@ pub fn brief<T: Send, E: Failure + Send>(
     outcome(py, py.detach(|| catch_unwind(AssertUnwindSafe(work))))
 }
 
-/// Does work in the pool of this process, or in one of `threads` threads of its own, and calls `poll`
-/// with the lock now and then.
+/// Runs a computation in the pool of this process, or in a separate pool of `threads` threads, and
+/// regularly calls `poll` with the lock.
 ///
-/// Where `poll` fails or Ctrl-C is pressed, the call returns at once; what it has begun runs to its end
-/// in the background, and the result is dropped.
+/// If `poll` fails or Ctrl-C is pressed, the call returns at once; the computation continues to its
+/// end in the background, and its result is dropped.
 ///
 /// # Errors
-/// `MechidError` for a failure or a panic of `work`, `KeyboardInterrupt`, and what `poll` gives.
+/// `MechidError` for a failure or a panic of `work`, `KeyboardInterrupt`, and errors of `poll`.
 pub fn watched<T: Send + 'static, E: Failure + Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -50,7 +51,7 @@ pub fn watched<T: Send + 'static, E: Failure + Send + 'static>(
     };
     let (done, mut end) = sync_channel(1);
     pool.spawn(move || {
-        // Nobody waits any more after Ctrl-C.
+        // After Ctrl-C there is no receiver any more, so a failed send is ignored.
         let _ = done.send(catch_unwind(AssertUnwindSafe(work)));
     });
     loop {
@@ -94,7 +95,7 @@ fn made(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
 }
 
 fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
-    // The lock is held as long as a pool takes to make, without calling Python.
+    // The mutex is held only while a pool is created, and Python is not called meanwhile.
     let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = process::id();
     match known.take() {
@@ -103,7 +104,7 @@ fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
             Ok(pool)
         }
         stale => {
-            // Its threads are not in this process: there is nothing to end.
+            // The threads of the inherited pool are not in this process, so it must not be dropped.
             std::mem::forget(stale);
             let pool = made(py, 0)?;
             *known = Some((process, Arc::clone(&pool)));
@@ -112,7 +113,7 @@ fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
     }
 }
 
-/// Leaves a pool whose threads are busy to itself: the next call makes another one.
+/// Releases a pool whose threads are busy: the next call creates another one.
 fn abandon(pool: &Arc<ThreadPool>) {
     let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if known.as_ref().is_some_and(|(_, shared)| Arc::ptr_eq(shared, pool)) {
