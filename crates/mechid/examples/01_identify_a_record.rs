@@ -1,4 +1,4 @@
-//! Reads the example record and finds mass, damping and stiffness, as `mechid identify` does.
+//! Reads the example record and identifies mass, damping and stiffness, as `mechid identify` does.
 //!
 //! `cargo run --package mechid --example 01_identify_a_record`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -12,14 +12,14 @@ use mechid::model::ResponseQuantity;
 use mechid::spectra::{Lines, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // The record lies in the repository; put the path of your own here.
+    // The record is part of the repository; replace it by the path of your own record.
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
     let table = Table::read(file)?;
     let time = TimeAxis::Column("time");
     let force = table.record(&time, &["force"])?;
     let displacement = table.record(&time, &["displacement"])?;
 
-    // Two periods of 256 samples; the excitation drives lines 4 to 60.
+    // The record has two periods of 256 samples; the excitation is on lines 4 to 60.
     let period = force.sampling().with_len(256)?;
     let lines = Lines::new(period, 4..=60)?;
     let periods =

@@ -1,5 +1,5 @@
-//! Five time-stepping schemes on one machine: the natural frequency that each of them
-//! gives it, against the exact response.
+//! Compares the natural frequency of one machine in the simulations of five time-stepping schemes
+//! with the exact response.
 //!
 //! `cargo run --package mechid --example 02_compare_schemes`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -16,7 +16,7 @@ use mechid::signal::{Multisine, Phases, Record, Sampling};
 use mechid::spectra::FrequencyData;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // Ten samples per natural period.
+    // The sampling rate is ten samples per natural period.
     let machine = Sdof::from_modal(10.0, 0.05, 10.0)?.system();
     let sampling = Sampling::new(std::f64::consts::TAU / 100.0, 512)?;
     let force = Multisine::flat(20..=90, 1.0, Phases::Schroeder)?.sample(sampling)?;
@@ -37,7 +37,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The machine that explains the displacement best.
+/// Identifies the machine from the displacement and prints its natural frequency.
 fn show(name: &str, force: &Record, response: &Response) -> Result<(), Box<dyn Error>> {
     let lines = 20..=90;
     let motion = response.displacement();

@@ -1,4 +1,5 @@
-//! Identifies a machine in one experiment, then finds an unknown force from another response.
+//! Identifies a machine in one experiment, then reconstructs an unknown force from another
+//! response.
 //!
 //! `cargo run --package mechid --example 03_find_the_force`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -15,7 +16,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let machine = Sdof::new(10.0, 180.0, 5000.0)?.system();
     let sampling = Sampling::new(0.01, 512)?;
 
-    // The experiment: a known multisine.
+    // The experiment has a known multisine.
     let excitation = Multisine::flat(1..=120, 5.0, Phases::Schroeder)?.sample(sampling)?;
     let response = mechid::exact_periodic(&machine, &excitation)?;
     let motion = response.displacement();
@@ -23,7 +24,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         FrequencyData::from_records(&excitation, motion, ResponseQuantity::Displacement, 1..=120)?;
     let identified = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
 
-    // At work: an unbalance on line 40, which nobody measures.
+    // In operation, an unbalance acts on line 40, which is not measured.
     let unbalance = Multisine::flat([40], 30.0, Phases::Zero)?.sample(sampling)?;
     let at_work = mechid::exact_periodic(&machine, &unbalance)?;
     let found = mechid::force::continuous(&identified, &at_work)?;

@@ -1,5 +1,5 @@
-//! Design of an excitation, measurement, and a machine with intervals: a multisine of low crest factor,
-//! eight measured periods, and what they tell.
+//! Designs a multisine of low crest factor, simulates eight measured periods, and identifies the
+//! machine with confidence intervals.
 //!
 //! `cargo run --package mechid --example 04_design_measure_identify`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -14,7 +14,7 @@ use mechid::signal::{CrestSearch, Multisine, Phases, Sampling, Spectrum, measure
 use mechid::spectra::{Lines, Pooling, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // Around an expected 20 Hz: lines of 0.5 Hz from 5 to 40 Hz, 256 Hz for 2 s.
+    // The expected frequency is about 20 Hz: lines of 0.5 Hz from 5 to 40 Hz, 256 Hz for 2 s.
     let sampling = Sampling::new(1.0 / 256.0, 512)?;
     let schroeder = Multisine::flat(10..=80, 2.0, Phases::Schroeder)?;
     let designed = CrestSearch { starts: 2, seed: 1 }.minimise(&schroeder)?;
@@ -24,7 +24,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let band = measures::effective_band(&Spectrum::of(&force), 0, 20.0)?;
     println!("the force covers {} to {} Hz", band.low_hz, band.high_hz);
 
-    // The experiment: eight periods of the steady state, noise of 5 % on the displacement.
+    // The experiment has eight periods of the steady state, with noise of 5 % on the displacement.
     let truth = Sdof::from_modal(40.0, 0.03, std::f64::consts::TAU * 20.0)?.system();
     let steady = mechid::exact_periodic(&truth, &force)?;
     let level = NoiseLevel::FractionOfRms(0.05);

@@ -1,5 +1,5 @@
-//! Noise that is not white: what least squares, instruments and weights make of a displacement
-//! with most of it at low frequencies.
+//! Compares least squares, instrumental variables and weighted estimates for a displacement whose
+//! noise is strongest at low frequencies.
 //!
 //! `cargo run --package mechid --example 05_weigh_the_noise`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -18,7 +18,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let sampling = Sampling::new(1.0 / 128.0, 512)?;
     let force = Multisine::flat(4..=120, 5.0, Phases::Schroeder)?.sample(sampling)?;
 
-    // Sixteen periods; the noise falls above 2 Hz.
+    // The record has sixteen periods, with noise that decreases above 2 Hz.
     let steady = mechid::exact_periodic(&truth, &force)?.displacement().repeated(16)?;
     let (level, slow) = (NoiseLevel::FractionOfRms(0.3), Colour::LowPass { corner_hz: 2.0 });
     let displacement = noise::add(&steady, level, slow, 3)?;
@@ -31,7 +31,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     show("least squares", &equation_error(&periods.mean()?, &unknowns)?)?;
     let (first, second) = periods.halves()?;
     show("instruments", &instrumental_variables(&first, &second, &unknowns)?)?;
-    // Without weights the noise is taken as white; with them, as what the periods scatter by.
+    // Without weights the noise is assumed white; the weights come from the scatter of the periods.
     show("likelihood, white noise", &output_error(&periods.mean()?, &unknowns)?.estimate)?;
     let weighted = output_error(&periods.mean_with_noise(Pooling::Neighbours(2))?, &unknowns)?;
     show("likelihood, weighted", &weighted.estimate)?;
@@ -42,7 +42,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Each parameter with its distance from the truth, in standard errors.
+/// Prints each parameter with its deviation from the true value, in standard errors.
 fn show(name: &str, found: &Estimate) -> Result<(), Box<dyn Error>> {
     println!("{name}");
     for (parameter, truth) in [("m", 10.0), ("c", 60.0), ("k", 4.0e4)] {

@@ -1,5 +1,5 @@
-//! The force behind a noisy motion: line by line where its lines are known, by shrinkage where they
-//! are not, by a Kalman smoother where there is no period.
+//! Reconstructs the force from a noisy response: line by line if its lines are known, by shrinkage
+//! if they are not, by a Kalman smoother without periodicity.
 //!
 //! `cargo run --package mechid --example 06_force_through_noise`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -24,7 +24,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let measured = Measurement::from_record(ResponseQuantity::Displacement, noisy);
 
     let (all, unknown) = ((1..128).collect::<Vec<_>>(), Noise::Unknown);
-    // On all lines the noise of the high ones comes back multiplied by ω²m.
+    // On all lines, the factor ω²m amplifies the noise at high frequencies.
     let naive = frequency_domain(&machine, &measured, &[0], &all, &unknown)?;
     show("every line, as it stands", &naive, &truth)?;
     let known = frequency_domain(&machine, &measured, &[0], &lines, &Noise::OutsideLines)?;

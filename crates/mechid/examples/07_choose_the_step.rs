@@ -1,4 +1,5 @@
-//! Choice of the step of a scheme: how long it may be, and how far period and damping are off before.
+//! Chooses the step of a scheme: its limit of stability, and the errors of period and damping below
+//! it.
 //!
 //! `cargo run --package mechid --example 07_choose_the_step`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
@@ -11,11 +12,11 @@ use mechid::integrate::{
 };
 use mechid::model::Sdof;
 
-/// A period this much too long is accepted.
+/// Accepted relative error of the period.
 const ACCEPTED: f64 = 0.01;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // 12 Hz, damping ratio 0.02.
+    // The machine has 12 Hz and a damping ratio of 0.02.
     let period = 1.0 / 12.0;
     let machine = Sdof::from_modal(1.0, 0.02, std::f64::consts::TAU / period)?.system();
     let wilson = WilsonTheta::new(1.4)?;
@@ -44,8 +45,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The longest step, in periods, whose period is right to [`ACCEPTED`]: halved until it is, then
-/// bisected.
+/// Returns the longest step, in periods, at which the error of the period is at most [`ACCEPTED`]:
+/// by halving, then by bisection.
 fn longest(scheme: &dyn Scheme) -> Result<f64, IntegrateError> {
     let off = |found: Accuracy| found.period_elongation.map_or(f64::INFINITY, f64::abs);
     let good = |step: f64| Ok::<_, IntegrateError>(off(accuracy(scheme, 0.02, step)?) <= ACCEPTED);

@@ -1,4 +1,4 @@
-//! The eight coefficients of an oil film: two shakers at once, each on lines of its own, and two
+//! Identifies the eight coefficients of an oil film from two shakers on interleaved lines and two
 //! noisy displacements.
 //!
 //! `cargo run --package mechid --example 08_identify_a_bearing`
@@ -29,7 +29,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     };
     let machine = JournalBearing::new(MASS, film, KyxSign::Plus)?.system();
 
-    // Lines 10 to 300 of 2 Hz, dealt out in turn to the shakers in x and y.
+    // Lines 10 to 300 of 2 Hz are assigned in turn to the shakers in x and y.
     let sampling = Sampling::new(1.0 / 2048.0, 1024)?;
     let used: Vec<usize> = (10..=300).collect();
     let shakers = lines::interleaved(&used, 2)?
@@ -40,7 +40,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let steady = mechid::exact_periodic(&machine, &force)?.displacement().repeated(10)?;
     let displacement = noise::add_white(&steady, NoiseLevel::SnrDb(30.0), 11)?;
 
-    // The mass is weighed; the rest is found.
+    // The mass is known by weighing; the other parameters are estimated.
     let periods = RepeatedPeriods::new(
         &Lines::new(sampling, used)?,
         &force.repeated(10)?,
@@ -57,7 +57,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
             hz.value, hz.standard_error, ratio.value, ratio.standard_error
         );
     }
-    // The cross-coupling that can drive a whirl.
+    // This cross-coupling can cause a whirl.
     let whirl = 0.5 * (found.parameter("k12")?.value - found.parameter("k21")?.value);
     println!("skew part of the stiffness: {whirl:.3e} N/m, true 1.6e7 N/m");
     Ok(())

@@ -1,4 +1,5 @@
-//! Identification of a file, a machine with intervals and checks, and the force, in four statements.
+//! Identifies a machine from a file, with intervals and checks, and reconstructs the force, in four
+//! statements.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 use mechid::{
@@ -9,7 +10,7 @@ use mechid::{
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
     let channels = Channels::new("force", Displacement, "displacement");
-    // The second of the two periods is kept for validation.
+    // The second of the two periods is used for validation.
     let other = Measurement::open(rig, &channels)?.window(Window {
         start: 257,
         period: Some(256),

@@ -1,4 +1,5 @@
-//! A record too long to be held: it is read in chunks, as often as the fit needs it.
+//! Identifies a machine from a record that does not fit into memory: it is read in chunks,
+//! repeatedly.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 use mechid::analysis::measurement::IN_MEMORY_SAMPLES;
@@ -9,7 +10,8 @@ use mechid::{Channels, Displacement, Identify, LeastSquares, Measurement};
 
 /// Runs the example.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // Three hundred thousand samples: a period of a multisine and its exact response, again and again.
+    // The record has three hundred thousand samples: a repeated period of a multisine and its exact
+    // response.
     let period = Sampling::from_rate_hz(128.0, 1024)?;
     let periods = 300;
     let machine = Sdof::from_modal(25.0, 0.05, 75.0)?.system();

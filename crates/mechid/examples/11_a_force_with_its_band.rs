@@ -1,4 +1,5 @@
-//! Identification of an uncertain machine from a noisy test, and an unknown force with its band.
+//! Identifies an uncertain machine from a noisy test, and reconstructs an unknown force with its
+//! confidence band.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 use mechid::model::Sdof;
@@ -15,14 +16,14 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         Ok(Record::new(force.sampling(), response.displacement().data() + noise.data())?)
     };
 
-    // The test: eight periods under a known force.
+    // The test has eight periods under a known force.
     let known = Multisine::flat(lines::band(period, 2.0, 30.0), 2.0, Phases::Schroeder)?;
     let known = known.sample(period)?.repeated(8)?;
     let x = measured(&known, 1)?;
     let test = Measurement::from_records(&known, &[(Displacement, &x)])?.period(256)?;
     let found = mechid::identify(&[test], &Identify::spectra(MaximumLikelihood))?;
 
-    // The run: another force, which nobody measured.
+    // In operation, another force acts, which is not measured.
     let truth = Multisine::flat([6, 11, 23], 5.0, Phases::Random { seed: 3 })?.sample(period)?;
     let x = measured(&truth, 2)?;
     let columns = [("x", x.channel(0))];

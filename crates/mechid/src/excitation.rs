@@ -1,4 +1,4 @@
-//! Multisines for a test with one or several inputs, and how good they are.
+//! Design of multisines for a test with one or several inputs, and measures of their quality.
 
 use std::fmt;
 
@@ -10,10 +10,10 @@ use mechid_signal::{
 };
 use serde::Serialize;
 
-/// Lines weaker than this fraction of the strongest are taken as rounding.
+/// Maximum amplitude, relative to the strongest line, of a line that counts as rounding.
 const FLOOR: f64 = 1e-9;
 
-/// The effective band ends where the lines are this much weaker than the strongest, in dB.
+/// Level of the lines at the ends of the effective band below the strongest line, in dB.
 const DROP_DB: f64 = 20.0;
 
 /// Design of the excitation of a test.
@@ -39,9 +39,9 @@ pub struct ExcitationDesign {
     pub lines: Vec<usize>,
     /// Amplitude of the first line, in N.
     pub amplitude: f64,
-    /// Slope of the amplitudes from the first line on, in dB per decade.
+    /// Slope of the amplitudes after the first line, in dB per decade.
     pub slope_db: f64,
-    /// Law of the phases; random ones of a further input have a seed of their own.
+    /// Law of the phases; random phases of further inputs have other seeds.
     pub phases: Phases,
     /// Number of starting points of a search for phases of low crest factor; 0 for no search.
     pub starts: usize,
@@ -51,16 +51,16 @@ pub struct ExcitationDesign {
     pub inputs: usize,
     /// Separation of several inputs.
     pub separation: Separation,
-    /// Level of each input; `None`: that of the amplitudes.
+    /// Level of each input; `None`: the level that follows from the amplitudes.
     pub level: Option<ExcitationLevel>,
 }
 
-/// Ways to tell the responses to several inputs apart.
+/// Methods to separate the responses to several inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separation {
-    /// Each input has lines of its own, dealt out in turn: one experiment.
+    /// Interleaved lines: each input has separate lines, assigned in turn, in one experiment.
     Interleaved,
-    /// All inputs share all lines: as many experiments as inputs.
+    /// All inputs have the same lines: as many experiments as inputs.
     Orthogonal(Mixing),
 }
 
@@ -69,7 +69,7 @@ pub enum Separation {
 pub enum ExcitationLevel {
     /// RMS value, in N.
     Rms(f64),
-    /// Largest absolute value, between samples too, in N.
+    /// Largest absolute value, including values between samples, in N.
     Peak(f64),
 }
 
@@ -100,11 +100,11 @@ impl ExcitationDesign {
         }
     }
 
-    /// Makes the inputs and samples a period of each, experiment by experiment.
+    /// Creates the inputs and samples one period of each, experiment by experiment.
     ///
     /// # Errors
-    /// [`SignalError`] for lines beyond half the sampling rate, a level that is not positive, inputs that
-    /// cannot be mixed, or more inputs than lines.
+    /// [`SignalError`] for lines beyond half the sampling rate, a level that is not positive,
+    /// inputs that cannot be mixed, or more inputs than lines.
     pub fn inputs(&self, sampling: Sampling) -> Result<Vec<DesignedInput>, SignalError> {
         let chosen = self.lines.clone();
         if self.inputs == 1 {
@@ -124,10 +124,8 @@ impl ExcitationDesign {
         let mut designed = Vec::new();
         for (e, inputs) in (1..).zip(experiments) {
             for (k, multisine) in (1..).zip(inputs) {
-                let name = match single {
-                    true => format!("force_{k}"),
-                    false => format!("experiment_{e}_force_{k}"),
-                };
+                let name =
+                    if single { format!("force_{k}") } else { format!("experiment_{e}_force_{k}") };
                 designed.push(self.sampled(name, multisine, sampling)?);
             }
         }
@@ -140,7 +138,7 @@ impl ExcitationDesign {
         multisine: Multisine,
         sampling: Sampling,
     ) -> Result<DesignedInput, SignalError> {
-        // After mixing, so that the peak is that of the signal written.
+        // The level is set after mixing, because mixing changes the peak.
         let multisine = match self.level {
             Some(ExcitationLevel::Rms(rms)) => multisine.with_rms(rms)?,
             Some(ExcitationLevel::Peak(peak)) => multisine.with_peak(peak)?,
@@ -150,12 +148,13 @@ impl ExcitationDesign {
         Ok(DesignedInput { name, multisine, period })
     }
 
-    /// Makes the multisine of one input before mixing; inputs differ by their seeds.
+    /// Creates the multisine of one input before mixing; inputs differ by their seeds.
     fn input(&self, lines: Vec<usize>, input: u64) -> Result<Multisine, SignalError> {
         let seed = self.seed.wrapping_add(input);
         let law = match &self.phases {
             Phases::Random { seed } => Phases::Random { seed: seed.wrapping_add(input) },
-            // The search of a further input must not begin, and end, where the first one did.
+            // The search for a further input begins at other phases, otherwise all inputs would be
+            // equal.
             _ if self.starts > 0 && input > 0 => Phases::Random { seed },
             law => law.clone(),
         };
@@ -170,7 +169,7 @@ impl ExcitationDesign {
     }
 }
 
-/// Measures of an excitation; `Display` writes them for a person, `Serialize` the same for programs.
+/// Measures of an excitation; `Display` writes them as text, `Serialize` as data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExcitationSummary {
     /// Number of samples in a period.
@@ -196,22 +195,23 @@ pub struct InputMeasures {
     pub name: String,
     /// RMS value, in N.
     pub rms: f64,
-    /// Largest absolute force, between samples too, in N.
+    /// Largest absolute force, including values between samples, in N.
     pub peak: f64,
-    /// Peak over RMS, a pure number.
+    /// Ratio of peak to RMS value, a pure number.
     pub crest_factor: f64,
-    /// Crest factor of the samples alone.
+    /// Crest factor of the samples only.
     pub sampled_crest_factor: f64,
-    /// Geometric over arithmetic mean of the power of the lines asked for, a pure number.
+    /// Ratio of the geometric to the arithmetic mean of the power of the designed lines, a pure
+    /// number.
     pub spectral_flatness: f64,
     /// Order of persistent excitation.
     pub persistent_excitation_order: usize,
-    /// Lower end of the band in which the lines are at most 20 dB below the strongest, in Hz.
+    /// Lower end of the band whose lines are at most 20 dB below the strongest line, in Hz.
     pub effective_band_low_hz: f64,
-    /// Upper end of that band, in Hz.
+    /// Upper end of this band, in Hz.
     pub effective_band_high_hz: f64,
-    /// Largest circular autocorrelation of the samples at any lag but zero, as a ratio to that at
-    /// zero.
+    /// Largest circular autocorrelation of the samples at a lag other than zero, as a ratio to the
+    /// value at zero.
     pub autocorrelation_side_lobe: f64,
     /// Numbers of the lines, in rising order.
     pub lines: Vec<usize>,
@@ -222,7 +222,7 @@ pub struct InputMeasures {
 }
 
 impl ExcitationSummary {
-    /// Measures inputs, which have one time axis.
+    /// Computes the measures of inputs, which must have one time axis.
     ///
     /// # Errors
     /// [`SignalError`] if there is no input, or one has no power.
@@ -234,13 +234,13 @@ impl ExcitationSummary {
             rate_hz: sampling.rate_hz(),
             period_s: sampling.duration(),
             line_spacing_hz: sampling.line_spacing_hz(),
-            channels: inputs.iter().map(InputMeasures::of).collect::<Result<_, _>>()?,
+            channels: inputs.iter().map(InputMeasures::new).collect::<Result<_, _>>()?,
         })
     }
 }
 
 impl InputMeasures {
-    fn of(input: &DesignedInput) -> Result<Self, SignalError> {
+    fn new(input: &DesignedInput) -> Result<Self, SignalError> {
         let (multisine, period) = (&input.multisine, &input.period);
         let spectrum = Spectrum::of(period);
         let band = measures::effective_band(&spectrum, 0, DROP_DB)?;
@@ -305,10 +305,11 @@ mod figure {
 
     use super::DesignedInput;
 
-    /// Points a drawn period has at least: enough to see what it does between its samples.
+    /// Minimum number of points of a drawn period: enough to show the force between its samples.
     const DRAWN_POINTS: usize = 4096;
 
-    /// Draws one period of each input, force (N) against time (s), above the amplitudes (N) of the lines.
+    /// Draws one period of each input, force (N) over time (s), above the amplitudes (N) of the
+    /// lines.
     ///
     /// # Errors
     /// [`SignalError`] if a period cannot be interpolated.
@@ -316,7 +317,7 @@ mod figure {
         let mut figure = Figure::new("Multisine");
         let mut lines = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Amplitude", "N"));
         for DesignedInput { name, multisine, period } in inputs {
-            // A single curve needs no name.
+            // A single curve does not need a name.
             let name = if inputs.len() == 1 { "" } else { name.as_str() };
             let factor = DRAWN_POINTS.div_ceil(period.len());
             let fine = refine(period, factor, Interpolation::BandLimited)?;

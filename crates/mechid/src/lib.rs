@@ -1,4 +1,5 @@
-//! Measure a force and a response, get the machine: the rooms of the workspace under one roof.
+//! Identification of mechanical systems from measured forces and responses: the facade of the
+//! workspace.
 //!
 //! ```
 //! use mechid::{Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct};
@@ -6,38 +7,38 @@
 //! let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
 //! let channels = Channels::new("force", Displacement, "displacement");
 //! let test = Measurement::open(rig, &channels)?.period(256)?;
-//! let found = mechid::identify(&[test.clone()], &Identify::spectra(MaximumLikelihood))?;
-//! println!("{found}");
+//! let identified = mechid::identify(&[test.clone()], &Identify::spectra(MaximumLikelihood))?;
+//! println!("{identified}");
 //!
 //! // The same machine under an unknown force.
-//! let force = mechid::reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
+//! let force = mechid::reconstruct(&test, &identified.machine()?, &Reconstruct::auto())?;
 //! println!("{force}");
-//! assert!(found.summary().fit.unexplained_motion < Some(0.01));
+//! assert!(identified.summary().fit.unexplained_motion < Some(0.01));
 //! # Ok::<(), mechid::analysis::AnalysisError>(())
 //! ```
 //!
-//! The functions at the root answer the questions one asks of a record; their settings are plain
-//! structs, and their results print themselves. The rooms behind them are modules:
+//! The functions at the root analyse records; their settings are plain structs, and their results
+//! implement `Display`. The other crates are available as modules:
 //!
-//! | Module | What is in it |
+//! | Module | Contents |
 //! |---|---|
 //! | [`signal`] | time axes, records, spectra, multisines and other excitations |
-//! | [`numerics`] | values with intervals, least squares, Gauss-Newton steps, decompositions that end |
+//! | [`numerics`] | values with intervals, least squares, Gauss-Newton steps, decompositions |
 //! | [`model`] | M, C, K; modes and receptance |
-//! | [`bearing`] | journal bearings from their geometry: film force, coefficients, threshold of instability |
+//! | [`bearing`] | journal bearings from their geometry: film force, coefficients, stability |
 //! | [`integrate`] | the response by time-stepping schemes, linear and nonlinear |
 //! | [`spectra`] | spectral lines of records, their noise, frequency responses |
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
 //! | [`modal`] | modes of any set of sensors, free decays |
-//! | [`nonlinear`] | nonlinear springs and dampers beside a linear system |
+//! | [`nonlinear`] | nonlinear springs and dampers of a system |
 //! | [`checks`] | checks of data and residuals, with verdicts and p-values |
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |
 //! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
-//! | [`excitation`] | multisines for a test with one or several inputs, and how good they are |
-//! | [`simulation`] | the record that a described experiment gives, and its summary |
+//! | [`excitation`] | multisines for a test with one or several inputs, and their quality |
+//! | [`simulation`] | the record of a described experiment, and its summary |
 //! | [`selected_modes`] | some of the modes of a large machine |
-//! | [`stability`] | time-stepping schemes side by side |
+//! | [`stability`] | comparison of time-stepping schemes |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
 
@@ -46,7 +47,7 @@ pub mod selected_modes;
 pub mod simulation;
 pub mod stability;
 
-/// The Rust of the README and of the book, compiled and run with the documentation tests.
+/// Rust code of the README and of the book, compiled and run with the documentation tests.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../../../README.md")]

@@ -9,28 +9,28 @@ use mechid_model::SparseSystem;
 use mechid_signal::message;
 use serde::Serialize;
 
-/// Modes of a machine of any size that is exactly known: those of the lowest natural frequencies, or those
-/// nearest to a frequency; `Display` writes them for a person, `Serialize` for programs.
+/// Modes of an exactly known machine of any size: those with the lowest natural frequencies, or
+/// those nearest to a frequency; `Display` writes them as text, `Serialize` as data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SelectedModes {
-    /// The machine.
+    /// Name of the machine.
     pub file: String,
     /// Number of degrees of freedom.
     pub degrees_of_freedom: usize,
-    /// Frequency that the modes are nearest to, in Hz; `None` if they are the lowest.
+    /// Frequency to which the modes are nearest, in Hz; `None` if they are the lowest.
     pub near_hz: Option<f64>,
-    /// The modes, those searched for first.
+    /// Modes, in the order of the search.
     pub modes: Vec<SelectedMode>,
 }
 
-/// One of them.
+/// One of these modes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SelectedMode {
     /// `true` if the mode is underdamped.
     pub oscillates: bool,
-    /// `true` for a motion without restoring force: the eigenvalue is zero to rounding.
+    /// `true` for a motion without restoring force: the eigenvalue is zero up to rounding.
     pub is_rigid_body: bool,
-    /// Natural frequency, in Hz; of a real eigenvalue its modulus over 2π.
+    /// Natural frequency, in Hz; for a real eigenvalue its modulus over 2π.
     pub natural_frequency_hz: f64,
     /// Damped frequency, in Hz.
     pub damped_frequency_hz: f64,
@@ -40,14 +40,14 @@ pub struct SelectedMode {
     pub eigenvalue: [f64; 2],
     /// ‖(λ²M + λC + K) φ‖ relative to the size of its terms (pure number).
     pub residual: f64,
-    /// Number, from 1, of the degree of freedom that moves most.
+    /// Number, from 1, of the degree of freedom with the largest motion.
     pub largest: usize,
     /// Real and imaginary part of one entry per degree of freedom; the largest is 1.
     pub shape: Vec<[f64; 2]>,
 }
 
 impl SelectedModes {
-    /// Finds `count` modes of the machine in `file`, fewer if it has no more.
+    /// Computes `count` modes of the machine in `file`, or fewer if it has no more.
     ///
     /// ```
     /// use mechid::integrate::ModeSearch;
@@ -57,9 +57,9 @@ impl SelectedModes {
     /// // A chain of 1,000 masses.
     /// let stiffness = band(1000, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
     /// let chain = SparseSystem::new(band(1000, &[(0, 1.0)]), band(1000, &[]), stiffness)?;
-    /// let found = SelectedModes::of("the chain", &chain, ModeSearch::NearOmega(30.0), 4)?;
-    /// assert_eq!(found.modes.len(), 4);
-    /// println!("{found}");
+    /// let selected = SelectedModes::of("the chain", &chain, ModeSearch::NearOmega(30.0), 4)?;
+    /// assert_eq!(selected.modes.len(), 4);
+    /// println!("{selected}");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -79,23 +79,23 @@ impl SelectedModes {
                 ModeSearch::Lowest => None,
                 ModeSearch::NearOmega(omega) => Some(omega / TAU),
             },
-            modes: modes.iter().map(SelectedMode::of).collect(),
+            modes: modes.iter().map(SelectedMode::new).collect(),
         })
     }
 }
 
 impl SelectedMode {
-    fn of(found: &SparseMode) -> Self {
-        let mode = &found.mode;
+    fn new(sparse: &SparseMode) -> Self {
+        let mode = &sparse.mode;
         let eigenvalue = mode.eigenvalue();
         Self {
             oscillates: mode.oscillates(),
-            is_rigid_body: found.is_rigid_body,
+            is_rigid_body: sparse.is_rigid_body,
             natural_frequency_hz: mode.natural_frequency() / TAU,
             damped_frequency_hz: mode.damped_frequency_hz(),
             damping_ratio: mode.damping_ratio(),
             eigenvalue: [eigenvalue.re, eigenvalue.im],
-            residual: found.residual,
+            residual: sparse.residual,
             largest: mode.shape().icamax() + 1,
             shape: mode.shape().iter().map(|entry| [entry.re, entry.im]).collect(),
         }
@@ -144,7 +144,7 @@ impl fmt::Display for SelectedModes {
         f.write_str(&text_table(&rows))?;
         for (number, mode) in (1..).zip(&self.modes) {
             let growth = mode.eigenvalue[0];
-            // Undamped modes have a real part of rounding.
+            // The real part of an undamped mode is only rounding.
             let rounding = 1e-9 * TAU * mode.natural_frequency_hz;
             if !mode.is_rigid_body && growth > rounding {
                 writeln!(

@@ -1,4 +1,5 @@
-//! Time-stepping schemes side by side: stability and accuracy of a free oscillation, step by step.
+//! Comparison of time-stepping schemes: stability and accuracy for a free oscillation, step by
+//! step.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -11,13 +12,13 @@ use mechid_integrate::{
 use mechid_model::Sdof;
 use serde::Serialize;
 
-/// Spectral radii above 1 by less than this are rounding.
+/// Maximum excess over 1 of a spectral radius that counts as rounding.
 const RADIUS_ROUNDING: f64 = 1e-9;
 
-/// Percentages and damping ratios below this are rounding of zero.
+/// Maximum percentage or damping ratio that counts as zero.
 const ZERO: f64 = 1e-10;
 
-/// A scheme under a name short enough for the head of a column or a legend.
+/// Scheme with a name that is short enough for the head of a column or a legend.
 #[derive(Debug)]
 pub struct NamedScheme {
     /// Short name.
@@ -26,16 +27,16 @@ pub struct NamedScheme {
     pub scheme: Box<dyn Scheme>,
 }
 
-/// A machine, and the step with which it is to be stepped.
+/// Machine, and the step for its simulation.
 #[derive(Debug, Clone, Copy)]
 pub struct SteppedMachine<'a> {
-    /// M, C and K of the machine, as they are stored.
+    /// M, C and K of the machine, dense or sparse.
     pub system: Matrices<'a>,
     /// Step, in s.
     pub dt: f64,
 }
 
-/// Stability and accuracy of schemes; `Display` writes tables, `Serialize` the same for programs.
+/// Stability and accuracy of schemes; `Display` writes tables, `Serialize` the same as data.
 ///
 /// # Source
 /// Dissertation section 3.4; Hughes (1987), *The Finite Element Method*, section 9.1.
@@ -43,7 +44,7 @@ pub struct SteppedMachine<'a> {
 pub struct SchemeComparison {
     /// Damping ratio of the oscillation.
     pub damping_ratio: f64,
-    /// Results of each scheme.
+    /// Results, one per scheme.
     pub schemes: Vec<SchemeAccuracy>,
 }
 
@@ -57,20 +58,20 @@ pub struct SchemeAccuracy {
     pub name: String,
     /// Largest stable step as a fraction of the undamped period; `None` if every step is stable.
     pub stability_limit: Option<f64>,
-    /// Accuracy at each step asked for.
+    /// Accuracy at each requested step.
     pub chart: Vec<StepAccuracy>,
-    /// Stability on the machine, if one was given.
+    /// Stability for the machine, if one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub machine: Option<MachineStability>,
 }
 
-/// Accuracy of a step of one length on a free oscillation; `None` where the numerical motion does not
-/// oscillate.
+/// Accuracy of a step of one length for a free oscillation; `None` if the numerical response does
+/// not oscillate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepAccuracy {
     /// Step as a fraction of the undamped period.
     pub step_over_period: f64,
-    /// Spectral radius of the amplification matrix, a pure number; above 1 the motion grows.
+    /// Spectral radius of the amplification matrix, a pure number; above 1 the response grows.
     pub spectral_radius: f64,
     /// Lengthening of the period, as a fraction of it.
     pub period_elongation: Option<f64>,
@@ -80,19 +81,19 @@ pub struct StepAccuracy {
     pub numerical_damping_ratio: Option<f64>,
 }
 
-/// Stability of a scheme on a machine.
+/// Stability of a scheme for a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MachineStability {
     /// Largest stable step, in s; `None` if every step is stable.
     pub critical_step_s: Option<f64>,
-    /// Step chosen, in s.
+    /// Given step, in s.
     pub step_s: f64,
-    /// Spectral radius at the step chosen, a pure number.
+    /// Spectral radius at the given step, a pure number.
     pub spectral_radius: f64,
 }
 
-/// Compares schemes on an oscillation of a damping ratio, at any number of steps, each a fraction of its
-/// undamped period, and on a machine if there is one.
+/// Compares schemes for an oscillation with a damping ratio, at any number of steps, each a
+/// fraction of its undamped period, and for a machine if there is one.
 ///
 /// ```
 /// use mechid::integrate::Houbolt;
@@ -106,8 +107,8 @@ pub struct MachineStability {
 /// ```
 ///
 /// # Errors
-/// [`IntegrateError`] for a damping ratio outside [0, 1), a step that is not positive, or a machine that
-/// a scheme cannot step.
+/// [`IntegrateError`] for a damping ratio outside [0, 1), a step that is not positive, or a machine
+/// to which a scheme does not apply.
 pub fn compare_schemes(
     schemes: &[NamedScheme],
     damping_ratio: f64,
@@ -115,10 +116,10 @@ pub fn compare_schemes(
     machine: Option<SteppedMachine<'_>>,
 ) -> Result<SchemeComparison, IntegrateError> {
     let oscillator = Sdof::from_modal(1.0, damping_ratio, 1.0)?.system();
-    let all: Vec<&dyn Scheme> = schemes.iter().map(|named| named.scheme.as_ref()).collect();
+    let all_schemes: Vec<&dyn Scheme> = schemes.iter().map(|named| named.scheme.as_ref()).collect();
     let limits = match machine {
-        Some(SteppedMachine { system, .. }) => critical_steps(&all, &system)?,
-        None => vec![None; all.len()],
+        Some(SteppedMachine { system, .. }) => critical_steps(&all_schemes, &system)?,
+        None => vec![None; all_schemes.len()],
     };
     let compare = |(NamedScheme { label, scheme }, limit): (&NamedScheme, Option<f64>)| {
         let scheme = scheme.as_ref();
@@ -129,7 +130,7 @@ pub fn compare_schemes(
             chart: points.map(|p| p.map(StepAccuracy::from)).collect::<Result<_, _>>()?,
             stability_limit: critical_step(scheme, &oscillator)?.map(|dt| dt / TAU),
             machine: machine
-                .map(|machine| MachineStability::of(scheme, machine, limit))
+                .map(|machine| MachineStability::new(scheme, machine, limit))
                 .transpose()?,
         })
     };
@@ -151,14 +152,14 @@ impl From<Accuracy> for StepAccuracy {
 }
 
 impl StepAccuracy {
-    /// Returns `value`, unless the motion grows.
+    /// Returns `value`, unless the response grows.
     fn stable(&self, value: Option<f64>) -> Option<f64> {
         value.filter(|_| self.spectral_radius <= 1.0 + RADIUS_ROUNDING)
     }
 }
 
 impl MachineStability {
-    fn of(
+    fn new(
         scheme: &dyn Scheme,
         SteppedMachine { system, dt }: SteppedMachine<'_>,
         critical_step_s: Option<f64>,
@@ -171,7 +172,7 @@ impl MachineStability {
     }
 }
 
-/// A quantity of a chart, where there is one.
+/// Quantity of a chart, if it is defined.
 type Quantity = fn(&StepAccuracy) -> Option<f64>;
 
 impl fmt::Display for SchemeComparison {
@@ -203,7 +204,7 @@ impl fmt::Display for SchemeComparison {
 }
 
 impl SchemeComparison {
-    /// Lays out one row per step, one column per scheme.
+    /// Returns a table with one row per step and one column per scheme.
     fn table(&self, value: Quantity) -> String {
         let mut header = vec!["Δt/T".to_owned()];
         header.extend(self.schemes.iter().map(|s| s.label.clone()));
@@ -218,12 +219,12 @@ impl SchemeComparison {
     }
 }
 
-/// Writes five digits; what is rounding of zero is zero.
+/// Writes five digits; rounding errors are written as zero.
 fn rounded(value: f64) -> String {
     if value.abs() < ZERO { "0".into() } else { significant(value, 5) }
 }
 
-/// The chart that textbooks print.
+/// The usual chart of textbooks.
 #[cfg(feature = "report")]
 mod figure {
     use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
@@ -231,14 +232,14 @@ mod figure {
     use super::{NamedScheme, StepAccuracy, compare_schemes};
     use crate::integrate::IntegrateError;
 
-    /// Draws spectral radius, period elongation (%) and amplitude decay (%) of schemes over the step as a
-    /// fraction of the undamped period, for an oscillation of a damping ratio.
+    /// Draws spectral radius, period elongation (%) and amplitude decay (%) of schemes over the
+    /// step as a fraction of the undamped period, for an oscillation with a damping ratio.
     ///
     /// # Errors
-    /// Those of [`compare_schemes`].
+    /// As [`compare_schemes`].
     ///
     /// # Source
-    /// Bathe (1996), *Finite Element Procedures*, section 9.4, whose figures these are.
+    /// Bathe (1996), *Finite Element Procedures*, section 9.4, with the same figures.
     pub fn stability_figure(
         schemes: &[NamedScheme],
         damping_ratio: f64,
@@ -248,7 +249,8 @@ mod figure {
         let narrow: Vec<f64> = (1..=160).map(|k| 0.0025 * f64::from(k)).collect();
         let step = "Step over natural period Δt/T";
         let mut panels = [
-            // An unstable scheme leaves through the roof; what happens below 1 is what is compared.
+            // Only radii around and below 1 are compared, so the curve of an unstable scheme is cut
+            // off.
             Panel::new(
                 Axis::log10(step, ""),
                 Axis::linear("Spectral radius ρ", "").range(0.0, 1.6),

@@ -6,44 +6,45 @@ use mechid_model::{Instability, ModelError};
 use mechid_signal::{SignalError, message};
 use nalgebra::Complex;
 
-/// Periods of the force from rest after which a steady state of a nonlinear machine is searched for.
+/// Number of periods of the force, from rest, before the search for a steady state of a nonlinear
+/// machine.
 pub(super) const SETTLING: usize = 50;
 
-/// A simulation that cannot be run.
+/// Error of a simulation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
     /// The description is wrong.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// The scheme refuses.
+    /// The scheme does not apply.
     #[error(transparent)]
     Integrate(#[from] IntegrateError),
-    /// The system has no such response.
+    /// The response of the system does not exist.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A record cannot be made.
+    /// A record cannot be created.
     #[error(transparent)]
     Signal(#[from] SignalError),
-    /// The exact scheme has no time steps, and so no start.
+    /// The exact scheme has no time steps, and therefore no initial conditions.
     #[error(
         "the scheme \"exact\" gives the periodic response only: choose another one for a response that \
          starts from rest or from a given motion"
     )]
     ExactFromRest,
-    /// The exact scheme is that of linear machines.
+    /// The exact scheme is only for linear machines.
     #[error(
         "the scheme \"exact\" is for linear machines: choose another one for nonlinear terms, such as \
          newmark or runge-kutta-4, and steps that are short against the fastest motion"
     )]
     ExactNonlinear,
-    /// A periodic response has no start.
+    /// A periodic response has no initial conditions.
     #[error(
         "a periodic response has no start: give displacements for Houbolt's first steps only with a \
          response from rest or from a given motion"
     )]
     GivenStartPeriodic,
-    /// An unstable machine reaches no steady state.
+    /// An unstable machine does not reach a steady state.
     #[error(
         "the machine is unstable, {instability}: it reaches no periodic response; choose \
          \"response\": \"from-rest\" and a record of a few doublings"
@@ -52,7 +53,7 @@ pub enum SimulateError {
         /// The growing free response.
         instability: Instability,
     },
-    /// A periodic response that no run stays on, of a nonlinear machine or a large one.
+    /// The periodic response of a nonlinear or large machine is unstable, so that a run leaves it.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
          Floquet multiplier), so that no machine stays on it; choose \"response\": \"from-rest\" to see \
@@ -63,7 +64,7 @@ pub enum SimulateError {
         /// The largest Floquet multiplier (pure number).
         multiplier: Complex<f64>,
     },
-    /// The search for the periodic response of a nonlinear machine ends without one.
+    /// The search for the periodic response of a nonlinear machine fails.
     #[error(
         "no response that repeats every {period} s was found from rest and {SETTLING} periods: the best \
          changes by {missed:.1e} of its size in a period. Choose \"response\": \"from-rest\" to see where \
@@ -82,13 +83,13 @@ pub enum SimulateError {
     UnstableOverflow {
         /// The growing free response.
         instability: Instability,
-        /// Place of the overflow.
+        /// Error of the time steps, with the position of the overflow.
         #[source]
         error: IntegrateError,
     },
 }
 
-/// The number with four decimals, of a complex one its modulus too.
+/// Writes the number with four decimals, and the modulus of a complex number.
 fn multiplier_text(multiplier: Complex<f64>) -> String {
     let number = |value: f64| message::number_to(value, 4);
     match multiplier.im {
@@ -103,16 +104,17 @@ fn multiplier_text(multiplier: Complex<f64>) -> String {
 }
 
 impl SimulateError {
-    /// Says of a failed search what the description of an experiment can change.
-    pub(super) fn of_orbit(error: IntegrateError) -> Self {
+    /// Converts the error of a search, so that the message refers to the description of the
+    /// experiment.
+    pub(super) fn from_orbit(error: IntegrateError) -> Self {
         match error {
             IntegrateError::NoOrbit { period, missed } => Self::NoPeriodicOrbit { period, missed },
             error => Self::Integrate(error),
         }
     }
 
-    /// Adds the reason to the overflow of a run.
-    pub(super) fn of_unstable(self, instability: Option<Instability>) -> Self {
+    /// Adds the instability as the reason for an overflow.
+    pub(super) fn with_instability(self, instability: Option<Instability>) -> Self {
         match (self, instability) {
             (Self::Integrate(error @ IntegrateError::Overflow { .. }), Some(instability)) => {
                 Self::UnstableOverflow { instability, error }

@@ -1,24 +1,25 @@
-//! Force and motion over time.
+//! Force and response over time.
 
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 use super::Simulation;
 use super::summary::Group;
 
-/// Degrees of freedom drawn at most, side by side.
+/// Maximum number of degrees of freedom that are drawn, side by side.
 const SHOWN: usize = 4;
 
 impl Simulation {
-    /// Draws the measured record over time: a column of panels for each degree of freedom, the first
-    /// four at most, with force (N), displacement (m), velocity (m/s) and acceleration (m/s²).
+    /// Draws the measured record over time: a column of panels for each of at most four degrees of
+    /// freedom, with force (N), displacement (m), velocity (m/s) and acceleration (m/s²).
     pub fn figure(&self, title: &str) -> Figure {
         let groups = self.groups();
         let counts = groups.iter().map(|group| group.dofs.len());
         let (fewest, most) = (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0));
         let shown = fewest.min(SHOWN);
-        let mut figure = Figure::new(match shown < most {
-            true => format!("{title}, the first {shown} of {most} degrees of freedom"),
-            false => title.to_owned(),
+        let mut figure = Figure::new(if shown < most {
+            format!("{title}, the first {shown} of {most} degrees of freedom")
+        } else {
+            title.to_owned()
         });
         for (group, color) in groups.iter().zip(Color::CYCLE) {
             for at in 0..shown {

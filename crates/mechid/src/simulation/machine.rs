@@ -11,12 +11,12 @@ use mechid_signal::{Record, Sampling};
 
 use super::{SimulateError, SimulatedTerms};
 
-/// M, C and K of a simulated machine, as they are stored.
+/// M, C and K of a simulated machine, dense or sparse.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SimulatedSystem {
     /// All entries.
     Dense(SecondOrderSystem),
-    /// The non-zero entries, of a large machine in Matrix Market files.
+    /// The non-zero entries, for a large machine in Matrix Market files.
     Sparse(SparseSystem),
 }
 
@@ -29,7 +29,7 @@ impl SimulatedSystem {
         }
     }
 
-    /// M (kg), C (N·s/m) and K (N/m), each n × n, as they are stored.
+    /// Returns M (kg), C (N·s/m) and K (N/m), each n × n, dense or sparse.
     pub fn matrices(&self) -> Matrices<'_> {
         match self {
             Self::Dense(system) => Matrices::Dense(system),
@@ -53,7 +53,7 @@ pub(super) struct Described {
 }
 
 impl Described {
-    pub(super) fn of(experiment: &Experiment) -> Result<Self, SimulateError> {
+    pub(super) fn new(experiment: &Experiment) -> Result<Self, SimulateError> {
         let terms = experiment.nonlinear()?.filter(|described| !described.terms.is_empty());
         let nonlinear = terms.map(|NonlinearDescription { terms, coefficients, .. }| {
             SimulatedTerms { terms: terms.clone(), coefficients: coefficients.clone() }
@@ -65,7 +65,8 @@ impl Described {
         Ok(Self { linear, nonlinear })
     }
 
-    /// The growth of the free response of a linear machine; that of a nonlinear one may end by itself.
+    /// Returns the growth of the free response of a linear machine; the growth of a nonlinear
+    /// machine may be limited, so it is not considered.
     pub(super) fn instability(&self) -> Result<Option<Instability>, ModelError> {
         match (&self.linear, &self.nonlinear) {
             (SimulatedSystem::Dense(system), None) => system.instability(),
@@ -73,7 +74,8 @@ impl Described {
         }
     }
 
-    /// A steady state of an unstable machine solves its equations, but no run reaches it.
+    /// Refuses the steady state of an unstable machine: it solves the equations, but no run reaches
+    /// it.
     pub(super) fn refuse_unstable_periodic(
         &self,
         experiment: &Experiment,
@@ -112,7 +114,7 @@ impl Described {
         }
     }
 
-    /// M, C and K with the forces of the terms.
+    /// Returns M, C and K with the forces of the nonlinear terms.
     pub(super) fn with_forces(&self) -> Result<SystemWithForces<'_>, SimulateError> {
         let system = match &self.linear {
             SimulatedSystem::Dense(system) => SystemWithForces::new(system),

@@ -1,4 +1,4 @@
-//! The record an experiment would give: excitation, response, noise.
+//! Simulation of an experiment: excitation, response, noise.
 
 mod error;
 #[cfg(feature = "report")]
@@ -34,21 +34,21 @@ pub use self::summary::{
 /// Result of [`simulate`]: the true response and the measured record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
-    /// The machine; of a nonlinear one, the linear part.
+    /// The machine; for a nonlinear one, its linear part.
     pub system: SimulatedSystem,
-    /// The nonlinear terms of the machine; `None` of a linear one.
+    /// The nonlinear terms of the machine; `None` for a linear one.
     pub nonlinear: Option<SimulatedTerms>,
-    /// Kind of the response: the steady state, or one with a beginning.
+    /// Kind of the response: steady state, or response from initial conditions.
     pub response_kind: ResponseKind,
     /// Number of periods of the force.
     pub periods: usize,
     /// Scheme that computed the response, with its parameters.
     pub scheme: String,
-    /// The scheme's conventions in force.
+    /// Conventions that the scheme uses.
     pub conventions: Vec<Convention>,
-    /// Degrees of freedom, counted from 0, that the channels of the force act on.
+    /// Degrees of freedom, counted from 0, of the force channels.
     pub forced: Vec<usize>,
-    /// Degrees of freedom, counted from 0, of the channels of the response.
+    /// Degrees of freedom, counted from 0, of the response channels.
     pub outputs: Vec<usize>,
     /// The force without noise, in N: samples × `forced`.
     pub force: Record,
@@ -58,13 +58,13 @@ pub struct Simulation {
     pub measured_force: Record,
     /// The response with its noise.
     pub measured_response: Response,
-    /// The fastest growing free response of an unstable machine; of a sparse one it is not computed.
+    /// The fastest growing free response of an unstable machine; not computed for a sparse one.
     pub instability: Option<Instability>,
     /// The largest Floquet multiplier of the periodic response of a nonlinear machine.
     pub multiplier: Option<Multiplier>,
 }
 
-/// Runs an experiment.
+/// Simulates an experiment.
 ///
 /// ```
 /// use mechid::io::Experiment;
@@ -81,9 +81,9 @@ pub struct Simulation {
 /// ```
 ///
 /// # Errors
-/// [`SimulateError`]: what is wrong with the description, or a response that does not exist.
+/// [`SimulateError`] for a wrong description, or a response that does not exist.
 pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
-    let machine = Described::of(experiment)?;
+    let machine = Described::new(experiment)?;
     let instability = machine.instability()?;
     let (forced, outputs) = (experiment.forced()?, experiment.outputs()?);
     let period = experiment.force()?;
@@ -109,7 +109,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
                 ResponseKind::FromRest | ResponseKind::From(_) => {
                     let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
                     stepped(experiment, &**scheme, &machine, &force, middle.as_ref())
-                        .map_err(|error| error.of_unstable(instability))?
+                        .map_err(|error| error.with_instability(instability))?
                 }
             }
         }
@@ -119,7 +119,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         ResponseKind::FromRest | ResponseKind::From(_) => response,
     };
     let response = match &machine.linear {
-        // All degrees of freedom were computed.
+        // The dense solution has all degrees of freedom, so the recorded ones are selected.
         SimulatedSystem::Dense(_) if !outputs.iter().copied().eq(0..response.dof()) => {
             let selected =
                 |_, r: &Record| Record::new(r.sampling(), r.data().select_columns(&outputs));
@@ -130,7 +130,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let noise = experiment.noise;
     let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
         (Some(level), Some(noise)) => {
-            // One seed for the experiment, one stream for each quantity.
+            // The experiment has one seed, and each quantity a separate stream.
             noise::add_white(record, level.into(), noise.seed.wrapping_mul(4).wrapping_add(stream))
         }
         _ => Ok(record.clone()),
@@ -158,14 +158,15 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     })
 }
 
-/// Computes the response of a described machine to `force` (samples × the degrees of freedom that
-/// [`Experiment::forced`] tells, in N) in the place of its excitation, by its scheme and from its start; noise and number of periods do not count.
+/// Computes the response of a described machine to `force` (samples × the degrees of freedom of
+/// [`Experiment::forced`], in N) instead of its excitation, by its scheme and with its initial
+/// conditions; noise and number of periods are ignored.
 ///
 /// # Errors
-/// As [`simulate`]; [`MidStepMissing`](mechid_integrate::IntegrateError::MidStepMissing) if the scheme asks for the exact force between
-/// the samples.
+/// As [`simulate`]; [`MidStepMissing`](mechid_integrate::IntegrateError::MidStepMissing) if the
+/// scheme needs the exact force between the samples.
 pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
-    let machine = Described::of(experiment)?;
+    let machine = Described::new(experiment)?;
     let instability = machine.instability()?;
     machine.refuse_unstable_periodic(experiment, instability, force.sampling())?;
     let Some(scheme) = scheme(experiment)? else {
@@ -178,10 +179,10 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
     let middle = within.transpose()?.flatten();
     stepped(experiment, &*scheme, &machine, force, middle.as_ref())
         .map(|stepped| stepped.response)
-        .map_err(|error| error.of_unstable(instability))
+        .map_err(|error| error.with_instability(instability))
 }
 
-/// A record of so many periods.
+/// Repeats a period this many times.
 fn repeated(period: &Record, periods: usize) -> Result<Record, SignalError> {
     let len = period.len();
     let sampling = period.sampling().with_len(len * periods)?;
@@ -192,7 +193,7 @@ fn repeated(period: &Record, periods: usize) -> Result<Record, SignalError> {
     )
 }
 
-/// A response made of another one, record by record.
+/// Applies a function to each record of a response.
 fn map(
     response: &Response,
     change: impl Fn(usize, &Record) -> Result<Record, SignalError>,
@@ -204,8 +205,8 @@ fn map(
     )
 }
 
-/// Identifies a described experiment at many sampling steps, each simulated; `progress` is called after
-/// each.
+/// Identifies a described experiment at many sampling steps, each simulated; `progress` is called
+/// after each.
 ///
 /// # Errors
 /// As [`sweep_experiment`].

@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use super::{SimulateError, simulate};
 
-/// Name of the column that tells the runs apart.
+/// Name of the column with the number of the run.
 const RUN: &str = "run";
 
-/// Summary of the records of a study; `Display` writes it for a person, `Serialize` the same for programs.
+/// Summary of the records of a study; `Display` writes it as text, `Serialize` the same as data.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RunsSummary {
     /// Number of runs.
@@ -23,12 +23,13 @@ pub struct RunsSummary {
     pub record_column: &'static str,
     /// Channels of each run.
     pub channels: Vec<String>,
-    /// Fields of the description that change; each is a column, too, which holds the number of its run.
+    /// Fields of the description that change; each is a column with its number for every run.
     pub fields: Vec<String>,
 }
 
 /// Simulates the runs of a study into one Parquet file, which gets its name in
-/// [`write_all`](mechid_io::write_all); `progress` is called after each with the number of runs done.
+/// [`write_all`](mechid_io::write_all); `progress` is called after each with the number of
+/// completed runs.
 ///
 /// # Errors
 /// As [`simulate`], and [`SimulateError::Io`] for a file that cannot be written.
@@ -55,8 +56,8 @@ pub fn simulate_runs(
         let file = match &mut file {
             Some(file) => file,
             none => {
-                let all: Vec<&String> = names.iter().chain(&fields).collect();
-                none.insert(ParquetRecordWriter::begin(&path, RUN, &all)?)
+                let columns: Vec<&String> = names.iter().chain(&fields).collect();
+                none.insert(ParquetRecordWriter::begin(&path, RUN, &columns)?)
             }
         };
         file.append(&run.to_string(), sampling, &columns)?;

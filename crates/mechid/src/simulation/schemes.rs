@@ -1,4 +1,4 @@
-//! The scheme that a description asks for.
+//! Scheme of a description.
 
 use mechid_integrate::{
     AlphaAcceleration, Bathe, CentralDifference, CentralDifferenceStart, GeneralisedAlpha, Houbolt,
@@ -15,12 +15,12 @@ use mechid_signal::{Interpolation, Record};
 
 use super::SimulateError;
 
-/// Returns whether the description gives the first displacements.
+/// Returns whether the description states the first displacements.
 pub fn has_given_start(experiment: &Experiment) -> bool {
     matches!(experiment.scheme, SchemeChoice::Houbolt { start: FirstSteps::Given { .. } })
 }
 
-/// Makes the scheme; `None` for the exact steady state.
+/// Creates the scheme; `None` for the exact steady state.
 pub fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, SimulateError> {
     Ok(Some(match &experiment.scheme {
         SchemeChoice::Newmark { beta, gamma } => Box::new(Newmark::new(*beta, *gamma)?),
@@ -74,7 +74,8 @@ pub fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, Simula
     }))
 }
 
-/// The force within the steps of one period `force`, if the scheme takes it from the samples.
+/// Returns the force within the steps from one period `force`, if the scheme interpolates the
+/// samples.
 pub fn interpolated(
     experiment: &Experiment,
     force: &Record,

@@ -1,4 +1,4 @@
-//! Responses step by step, and what becomes of disturbances of those that repeat.
+//! Responses by time steps, and the stability of periodic ones.
 
 use mechid_integrate::{
     AllowUnstable, PeriodicOrbit, SampledForce, Scheme, SelectedDofs, integrate,
@@ -15,21 +15,21 @@ use super::machine::Described;
 use super::schemes::has_given_start;
 use super::{SimulateError, SimulatedSystem};
 
-/// The factor by which a disturbance of a periodic response is multiplied in each period: a complex number
+/// Ratio of a disturbance of a periodic response after and before one period: a complex number
 /// without unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Multiplier {
     /// The factor.
     pub value: Complex<f64>,
-    /// Error to which it is known (pure number).
+    /// Error bound (pure number).
     pub error: f64,
 }
 
-/// Excess over 1 of a Floquet multiplier that rounding makes of a double one, such as that of a machine
-/// without damping: about the root of what the multipliers are known to (pure number).
+/// Maximum excess over 1 of a Floquet multiplier that counts as rounding of a double one, as for an
+/// undamped machine: about the square root of the accuracy of the multipliers (pure number).
 const MULTIPLIER_ROUNDING: f64 = 1e-4;
 
-/// A response, and of one that repeats of a nonlinear machine what becomes of disturbances.
+/// Response, and for a periodic response of a nonlinear machine its largest multiplier.
 pub(super) struct Stepped {
     pub(super) response: Response,
     pub(super) multiplier: Option<Multiplier>,
@@ -41,7 +41,7 @@ impl From<Response> for Stepped {
     }
 }
 
-/// Steps through one force record, or through the period that repeats.
+/// Computes the steps through one force record, or through the period of a periodic response.
 pub(super) fn stepped(
     experiment: &Experiment,
     scheme: &dyn Scheme,
@@ -53,7 +53,7 @@ pub(super) fn stepped(
     let scheme = if experiment.allow_unstable { &unguarded } else { scheme };
     let force = with_middle(force, middle);
     let system = machine.with_forces()?;
-    // Of a sparse machine the force has the columns of some degrees of freedom.
+    // For a sparse machine, the force has columns for some of the degrees of freedom only.
     let sparse = matches!(machine.linear, SimulatedSystem::Sparse(_));
     let some = sparse.then(|| Ok::<_, IoError>((experiment.forced()?, experiment.outputs()?)));
     let some = some.transpose()?;
@@ -67,14 +67,14 @@ pub(super) fn stepped(
             Some(dofs) => integrate_periodic_selected(scheme, &system, dofs, force)?.into(),
         }),
         ResponseKind::Periodic => {
-            let rest = InitialState::rest(machine.linear.dof());
+            let at_rest = InitialState::rest(machine.linear.dof());
             let orbit = match dofs {
-                None => periodic_orbit(scheme, &system, force, &rest, SETTLING),
+                None => periodic_orbit(scheme, &system, force, &at_rest, SETTLING),
                 Some(dofs) => {
-                    periodic_orbit_selected(scheme, &system, dofs, force, &rest, SETTLING)
+                    periodic_orbit_selected(scheme, &system, dofs, force, &at_rest, SETTLING)
                 }
             };
-            stayed_on(&orbit.map_err(SimulateError::of_orbit)?)
+            stayed_on(&orbit.map_err(SimulateError::from_orbit)?)
         }
         ResponseKind::FromRest | ResponseKind::From(_) => {
             let initial = experiment.initial_state()?;
@@ -86,11 +86,12 @@ pub(super) fn stepped(
     }
 }
 
-/// The response of an orbit, unless its largest multiplier is known to lead away from it.
+/// Returns the response of an orbit, or an error if its largest multiplier shows that it is
+/// unstable.
 fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
     let multiplier = match orbit.multipliers().first() {
         Some(value) => Multiplier { value: *value, error: orbit.multiplier_error() },
-        // It overflows.
+        // The multiplier overflows.
         None => Multiplier { value: f64::INFINITY.into(), error: 0.0 },
     };
     if multiplier.value.norm() > 1.0 + MULTIPLIER_ROUNDING + multiplier.error {

@@ -11,12 +11,12 @@ use serde::Serialize;
 
 use super::{Multiplier, Simulation};
 
-/// Summary of a [`Simulation`]; `Display` writes it for a person, `Serialize` the same for programs.
+/// Summary of a [`Simulation`]; `Display` writes it as text, `Serialize` the same as data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulationSummary {
     /// Scheme that computed the response, with its parameters.
     pub scheme: String,
-    /// The scheme's conventions in force.
+    /// Conventions that the scheme uses.
     pub conventions: Vec<SchemeConvention>,
     /// Kind of the response.
     pub response: ResponseKind,
@@ -28,8 +28,8 @@ pub struct SimulationSummary {
     pub sample_rate_hz: f64,
     /// Number of degrees of freedom of the machine.
     pub degrees_of_freedom: usize,
-    /// Oscillating modes of the machine, of a nonlinear one of its linear part, by rising frequency;
-    /// none of a sparse machine.
+    /// Oscillating modes of the machine (of its linear part if it is nonlinear), in rising order of
+    /// frequency; none for a sparse machine.
     pub modes: Vec<SimulatedMode>,
     /// Channels of the record, in its order.
     pub channels: Vec<SimulatedChannel>,
@@ -39,7 +39,7 @@ pub struct SimulationSummary {
     /// The largest Floquet multiplier of the periodic response of a nonlinear machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub multiplier: Option<LargestMultiplier>,
-    /// Mass, damping and stiffness matrix, in SI units; not those of a sparse machine.
+    /// Mass, damping and stiffness matrix, in SI units; `None` for a sparse machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
     /// Nonlinear terms of the machine.
@@ -47,12 +47,12 @@ pub struct SimulationSummary {
     pub nonlinear: Option<SimulatedTerms>,
 }
 
-/// A convention of a scheme where the literature has several.
+/// Choice of a scheme among several conventions in the literature.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SchemeConvention {
     /// Subject of the convention.
     pub what: &'static str,
-    /// Choice in force.
+    /// Choice that is used.
     pub choice: &'static str,
 }
 
@@ -87,24 +87,24 @@ pub struct FreeGrowth {
     pub growth_rate: f64,
     /// Time in which the response doubles, in s.
     pub doubling_time_s: f64,
-    /// The same as a sentence.
+    /// Text with these numbers.
     pub text: String,
 }
 
-/// The factor by which a disturbance of a periodic response is multiplied in each period, at most.
+/// Largest ratio of a disturbance of a periodic response after and before one period.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LargestMultiplier {
     /// Real and imaginary part of the factor, pure numbers.
     pub value: [f64; 2],
-    /// Modulus of the factor: below 1 disturbances die out (pure number).
+    /// Modulus of the factor: below 1 disturbances decay (pure number).
     pub modulus: f64,
-    /// Error to which it is known (pure number).
+    /// Error bound (pure number).
     pub error: f64,
-    /// The same as a sentence.
+    /// Text with these numbers.
     pub text: String,
 }
 
-/// Nonlinear terms and what they are multiplied with.
+/// Nonlinear terms and their coefficients.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedTerms {
     /// The terms.
@@ -163,9 +163,9 @@ impl Simulation {
                     damping_ratio: mode.damping_ratio(),
                 })
                 .collect(),
-            channels: self.groups().iter().flat_map(SimulatedChannel::of).collect(),
-            instability: self.instability.as_ref().map(FreeGrowth::of),
-            multiplier: self.multiplier.map(LargestMultiplier::of),
+            channels: self.groups().iter().flat_map(SimulatedChannel::from_group).collect(),
+            instability: self.instability.as_ref().map(FreeGrowth::from_instability),
+            multiplier: self.multiplier.map(LargestMultiplier::from_multiplier),
             system: self.system.dense().map(SystemMatrices::from),
             nonlinear: self.nonlinear.clone(),
         })
@@ -192,14 +192,14 @@ impl Simulation {
 }
 
 impl Group<'_> {
-    /// Returns the name of the column of a channel, counted from 0; a degree of freedom has its number
-    /// where there are several.
+    /// Returns the name of the column of a channel, counted from 0; it includes the number of the
+    /// degree of freedom if there are several.
     fn column(&self, channel: usize) -> String {
         self.named(channel, '_')
     }
 
-    /// Returns the name of a channel, counted from 0, with the number of its degree of freedom after
-    /// `separator`.
+    /// Returns the name of a channel, counted from 0, with the number of its degree of freedom
+    /// after `separator`.
     pub fn named(&self, channel: usize, separator: char) -> String {
         match self.dof {
             1 => self.name.to_string(),
@@ -209,8 +209,8 @@ impl Group<'_> {
 }
 
 impl SimulatedChannel {
-    /// Makes one for each degree of freedom.
-    fn of(group: &Group<'_>) -> Vec<Self> {
+    /// Creates the channels of a group, one for each degree of freedom.
+    fn from_group(group: &Group<'_>) -> Vec<Self> {
         let Group { unit, truth, measured, .. } = *group;
         let channel = |dof: usize| {
             let noise = measured.column(dof) - truth.column(dof);
@@ -227,7 +227,7 @@ impl SimulatedChannel {
 }
 
 impl FreeGrowth {
-    fn of(instability: &Instability) -> Self {
+    fn from_instability(instability: &Instability) -> Self {
         Self {
             pole: [instability.eigenvalue().re, instability.eigenvalue().im],
             growth_rate: instability.growth_rate(),
@@ -238,7 +238,7 @@ impl FreeGrowth {
 }
 
 impl LargestMultiplier {
-    fn of(multiplier: Multiplier) -> Self {
+    fn from_multiplier(multiplier: Multiplier) -> Self {
         let Multiplier { value, error } = multiplier;
         let modulus = value.norm();
         let becomes = match modulus {
