@@ -14,14 +14,21 @@ use crate::trace::{self, Mappings, Segment};
 /// Maximum width or height of a figure, px; larger ones would overflow on a short axis.
 const LARGEST: f64 = 1e9;
 
-/// Length of a tick, which is also the distance of its label, px.
+/// Length of a tick, px.
 pub(crate) const TICK: f64 = 4.0;
+/// Distance of the label from its tick, px.
 const TICK_GAP: f64 = 4.0;
+/// Margin of the figure, px.
 const EDGE: f64 = 10.0;
+/// Height of the title of the figure, px.
 const TITLE: f64 = 28.0;
+/// Height of the title of a panel, px.
 const PANEL_TITLE: f64 = 21.0;
+/// Height of the common factor of the labels, px.
 const FACTOR: f64 = 15.0;
+/// Height of the caption of an axis, px.
 const CAPTION: f64 = LABEL_SIZE + 9.0;
+/// Distance between panels, px.
 const BETWEEN: f64 = 16.0;
 /// Minimum size of the frame of a panel that is legible, px.
 const LEAST_FRAME: Point = (60.0, 40.0);

@@ -8,13 +8,19 @@ use crate::style::{Color, LABEL_SIZE, Resolved};
 use crate::text::{Weight, text_width};
 use crate::trace::{Segment, meets};
 
+/// Height of a row, px.
 const ROW: f64 = 18.0;
-/// Length of a sample with a line, and of a sample without a line.
+/// Length of a sample with a line, px.
 const LINE_SAMPLE: f64 = 36.0;
+/// Length of a sample without a line, px.
 const POINT_SAMPLE: f64 = 12.0;
+/// Distance between a sample and its label, px.
 const GAP: f64 = 7.0;
+/// Distance between two entries in a row, px.
 const BETWEEN: f64 = 20.0;
+/// Distance between the entries and the edge of a box, px.
 const PADDING: f64 = 7.0;
+/// Font size of the labels, px.
 const TEXT: f64 = LABEL_SIZE - 1.0;
 
 /// Sample to the left of a label.

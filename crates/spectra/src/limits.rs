@@ -121,9 +121,11 @@ pub(crate) const END_LEVERAGE: f64 = 0.25;
 /// Maximum number of steps of the search for the log power.
 pub(crate) const SMOOTH_STEPS: usize = 200;
 
-/// Change of the log power (RMS) that ends the search, for the final fit and while forms are
-/// compared: the error in the log likelihood is its square.
+/// Change of the log power (RMS) that ends the search for the final fit.
 pub(crate) const SMOOTH_TOLERANCE: f64 = 1e-9;
+
+/// Change of the log power (RMS) that ends the search while forms are compared: the error in the
+/// log likelihood is its square.
 pub(crate) const SMOOTH_COMPARED: f64 = 1e-4;
 
 /// Smallest initial power, relative to the mean over the lines.
@@ -148,9 +150,10 @@ pub(crate) const BEST_WIDTHS: usize = 6;
 /// Maximum number of rounds in which a bump is varied.
 pub(crate) const BUMP_VARIATIONS: usize = 12;
 
-/// Maximum number of steps of the search for the height of a bump, and the change of the height
-/// that ends it.
+/// Maximum number of steps of the search for the height of a bump.
 pub(crate) const HEIGHT_STEPS: usize = 10;
+
+/// Change of the height of a bump that ends the search.
 pub(crate) const HEIGHT_TOLERANCE: f64 = 1e-4;
 
 /// Maximum height, as the logarithm of the power.
@@ -171,9 +174,10 @@ pub(crate) const PERIODS_HALVINGS: usize = 50;
 /// independent lines.
 pub(crate) const SINUSOID_CONSPICUOUS: f64 = 30.0;
 
-/// Number of lines to either side whose median is the level around a line, and number of lines next
-/// to it that are excluded from the median.
+/// Number of lines to either side whose median is the level around a line.
 pub(crate) const SINUSOID_AROUND: usize = 24;
+
+/// Number of nearest lines to either side that are excluded from this median.
 pub(crate) const SINUSOID_NEXT: usize = 3;
 
 /// Minimum number of lines for a level.
@@ -183,17 +187,21 @@ pub(crate) const SINUSOID_FEWEST: usize = 16;
 /// negligible on others.
 pub(crate) const SINUSOID_FITTED: usize = 4;
 
-/// Number of lines to either side whose power above the level a sinusoid must explain, and the
-/// maximum unexplained fraction: a band of noise, or a changing frequency, leaves more.
+/// Number of lines to either side whose power above the level a sinusoid must explain.
 pub(crate) const SINUSOID_EXPLAINED: usize = 8;
+
+/// Maximum unexplained fraction of this power: a band of noise, or a changing frequency, leaves
+/// more.
 pub(crate) const SINUSOID_LEFT: f64 = 0.25;
 
 /// Minimum power of further sinusoids of one search relative to the strongest one: the residual of
 /// a strong sinusoid near a resonance may look like a weak one.
 pub(crate) const SINUSOID_BESIDE: f64 = 0.1;
 
-/// Maximum number of sinusoids in a record, and of candidate lines.
+/// Maximum number of sinusoids in a record.
 pub(crate) const SINUSOID_MOST: usize = 16;
+
+/// Maximum number of candidate lines in the search for sinusoids.
 pub(crate) const LOOKED_AT: usize = 96;
 
 /// Number of frequencies per line at which receptances are averaged.
@@ -202,7 +210,8 @@ pub(crate) const GAINS_PER_LINE: usize = 16;
 /// Number of rounds in which each sinusoid is fitted again with all others subtracted.
 pub(crate) const SINUSOID_ROUNDS: usize = 2;
 
-/// Number of frequencies tried between the two neighbouring lines, and number of golden-section
-/// steps after that.
+/// Number of frequencies tried between the two neighbouring lines.
 pub(crate) const SINUSOID_FREQUENCIES: usize = 20;
+
+/// Number of golden-section steps after that.
 pub(crate) const SINUSOID_SECTIONS: usize = 40;

@@ -17,12 +17,16 @@ const GROUP_DEPTH: usize = 64;
 /// Number of bytes at the end of a file: length of the footer, and magic word.
 const TAIL: u64 = 8;
 
-/// Fields of `FileMetaData` and `SchemaElement`.
+/// Field of `FileMetaData` with the schema.
 const SCHEMA: i64 = 2;
+
+/// Field of `SchemaElement` with the number of children.
 const CHILDREN: i64 = 5;
 
-/// Kinds of values in the compact protocol.
+/// Kind of a list in the compact protocol.
 const LIST: u8 = 9;
+
+/// Kind of a struct in the compact protocol.
 const STRUCT: u8 = 12;
 
 /// Returns whether the footer of a file is plausible; `true` for a file too short to have one,

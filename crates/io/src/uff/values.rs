@@ -6,8 +6,10 @@ use super::header::Header;
 use super::lines::{Line, Lines, is_mark, number};
 use crate::contents::Fault;
 
-/// Width of a printed number, in single and in double precision.
+/// Width of a printed number in single precision.
 const SINGLE: usize = 13;
+
+/// Width of a printed number in double precision.
 const DOUBLE: usize = 20;
 
 /// Reads the printed numbers up to the mark at the end of the dataset, which is not consumed.
