@@ -1,5 +1,6 @@
 //! Project tasks, as a library so that tests can run them too.
 
+pub mod conformance;
 pub mod cost;
 pub mod drawing;
 pub mod figures;

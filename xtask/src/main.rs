@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use clap::{Parser, Subcommand};
 use indicatif::ProgressBar;
-use xtask::cost;
 use xtask::thesis::reproduce::{self, Reproduction};
+use xtask::{conformance, cost};
 
 /// Project tasks.
 #[derive(Debug, Parser)]
@@ -36,6 +36,15 @@ enum Task {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
+    /// Compute every number that somebody else printed or that has a closed form, and write the page of the book about it.
+    Conformance {
+        /// Compare the page with what is computed now, without writing it.
+        #[arg(long, conflicts_with = "json")]
+        check: bool,
+        /// Also write the rows as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
     /// Measure how time grows with degrees of freedom and samples, and write the page of the book
     /// about it (with --release, on an idle machine).
     MeasureCost {
@@ -48,6 +57,10 @@ enum Task {
 fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     let outcome = match Tasks::parse().task {
+        Task::Conformance { check: true, .. } => conformance_compared(root),
+        Task::Conformance { json, .. } => {
+            conformance::write(root, json.as_deref()).map(|rows| println!("{rows} rows written"))
+        }
         Task::MeasureCost { seconds } => cost::write(root, seconds),
         Task::ReproduceThesis { only, check, bless, out } => {
             reproduce_thesis(root, only.as_deref(), check, bless, out)
@@ -81,6 +94,16 @@ fn reproduce_thesis(
         println!("{} golden files rewritten", reproduction.golden_files());
     }
     Ok(())
+}
+
+fn conformance_compared(root: &Path) -> Result<(), String> {
+    match conformance::differences(root)?.as_slice() {
+        [] => Ok(()),
+        differences => {
+            differences.iter().take(20).for_each(|difference| eprintln!("{difference}"));
+            Err(format!("{} differences from the page", differences.len()))
+        }
+    }
 }
 
 fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {

@@ -1,0 +1,130 @@
+//! Every number of this workspace that somebody else printed or that has a closed form, on one page.
+//!
+//! No row is judged by a simulator of this workspace.
+
+mod closed_forms;
+mod dissertation;
+mod journal_bearings;
+mod page;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::thesis::published::Published;
+use crate::thesis::results::Results;
+
+/// Agreement of a number with what judges it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The difference is within the tolerance.
+    Met,
+    /// The printed number is wrong, and why that is believed.
+    Misprint(String),
+    /// The difference has no known reason.
+    Open,
+}
+
+/// A number and what judges it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// What it is a number of.
+    pub quantity: String,
+    /// The number as printed, or by the closed form.
+    pub expected: String,
+    /// The number of this workspace.
+    pub ours: String,
+    /// Difference over the tolerance; `None` for text that is compared as such.
+    pub difference_over_tolerance: Option<f64>,
+    /// Agreement.
+    pub status: Status,
+}
+
+impl Row {
+    /// Compares a number with a closed form.
+    fn by_formula(quantity: String, expected: f64, ours: f64, tolerance: f64) -> Self {
+        let ratio = (ours - expected) / tolerance;
+        Self {
+            quantity,
+            expected: format!("{expected:.10e}"),
+            ours: format!("{ours:.10e}"),
+            difference_over_tolerance: Some(ratio),
+            status: if ratio.abs() <= 1.0 { Status::Met } else { Status::Open },
+        }
+    }
+}
+
+/// Rows of one judge.
+#[derive(Debug, Clone, Serialize)]
+pub struct Judge {
+    /// Who or what judges.
+    pub name: &'static str,
+    /// Publication with its pages, or the formula.
+    pub source: &'static str,
+    /// Tolerance, and why it is that.
+    pub tolerance: &'static str,
+    /// File of the test that holds the rows.
+    pub test: &'static str,
+    /// Its rows.
+    pub rows: Vec<Row>,
+}
+
+impl Judge {
+    /// Returns the numbers of rows that are met, are misprints, and are open.
+    pub fn counts(&self) -> [usize; 3] {
+        let of = |matches: fn(&Status) -> bool| {
+            self.rows.iter().filter(|row| matches(&row.status)).count()
+        };
+        [
+            of(|status| *status == Status::Met),
+            of(|status| matches!(status, Status::Misprint(_))),
+            of(|status| *status == Status::Open),
+        ]
+    }
+}
+
+/// Computes all rows, judge by judge.
+///
+/// # Errors
+/// The message of the computation that fails.
+pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
+    let published = Published::read(root)?;
+    let results = Results::compute(&published, || ())?;
+    Ok(vec![
+        dissertation::estimates(&published, &results)?,
+        dissertation::means(&published, &results),
+        dissertation::modes(&published)?,
+        journal_bearings::lund_thomsen(root)?,
+        journal_bearings::short_bearing()?,
+        closed_forms::chain()?,
+        closed_forms::transient()?,
+    ])
+}
+
+/// Writes the page, and the rows as JSON where a file is named.
+///
+/// # Errors
+/// The message of the computation or of the file that fails.
+pub fn write(root: &Path, json: Option<&Path>) -> Result<usize, String> {
+    let judges = judges(root)?;
+    let words = |file: &Path, e: std::io::Error| format!("{}: {e}", file.display());
+    let place = page::place(root);
+    std::fs::write(&place, page::markdown(&judges)).map_err(|e| words(&place, e))?;
+    if let Some(file) = json {
+        let text = serde_json::to_string_pretty(&judges).map_err(|e| e.to_string())?;
+        std::fs::write(file, text).map_err(|e| words(file, e))?;
+    }
+    Ok(judges.iter().map(|judge| judge.rows.len()).sum())
+}
+
+/// Returns the first differences of the committed page from what is computed now.
+///
+/// # Errors
+/// The message of the computation or of the file that fails.
+pub fn differences(root: &Path) -> Result<Vec<String>, String> {
+    let place = page::place(root);
+    let committed =
+        std::fs::read_to_string(&place).map_err(|e| format!("{}: {e}", place.display()))?;
+    Ok(page::differences(&committed, &page::markdown(&judges(root)?)))
+}
