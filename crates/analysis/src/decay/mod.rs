@@ -1,5 +1,6 @@
 //! Modes of a free response: a record in which no force acts.
 
+mod nonlinear;
 mod release;
 mod steps;
 pub mod summary;
@@ -12,6 +13,7 @@ use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 use serde::{Deserialize, Serialize, Serializer};
 
+pub use self::nonlinear::{BackbonePointRow, BackboneRow, Harmonic};
 use self::release::release;
 use self::steps::{coarse, last_shown};
 pub use self::summary::DecaySummary;

@@ -1,18 +1,97 @@
 //! The beginning of a free decay.
 
+use mechid_checks::limits::SIGNIFICANCE;
 use mechid_signal::Record;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Part of the largest sum of squares at which the decay begins.
 const LEVEL: f64 = 0.8;
 /// Part of the record, at its end, over which the constants are averaged.
 const REST: usize = 4;
+/// Number of parts in which the amplitude is followed over time.
+const PARTS: usize = 8;
 
 /// Returns the last sample, counted from 0, at which the squares of all channels, each over its own power, sum
-/// up to [`LEVEL`] of their largest sum or more.
+/// up to [`LEVEL`] of their largest sum or more; the first such sample if the amplitude falls from there on, and the first
+/// sample of the record if it rises over most of it.
 ///
 /// That is after a pull that is let go, after the last cycles of a shaker and at the peak that an impact
 /// leaves. Squares are those about the mean of the last quarter.
 pub(super) fn release(record: &Record) -> usize {
+    let sums = sums(record);
+    let largest = sums.iter().copied().fold(0.0, f64::max);
+    let is_large = |sum: &f64| *sum > 0.0 && *sum >= LEVEL * largest;
+    let (Some(first), Some(last)) =
+        (sums.iter().position(is_large), sums.iter().rposition(is_large))
+    else {
+        return 0;
+    };
+    // A pull or a shaker holds the amplitude before the release; a light decay loses some of it all the time.
+    let between = crests(&sums[first..=last]);
+    if between.iter().all(is_large) && trend(&between) < 0.0 && falls_throughout(&between) {
+        return first;
+    }
+    // A growth multiplies the amplitude in equal times.
+    let logarithms: Vec<f64> = crests(&sums[..=last]).iter().map(|crest| crest.ln()).collect();
+    let rises = (sums.len() - last) * PARTS < sums.len() && trend(&logarithms) > 0.0;
+    if rises { 0 } else { last }
+}
+
+/// Returns the largest sums of some parts of equal length; none of a stretch that is too short.
+fn crests(sums: &[f64]) -> Vec<f64> {
+    let part = sums.len() / PARTS;
+    let of_part = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+    if part == 0 { Vec::new() } else { sums.chunks_exact(part).take(PARTS).map(of_part).collect() }
+}
+
+/// Returns whether a line describes falling values as well as values that are held for some time and fall then, by the
+/// Bayesian information criterion.
+///
+/// # Source
+/// Schwarz (1978), Annals of Statistics 6, 461–464.
+fn falls_throughout(values: &[f64]) -> bool {
+    let count = values.len() as f64;
+    // Residual of a constant up to a place and a line from there on.
+    let left = |held: usize| {
+        let x = |at: usize| at.saturating_sub(held) as f64;
+        let [mean_x, mean] = [(0..values.len()).map(x).sum::<f64>(), values.iter().sum::<f64>()]
+            .map(|sum| sum / count);
+        let deviations = || values.iter().enumerate().map(|(at, y)| (x(at) - mean_x, y - mean));
+        let [products, squares, all] = deviations()
+            .fold([0.0; 3], |[xy, xx, yy], (x, y)| [xy + x * y, xx + x * x, yy + y * y]);
+        all - products * products / squares
+    };
+    let held = (2..values.len().saturating_sub(1)).map(left).fold(f64::INFINITY, f64::min);
+    left(0).powf(count) <= held.powf(count) * count
+}
+
+/// Returns the slope of some values, or of none of which scatter hardly makes it as steep: 0.
+///
+/// # Source
+/// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1.
+fn trend(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    if values.len() < PARTS {
+        return 0.0;
+    }
+    let (middle, mean) = (0.5 * (count - 1.0), values.iter().sum::<f64>() / count);
+    let (mut products, mut squares, mut all) = (0.0, 0.0, 0.0);
+    for (at, value) in values.iter().enumerate() {
+        let (x, y) = (at as f64 - middle, value - mean);
+        products += x * y;
+        squares += x * x;
+        all += y * y;
+    }
+    let slope = products / squares;
+    let error = ((all - slope * products).max(0.0) / (count - 2.0) / squares).sqrt();
+    let student = StudentsT::new(0.0, 1.0, count - 2.0).expect("positive degrees of freedom");
+    let ratio = (slope / error).abs();
+    let is_scatter = ratio.is_nan() || student.sf(ratio) > SIGNIFICANCE;
+    if is_scatter { 0.0 } else { slope }
+}
+
+/// Returns the sum of the squares of all channels, each over its own power, at every sample.
+fn sums(record: &Record) -> Vec<f64> {
     let len = record.len();
     let mut sums = vec![0.0; len];
     for channel in 0..record.channels() {
@@ -29,8 +108,7 @@ pub(super) fn release(record: &Record) -> usize {
             sums.iter_mut().zip(squares()).for_each(|(sum, square)| *sum += square / power);
         }
     }
-    let largest = sums.iter().copied().fold(0.0, f64::max);
-    sums.iter().rposition(|sum| *sum > 0.0 && *sum >= LEVEL * largest).unwrap_or(0)
+    sums
 }
 
 #[cfg(test)]
@@ -60,6 +138,20 @@ mod tests {
         for found in [at_rest, pulled, driven] {
             assert!((1.0..1.1).contains(&found), "{found}");
         }
+        // Held for a short time.
+        let shortly = release_of(|t| if t < 0.1 { 1.0 } else { after(t + 0.9) });
+        assert!((0.1..0.25).contains(&shortly), "{shortly}");
         assert_eq!(release_of(|_| 0.0), 0.0);
+    }
+
+    #[test]
+    fn a_light_decay_begins_at_its_first_crest_and_a_growth_at_the_first_sample() {
+        let light = |t: f64| (-0.0027 * TAU * 2.0 * t).exp() * (TAU * 2.0 * t).cos();
+        let found = release_of(light);
+        assert!(found < 0.1, "{found}");
+        let late = release_of(|t| if t < 0.5 { 0.0 } else { light(t - 0.5) });
+        assert!((0.45..0.6).contains(&late), "{late}");
+        let growing = release_of(|t| (0.4 * t).exp() * (TAU * 5.0 * t).cos());
+        assert_eq!(growing, 0.0);
     }
 }

@@ -10,6 +10,7 @@ use mechid_signal::message;
 use serde::Serialize;
 
 use super::DecaySettings;
+use super::nonlinear::{BackboneRow, Harmonic};
 use crate::AnalysisError;
 use crate::identify::rows::{CONFIDENCE, ModeRow, Uncertain};
 use crate::measurement::{Block, Measurement};
@@ -46,6 +47,10 @@ pub struct DecaySummary {
     pub confidence: f64,
     /// Modes by rising frequency.
     pub modes: Vec<DecayModeRow>,
+    /// Frequency and damping over amplitude of the strongest mode; `None` where linear modes describe the response better.
+    pub backbone: Option<BackboneRow>,
+    /// Time at which the response is excited again, in s from the first sample of the window; `None` if it is not.
+    pub excited_again_s: Option<f64>,
     /// Channels, one each.
     pub channels: Vec<DecayChannelRow>,
     /// Remarks to read before using the numbers.
@@ -68,6 +73,8 @@ pub struct DecayModeRow {
     pub energy_share: f64,
     /// `false` if the interval of the growth rate does not lie below zero.
     pub decays: bool,
+    /// Mode of which this one is a multiple; `None` if it is of none.
+    pub harmonic: Option<Harmonic>,
 }
 
 /// Fit of one channel.
@@ -111,6 +118,7 @@ impl DecaySummary {
                 phase_deg: mode.phase.to_degrees(),
                 energy_share: mode.energy_share,
                 decays: mode.decays(),
+                harmonic: None,
             })
         });
         let columns = whole.names.response(kind);
@@ -124,10 +132,17 @@ impl DecaySummary {
             release_found: how.from_s.is_none(),
             confidence: CONFIDENCE,
             modes: modes.collect::<Result<_, AnalysisError>>()?,
+            backbone: estimate.backbone().map(BackboneRow::new).transpose()?,
+            excited_again_s: estimate.restart().map(|at| {
+                (first_sample - whole.first_sample + at) as f64 / measurement.sampling().rate_hz()
+                    + how.from_s.unwrap_or(0.0)
+            }),
             channels: channel_rows(columns, estimate.channels()),
             remarks: whole.unit_notes(),
             analysis: *how,
         };
+        summary.name_harmonics(&identified);
+        summary.remarks.extend(summary.of_model());
         summary.remarks.extend(summary.of_channels());
         for (number, mode) in (1..).zip(estimate.modes()) {
             summary.remarks.extend(summary.of_mode(number, mode));
@@ -272,6 +287,7 @@ impl DecaySummary {
             let name = |at: usize| columns.get(at).map_or(String::new(), |c| (*c).to_owned());
             let _ = writeln!(text, "{}", shape_table(self.modes.iter().map(|row| &row.mode), name));
         }
+        text += &self.backbone_table();
         text += &self.channel_table();
         let notes: String = self.remarks.iter().map(|remark| format!("note: {remark}\n")).collect();
         if !notes.is_empty() {

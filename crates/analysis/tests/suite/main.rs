@@ -5,6 +5,7 @@
 mod bearing;
 mod crosstalk;
 mod decay;
+mod decay_nonlinear;
 mod doors;
 mod error_rate;
 mod faults;

@@ -49,6 +49,12 @@ pub enum FreeDecayError {
         /// Gain that a mode must exceed, a pure number.
         needed: f64,
     },
+    /// A response returns to rest without oscillation.
+    #[error("the response does not oscillate: {} it better than oscillations", returns(rates))]
+    NoOscillation {
+        /// Decay rates and their standard errors, in 1/s, one or two, rising.
+        rates: Vec<[f64; 2]>,
+    },
     /// A free response grows.
     #[error(
         "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: an \
@@ -78,4 +84,19 @@ pub enum FreeDecayError {
     /// A record is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+}
+
+/// Returns decays without oscillation in words.
+fn returns(rates: &[[f64; 2]]) -> String {
+    let rounded = |value: f64, digits: usize| {
+        let rounded = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+        message::number(rounded).to_string()
+    };
+    let all =
+        rates.iter().map(|[rate, error]| format!("{} ± {}", rounded(*rate, 4), rounded(*error, 2)));
+    let list = message::list(all, " and ", 2);
+    match rates.len() {
+        1 => format!("a decay of {list} 1/s describes"),
+        _ => format!("decays of {list} 1/s describe"),
+    }
 }

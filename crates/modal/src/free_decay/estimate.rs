@@ -11,9 +11,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::FreeDecayError;
+use super::backbone::{Backbone, backbone};
 use super::fit::{Data, Fit};
 use super::limits::{ESTIMATE_LAGS, LEAST_ONSET, ONSET_SHARE};
 use super::poles::{Pole, linear_columns};
+use super::restart::restart;
 
 /// A mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,10 +85,23 @@ pub struct FreeDecayEstimate {
     modes: Vec<DecayMode>,
     channels: Vec<DecayChannel>,
     fitted: Record,
+    backbone: Option<Backbone>,
+    restart: Option<usize>,
     degrees_of_freedom: usize,
 }
 
 impl FreeDecayEstimate {
+    /// Frequency and damping over amplitude of the strongest mode, where they change with it; `None` of a response that
+    /// linear modes describe better.
+    pub fn backbone(&self) -> Option<&Backbone> {
+        self.backbone.as_ref()
+    }
+
+    /// Sample, counted from 0, at which the response is excited again; `None` if it is not.
+    pub fn restart(&self) -> Option<usize> {
+        self.restart
+    }
+
     /// The modes by rising frequency.
     pub fn modes(&self) -> &[DecayMode] {
         &self.modes
@@ -198,6 +213,8 @@ pub(super) fn estimate(
     let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
     let energies = energies(data, fit, &relative);
     let total: f64 = energies.iter().sum();
+    let backbone = backbone(data, fit, &energies, scale, record.sampling().dt());
+    let restart = if backbone.is_none() { restart(data, fit) } else { None };
     let mut modes = Vec::new();
     for (at, energy) in energies.iter().enumerate() {
         let mut mode = mode(&spread, record, at, &relative, energy / total)?;
@@ -205,9 +222,13 @@ pub(super) fn estimate(
         mode.amplitude.standard_error *= unit;
         modes.push(mode);
     }
-    modes.sort_by(|a: &DecayMode, b| {
-        let frequency = |of: &DecayMode| of.mode.natural_frequency_hz.value;
-        frequency(a).total_cmp(&frequency(b))
+    let frequency = |of: &DecayMode| of.mode.natural_frequency_hz.value;
+    let mut order: Vec<usize> = (0..modes.len()).collect();
+    order.sort_by(|a, b| frequency(&modes[*a]).total_cmp(&frequency(&modes[*b])));
+    modes.sort_by(|a: &DecayMode, b| frequency(a).total_cmp(&frequency(b)));
+    let backbone = backbone.map(|backbone| {
+        let replaced = |place: &usize| backbone.modes.contains(&order[*place]);
+        Backbone { modes: (0..order.len()).filter(replaced).collect(), ..backbone }
     });
     let residual = data.residual(fit);
     let channels = (0..data.channels())
@@ -219,6 +240,8 @@ pub(super) fn estimate(
             modes,
             channels,
             fitted: Record::new(record.sampling(), fitted)?,
+            backbone,
+            restart,
             degrees_of_freedom: spread.degrees_of_freedom,
         })
     }))

@@ -85,3 +85,34 @@ pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
 /// Growth over the record that a peak is looked for with, in nepers.
 pub(crate) const INITIAL_GROWTH: f64 = 6.0;
+
+/// Lowest and highest order of the polynomials of a backbone: the lowest has linear and quadratic damping; beyond the
+/// highest, terms are not told apart over the range of one decay.
+pub(crate) const LOWEST_ORDER: usize = 2;
+pub(crate) const HIGHEST_ORDER: usize = 6;
+
+/// Gauss–Newton steps of a backbone at most.
+pub(crate) const BACKBONE_STEPS: usize = 20;
+
+/// Number of amplitudes at which a backbone is reported.
+pub(crate) const BACKBONE_POINTS: usize = 8;
+
+/// Distance from the strongest mode, over its frequency, within which modes may stand for it: harmonics lie beyond.
+pub(crate) const NEIGHBOURHOOD: f64 = 0.5;
+
+/// Amplitude over the first below which the first estimate of a backbone takes no value: there the noise decides.
+pub(crate) const SMALLEST_AMPLITUDE: f64 = 1e-3;
+
+/// Nepers over the record that a return without oscillation has at least: less is a drift.
+pub(crate) const SLOWEST_RETURN: f64 = 1.0;
+
+/// Rounds in which the rates of a return without oscillation are refined, each by as much or half as much as the last.
+pub(crate) const RATE_REFINEMENTS: usize = 40;
+
+/// Number of places of the record at which a second excitation is looked for, and again near the best one.
+pub(crate) const RESTART_PLACES: usize = 64;
+
+/// Decrease of the Bayesian information criterion from which a backbone takes the place of linear modes: very strong
+/// evidence after Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795. Close modes of one
+/// channel can be as well described by either.
+pub(crate) const STRONG_EVIDENCE: f64 = 10.0;

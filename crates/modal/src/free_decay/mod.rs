@@ -1,12 +1,15 @@
 //! Frequencies, damping and shapes from a record in which no force acts.
 
+mod aperiodic;
 mod autoregression;
+mod backbone;
 mod error;
 mod estimate;
 mod fit;
 mod initial_poles;
 mod limits;
 mod poles;
+mod restart;
 mod select;
 
 use mechid_signal::Record;
@@ -14,9 +17,11 @@ use mechid_signal::SignalError;
 use mechid_signal::measures::{peak, power_of_two};
 use nalgebra::DMatrix;
 
+use self::aperiodic::{Aperiodic, aperiodic, information};
+pub use self::backbone::{Backbone, BackbonePoint};
 pub use self::error::FreeDecayError;
 pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
-use self::fit::Data;
+use self::fit::{Data, Fit};
 use self::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
 use self::select::Search;
 
@@ -75,6 +80,7 @@ impl Default for FreeDecay {
 /// # Errors
 /// [`FreeDecayError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`],
 /// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than can be fitted,
+/// [`FreeDecayError::NoOscillation`] if decays without oscillation describe it better,
 /// [`FreeDecayError::NoDecay`] if no oscillation stands out of the noise, [`FreeDecayError::Grows`] if most of
 /// the response grows, [`FreeDecayError::NotConverged`] if so many modes cannot be told apart.
 ///
@@ -111,6 +117,7 @@ pub fn free_decay(
         Some(modes) => search.exactly(modes).ok_or(failed.clone())?,
         None => {
             let selected = search.best(most).ok_or(failed.clone())?;
+            check_oscillation(&data, &selected.best.fit, record.sampling().dt())?;
             if selected.best.fit.poles.is_empty() {
                 let needed = select::least_gain(samples, record.channels());
                 return Err(FreeDecayError::NoDecay {
@@ -136,6 +143,21 @@ pub fn free_decay(
         }
     }
     Ok(found)
+}
+
+/// Refuses a response that one or two decays without oscillation describe better than the oscillations that were found,
+/// by the Bayesian information criterion.
+fn check_oscillation(data: &Data, fit: &Fit, dt: f64) -> Result<(), FreeDecayError> {
+    let residual = data.residual(fit);
+    let squares = residual.column_iter().map(|e| e.norm_squared());
+    let of_modes = information(data, squares, fit.poles.len() * (2 + 2 * data.channels()));
+    match aperiodic(data).filter(|found| found.criterion < of_modes) {
+        Some(Aperiodic { rates, .. }) => {
+            let rates = rates.iter().map(|rate| rate.map(|value| value / dt)).collect();
+            Err(FreeDecayError::NoOscillation { rates })
+        }
+        None => Ok(()),
+    }
 }
 
 /// A power of two near the peak of each channel, and the RMS about the mean over it.

@@ -1,0 +1,178 @@
+//! What a free decay shows beside linear modes: a backbone, harmonics, a second hit.
+
+use mechid_checks::limits::SIGNIFICANCE;
+use mechid_estimate::IdentifiedMode;
+use mechid_modal::free_decay::Backbone;
+use mechid_signal::message;
+use serde::Serialize;
+
+use super::summary::DecaySummary;
+use crate::AnalysisError;
+use crate::identify::rows::Uncertain;
+use crate::text::{compact, significant, text_table};
+
+/// Highest multiple of a frequency that is looked for.
+const HIGHEST_HARMONIC: u32 = 7;
+/// Number of standard errors within which a frequency is a multiple of another.
+const HARMONIC_ERRORS: f64 = 4.0;
+
+/// Mode whose frequency is a multiple of that of another, within their errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Harmonic {
+    /// The other mode, counted from 1.
+    pub of_mode: usize,
+    /// The multiple.
+    pub order: u32,
+}
+
+/// Frequency and damping over amplitude.
+#[derive(Debug, Serialize)]
+pub struct BackboneRow {
+    /// Modes of the linear model that stand for this one, counted from 1.
+    pub modes: Vec<usize>,
+    /// Decrease of the Bayesian information criterion from the linear modes to the backbone, a pure number.
+    pub gain: f64,
+    /// Values from the first amplitude down.
+    pub points: Vec<BackbonePointRow>,
+}
+
+/// Frequency and damping at one amplitude.
+#[derive(Debug, Serialize)]
+pub struct BackbonePointRow {
+    /// Time from the first sample used, in s.
+    pub time_s: f64,
+    /// Amplitude in the channel where the mode is largest, in the unit of the response.
+    pub amplitude: f64,
+    /// Frequency, in Hz.
+    pub frequency_hz: Uncertain,
+    /// Damping ratio.
+    pub damping_ratio: Uncertain,
+}
+
+impl BackboneRow {
+    pub(super) fn new(backbone: &Backbone) -> Result<Self, AnalysisError> {
+        let points = backbone.points.iter().map(|point| {
+            Ok(BackbonePointRow {
+                time_s: point.time,
+                amplitude: point.amplitude,
+                frequency_hz: Uncertain::of(&point.frequency_hz)?,
+                damping_ratio: Uncertain::of(&point.damping_ratio)?,
+            })
+        });
+        Ok(Self {
+            modes: backbone.modes.iter().map(|at| at + 1).collect(),
+            gain: backbone.gain,
+            points: points.collect::<Result<_, AnalysisError>>()?,
+        })
+    }
+}
+
+impl DecaySummary {
+    /// Names the modes whose frequency is a multiple of that of a stronger one.
+    ///
+    /// Of a mode that is not linear these are the frequencies within four standard errors of the multiples of its own, which
+    /// change with the amplitude. Elsewhere chance must hardly put a frequency as near to any multiple.
+    pub(super) fn name_harmonics(&mut self, modes: &[IdentifiedMode]) {
+        let named: Vec<Option<Harmonic>> =
+            (0..modes.len()).map(|at| self.harmonic(modes, at)).collect();
+        self.modes.iter_mut().zip(named).for_each(|(row, harmonic)| row.harmonic = harmonic);
+    }
+
+    fn harmonic(&self, modes: &[IdentifiedMode], at: usize) -> Option<Harmonic> {
+        let frequency = modes[at].damped_frequency_hz;
+        let energy = |at: usize| self.modes[at].energy_share;
+        let replaced = self.backbone.as_ref().map(|b| b.modes.as_slice()).unwrap_or_default();
+        if replaced.contains(&(at + 1)) {
+            return None;
+        }
+        if let Some(backbone) = &self.backbone {
+            let hz = || backbone.points.iter().map(|point| point.frequency_hz.value);
+            let (low, high) = (hz().fold(f64::INFINITY, f64::min), hz().fold(0.0, f64::max));
+            let reach = HARMONIC_ERRORS * frequency.standard_error;
+            let order = (2..=HIGHEST_HARMONIC).find(|order| {
+                let multiple = f64::from(*order);
+                (multiple * low - reach..=multiple * high + reach).contains(&frequency.value)
+            });
+            let strongest =
+                replaced.iter().max_by(|a, b| energy(**a - 1).total_cmp(&energy(**b - 1)));
+            // The band of a frequency that is hardly known holds a multiple by chance.
+            if let Some((order, of_mode)) = order.zip(strongest).filter(|_| reach < 0.1 * low) {
+                return Some(Harmonic { of_mode: *of_mode, order });
+            }
+        }
+        let near = |other: usize| {
+            let fundamental = modes[other].damped_frequency_hz;
+            let order = (frequency.value / fundamental.value).round();
+            let error = frequency.standard_error.hypot(order * fundamental.standard_error);
+            let apart = (frequency.value - order * fundamental.value).abs();
+            let by_chance = 2.0 * HARMONIC_ERRORS * error / fundamental.value;
+            let is_multiple = (2.0..=f64::from(HIGHEST_HARMONIC)).contains(&order);
+            (is_multiple && apart <= HARMONIC_ERRORS * error && by_chance <= SIGNIFICANCE)
+                .then_some(Harmonic { of_mode: other + 1, order: order as u32 })
+        };
+        (0..modes.len()).filter(|other| energy(*other) > energy(at)).find_map(near)
+    }
+
+    /// What speaks against a sum of decaying oscillations.
+    pub(super) fn of_model(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if let Some(backbone) = &self.backbone {
+            let numbers: Vec<String> = backbone.modes.iter().map(usize::to_string).collect();
+            let stand = match &numbers[..] {
+                [one] => format!(
+                    "mode {one} is not linear, and its one frequency and damping are a mean"
+                ),
+                all => format!("modes {} stand for one mode and are none", all.join(", ")),
+            };
+            remarks.push(format!(
+                "the amplitude does not fall exponentially: frequency and damping that change with it describe the \
+                 response better (the Bayesian information criterion falls by {}). {stand}; use the values over \
+                 amplitude",
+                significant(backbone.gain, 3)
+            ));
+        }
+        if let Some(at) = self.excited_again_s {
+            let at = compact(at, 4);
+            remarks.push(format!(
+                "the response is excited again at about {at} s, as by a second hit: the modes are not those of one \
+                 decay. Use the part before or after (`to` {at}, `from` {at})"
+            ));
+        }
+        if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {
+            remarks.push(format!(
+                "{} were found, as many as are looked for: there may be more (`max_modes`)",
+                message::count(self.modes.len(), "mode")
+            ));
+        }
+        for (number, row) in (1..).zip(&self.modes) {
+            if let Some(Harmonic { of_mode, order }) = row.harmonic {
+                remarks.push(format!(
+                    "mode {number} lies at {order} × the frequency of mode {of_mode} within its error: a harmonic of a \
+                     response that is not linear, unless the structure has a mode there"
+                ));
+            }
+        }
+        remarks
+    }
+
+    /// Returns frequency and damping over amplitude as a table, or nothing.
+    pub(super) fn backbone_table(&self) -> String {
+        let Some(backbone) = &self.backbone else { return String::new() };
+        let header = [
+            &format!("amplitude ({})", self.unit),
+            "time (s)",
+            "frequency (Hz)",
+            "±",
+            "damping ratio (%)",
+            "±",
+        ];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        rows.extend(backbone.points.iter().map(|point| {
+            let [frequency, frequency_error, _] = point.frequency_hz.cells();
+            let [damping, damping_error, _] = point.damping_ratio.percent().cells();
+            let (amplitude, time) = (significant(point.amplitude, 3), significant(point.time_s, 3));
+            vec![amplitude, time, frequency, frequency_error, damping, damping_error]
+        }));
+        text_table(&rows) + "\n"
+    }
+}

@@ -1,0 +1,80 @@
+//! A response that is excited again while it decays.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::fit::{Data, Fit};
+use super::limits::RESTART_PLACES;
+use super::poles::linear_columns;
+
+/// Returns the first sample of a second excitation, counted from 0: amplitudes of their own before and after it lower
+/// the Bayesian information criterion most, and at all; `None` where none does.
+///
+/// # Source
+/// Bai & Perron (1998), Econometrica 66, 47–78 (changes of coefficients at unknown times); Schwarz (1978), Annals of
+/// Statistics 6, 461–464.
+pub(super) fn restart(data: &Data, fit: &Fit) -> Option<usize> {
+    let len = data.len();
+    let coarse = (len / RESTART_PLACES).max(1);
+    let (_, place) = best(data, fit, (coarse..len).step_by(coarse).collect())?;
+    let around = place.saturating_sub(coarse) + 1..(place + coarse).min(len);
+    let fine = (around.len() / RESTART_PLACES).max(1);
+    let (gain, place) = best(data, fit, around.step_by(fine).collect())?;
+    let unknowns = linear_columns(&fit.poles, data.constant) * data.channels() + 1;
+    (gain > unknowns as f64 * (len as f64).ln()).then_some(place)
+}
+
+/// Returns the place of the largest decrease of minus twice the log likelihood, with the decrease.
+fn best(data: &Data, fit: &Fit, places: Vec<usize>) -> Option<(f64, usize)> {
+    let sums = sums(data, fit, &places);
+    let (gram, products) = sums.last()?;
+    let squares: Vec<f64> = data.samples.column_iter().map(|x| x.norm_squared()).collect();
+    let whole = explained(gram, products)?;
+    let len = data.len() as f64;
+    let gain = |(at, place): (usize, &usize)| {
+        let (before, of_before) = &sums[at];
+        let first = explained(before, of_before)?;
+        let second = explained(&(gram - before), &(products - of_before))?;
+        let parts = (0..squares.len()).map(|c| {
+            let ratio = (squares[c] - first[c] - second[c]) / (squares[c] - whole[c]);
+            -len * ratio.max(f64::MIN_POSITIVE).ln()
+        });
+        Some((parts.sum::<f64>(), *place)).filter(|(gain, _)| gain.is_finite())
+    };
+    places.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Returns BᵀB and BᵀX of the rows before each place, and of all rows at the end.
+fn sums(data: &Data, fit: &Fit, places: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
+    let linear = linear_columns(&fit.poles, data.constant);
+    let mut gram = DMatrix::zeros(linear, linear);
+    let mut products = DMatrix::zeros(linear, data.channels());
+    let (mut sums, mut first, mut next) = (Vec::new(), 0, 0);
+    for basis in data.chunks(&fit.poles) {
+        let end = first + basis.nrows();
+        let mut row = first;
+        while row < end {
+            let stop = places.get(next).copied().unwrap_or(end).min(end);
+            let part = basis.view((row - first, 0), (stop - row, linear));
+            gram += part.tr_mul(&part);
+            products += part.tr_mul(&data.samples.rows(row, stop - row));
+            row = stop;
+            while places.get(next) == Some(&row) {
+                sums.push((gram.clone(), products.clone()));
+                next += 1;
+            }
+        }
+        first = end;
+    }
+    sums.push((gram, products));
+    sums
+}
+
+/// Returns the sum of squares of each channel that the columns explain.
+fn explained(gram: &DMatrix<f64>, products: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let scale: DVector<f64> = gram.diagonal().map(|g| if g > 0.0 { g.sqrt().recip() } else { 0.0 });
+    let scaling = DMatrix::from_diagonal(&scale);
+    let scaled = &scaling * gram * &scaling;
+    let right = &scaling * products;
+    let solution = scaled.cholesky()?.solve(&right);
+    Some((0..products.ncols()).map(|c| solution.column(c).dot(&right.column(c))).collect())
+}
