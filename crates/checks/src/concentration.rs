@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::limits::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED};
+use super::limits::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED, SIGNIFICANCE};
 use super::limits::{LINES_PER_DISTURBED, SAME_LINE};
 use super::misfit::Concentration;
 
@@ -92,7 +92,66 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
     let mut frequencies_hz: Vec<f64> = chosen.iter().map(|at| lines[*at].omega / TAU).collect();
     frequencies_hz.sort_by(f64::total_cmp);
     let alone = share >= CONCENTRATED && ratio <= DISTURBED_ALONE;
-    alone.then_some(Concentration { frequencies_hz, share })
+    let all_hz: Vec<f64> = lines.iter().map(|line| line.omega / TAU).collect();
+    let multiples_of_hz = common_divisor(&frequencies_hz, &all_hz);
+    alone.then_some(Concentration { frequencies_hz, share, multiples_of_hz })
+}
+
+/// Returns the frequency of which all `chosen` lines of `all` are multiples, each within the distance of the lines;
+/// `None` where so many lines chosen at random are likely to be, or no other line shows how far they are apart.
+///
+/// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a random choice are
+/// multiples of one of them is that of a hypergeometric distribution, times the number of candidates.
+fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
+    let spacing = all.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
+    let lowest = *chosen.first().filter(|_| chosen.len() > 1)?;
+    let near = |hz: f64, of: f64| (hz - (hz / of).round().max(1.0) * of).abs() < spacing;
+    let candidates: Vec<f64> = (1_u32..)
+        .map(|part| lowest / f64::from(part))
+        .take_while(|of| *of > 2.0 * spacing)
+        .collect();
+    let (probability, divisor) = candidates
+        .iter()
+        .map(|of| refined(chosen, *of))
+        .filter(|of| chosen.iter().all(|hz| near(*hz, *of)))
+        .map(|of| {
+            let multiples = all.iter().filter(|hz| near(**hz, of)).count();
+            // Choices without replacement: c/n · (c − 1)/(n − 1) …
+            let draws = (0..chosen.len())
+                .map(|drawn| (multiples - drawn) as f64 / (all.len() - drawn) as f64);
+            (draws.product::<f64>(), of)
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (probability * candidates.len() as f64 <= SIGNIFICANCE).then_some(divisor)
+}
+
+/// Returns the frequency whose multiples are nearest to the `chosen` lines, by least squares with the orders that the
+/// first estimate gives.
+fn refined(chosen: &[f64], first: f64) -> f64 {
+    let orders = chosen.iter().map(|hz| (hz / first).round().max(1.0));
+    let (products, squares) = chosen
+        .iter()
+        .zip(orders)
+        .fold((0.0, 0.0), |sums, (hz, order)| (sums.0 + hz * order, sums.1 + order * order));
+    products / squares
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn multiples_of_a_rotation_are_named_and_chance_is_not() {
+        let all: Vec<f64> = (6..=64).map(|line| 4.0 * f64::from(line)).collect();
+        // 50 Hz lies between two lines, 100 Hz on one.
+        let of_rotation = [48.0, 52.0, 100.0, 148.0, 152.0, 200.0];
+        let divisor = common_divisor(&of_rotation, &all).unwrap();
+        assert!((divisor - 50.0).abs() < 0.5, "{divisor}");
+        assert_eq!(common_divisor(&[48.0, 100.0], &all), None);
+        assert_eq!(common_divisor(&[60.0, 104.0, 172.0, 236.0], &all), None);
+        assert_eq!(common_divisor(&[60.0], &all), None);
+        assert_eq!(common_divisor(&[60.0], &[60.0]), None);
+    }
 }
 
 /// The lines of all records by rising frequency.

@@ -113,6 +113,8 @@ findings! {
     Instability in instability,
     /// Difference of two masses that the kinetic energy makes equal.
     MassSymmetry in symmetry,
+    /// Inertia of the fluid in a bearing whose reported coefficients have none.
+    FluidInertia in fluid_inertia,
     /// Mass that is negative.
     NegativeMass in mass,
     /// Damping and stiffness that are symmetric but for one factor between two degrees of freedom, as gains make them.

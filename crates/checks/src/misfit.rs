@@ -32,6 +32,9 @@ pub struct Concentration {
     pub frequencies_hz: Vec<f64>,
     /// Fraction of the residual power beyond the noise that goes with them.
     pub share: f64,
+    /// Frequency of which all of them are multiples, in Hz, where chance hardly makes them so.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub multiples_of_hz: Option<f64>,
 }
 
 /// Source of the noise power that a residual is compared with.
@@ -99,7 +102,14 @@ impl Concentration {
              with `without_hz` {}",
             listed(&hz),
             hz.join(",")
-        )
+        )?;
+        match self.multiples_of_hz.map(line_hz) {
+            Some(of) => write!(
+                f,
+                "; all are near multiples of {of} Hz, of a rotation? `without_hz` {of}:multiples"
+            ),
+            None => Ok(()),
+        }
     }
 }
 

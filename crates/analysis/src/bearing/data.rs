@@ -1,7 +1,9 @@
 //! Forces on the film and its motion, from records or from tables of frequency responses.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
+use mechid_checks::{Finding, power, steady_periods};
 use mechid_io::FrequencyResponses;
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
@@ -12,9 +14,10 @@ use super::IdentifyBearing;
 use crate::AnalysisError;
 use crate::identify::Disturbance;
 use crate::identify::IdentifyResponses;
+use crate::identify::checks::of_sensors;
 use crate::identify::left_out::LineRule;
 use crate::identify::tabulated::response_data;
-use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Measurement, Windowed};
+use crate::measurement::{Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed};
 
 /// Degrees of freedom from which the noise of a line is known well enough to weight with it: the loss
 /// of information is then below 3 %.
@@ -27,6 +30,8 @@ pub struct BearingData {
     pub(super) names: Vec<String>,
     /// Rows of all tests, with their noise where it is known.
     pub(super) data: FrequencyData,
+    /// The rows of each test, with the checks made of its record.
+    pub(super) records: Vec<TestRecord>,
     /// Source of the noise, in words; `None` where it is not known.
     pub(super) noise: Option<&'static str>,
     /// Largest distance of the housing from its mean place, relative to the shaft, in m; `None` of
@@ -35,6 +40,17 @@ pub struct BearingData {
     /// Frequencies with rotation that were left out, in Hz.
     pub(super) left_out_hz: Vec<f64>,
     pub(super) remarks: Vec<String>,
+}
+
+/// One test of a condition.
+#[derive(Debug, Clone)]
+pub(super) struct TestRecord {
+    pub name: String,
+    /// Names of its channels.
+    pub channels: Arc<Channels>,
+    pub data: FrequencyData,
+    /// Findings on its samples.
+    pub before: Vec<Finding>,
 }
 
 impl BearingData {
@@ -148,9 +164,16 @@ impl BearingData {
             ));
         }
         let left_out_hz = rotating.into_iter().map(|row| d.omega()[row] / TAU).collect();
+        let record = TestRecord {
+            name: names.join(", "),
+            channels: Arc::default(),
+            data: data.clone(),
+            before: Vec::new(),
+        };
         Ok(Self {
             names,
             data,
+            records: vec![record],
             noise,
             largest_displacement: None,
             left_out_hz: distinct(left_out_hz),
@@ -161,7 +184,8 @@ impl BearingData {
     fn of_record(test: &Measurement, how: &IdentifyBearing) -> Result<Self, AnalysisError> {
         let recorded = test.hold(Hold::Periods)?;
         let held = &recorded.held;
-        let (_, d) = of_film(held, how.stator_mass)?;
+        let (film_force, d) = of_film(held, how.stator_mass)?;
+        how.check_rotation(held.force.sampling().rate_hz())?;
         let period = held.force.sampling().with_len(held.period)?;
         let spacing_hz = period.line_spacing_hz();
         let rule = LineRule { choice: &how.lines, without: &how.without };
@@ -200,9 +224,16 @@ impl BearingData {
                 held.file
             ));
         }
+        let record = TestRecord {
+            name: held.file.clone(),
+            channels: Arc::clone(&held.names),
+            data: data.clone(),
+            before: of_record(held, &film_force, &d)?,
+        };
         Ok(Self {
             names: vec![held.file.clone()],
             data,
+            records: vec![record],
             noise,
             largest_displacement: Some(largest_orbit(&d)),
             left_out_hz: rotating.into_iter().map(|line| line as f64 * spacing_hz).collect(),
@@ -219,6 +250,7 @@ impl BearingData {
             (a, b) => a.or(b),
         };
         self.names.extend(other.names);
+        self.records.extend(other.records);
         self.remarks.extend(other.remarks);
         self.left_out_hz.extend(other.left_out_hz);
         self.left_out_hz = distinct(self.left_out_hz);
@@ -249,14 +281,14 @@ fn distinct(mut numbers: Vec<f64>) -> Vec<f64> {
 }
 
 /// Smallest distance between different frequencies, in Hz; 0 of a single one.
-fn spacing(omega: &[f64]) -> f64 {
+pub(super) fn spacing(omega: &[f64]) -> f64 {
     let sorted = distinct(omega.to_vec());
     let smallest = sorted.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest / TAU } else { 0.0 }
 }
 
 /// Returns whether the rotation or a multiple of it shows on a line.
-fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
+pub(super) fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
     rotation_hz.is_some_and(|rotation| Disturbance::rotation(rotation).reaches(hz, spacing_hz))
 }
 
@@ -277,6 +309,19 @@ fn of_film(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> 
     }
     let force = Record::new(block.force.sampling(), block.force.data() - a.data() * mass)?;
     Ok((force, d.clone()))
+}
+
+/// Checks the channels of a record, its periods, and the power that goes into the housing and into the film.
+fn of_record(held: &Block, film_force: &Record, d: &Record) -> Result<Vec<Finding>, AnalysisError> {
+    let kind = ResponseQuantity::Displacement;
+    let mut findings = held.unit_findings.clone();
+    findings.extend(of_sensors(held));
+    findings.extend(steady_periods(&held.force, d, held.period)?);
+    if let Some(a) = &held.acceleration {
+        findings.extend(power(&held.force, a, ResponseQuantity::Acceleration)?);
+    }
+    findings.extend(power(film_force, d, kind)?);
+    Ok(findings)
 }
 
 /// All periods of a test, read chunk by chunk.

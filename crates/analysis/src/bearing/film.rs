@@ -7,7 +7,10 @@ use mechid_estimate::frequency_domain::{
 use mechid_model::{Matrix, Parameter};
 use mechid_numerics::NumericsError;
 use nalgebra::{DMatrix, DVector, Matrix2};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::checks::excess;
+use super::selection::{conditional_interval, gap};
 use super::{BearingData, Coefficients};
 use crate::AnalysisError;
 
@@ -16,6 +19,10 @@ const SIGNIFICANCE: f64 = 0.05;
 
 /// Coefficients of each kind.
 const EACH: usize = 4;
+
+/// Names of the coefficients, in the order of every covariance.
+pub(super) const NAMED: [&str; 3 * EACH] =
+    ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
 
 /// Coefficients of a film with their covariance: kxx, kxy, kyx, kyy, then c and m likewise.
 #[derive(Debug, Clone)]
@@ -31,6 +38,13 @@ pub(super) struct Film {
     pub baseline: Option<(DVector<f64>, DMatrix<f64>)>,
     /// Fit of the tests, by which the result is judged.
     pub fit: OutputErrorFit,
+    /// Likewise of the baseline tests.
+    pub baseline_fit: Option<OutputErrorFit>,
+    /// Residual power over that of the noise where it exceeds that significantly, otherwise 1; all variances
+    /// are multiplied by it.
+    pub excess: f64,
+    /// Level that the statistic of all masses had to exceed; `None` where the test chose nothing.
+    critical: Option<f64>,
     pub degrees_of_freedom: usize,
 }
 
@@ -57,8 +71,12 @@ impl Film {
             rig: rig.values.clone(),
             baseline: base.as_ref().map(|base| (base.values.clone(), base.covariance.clone())),
             fit: rig.full.clone(),
+            baseline_fit: base.as_ref().map(|base| base.full.clone()),
+            excess: 1.0,
+            critical: None,
             degrees_of_freedom,
         };
+        let before_choice = film.excess_of(tests, baseline)?;
         let common = rig.common_mass(base.as_ref())?;
         let reduced = rig.with_mass(tests, &common)?;
         let reduced_base = match (baseline, &base) {
@@ -69,13 +87,20 @@ impl Film {
         if let (Some(base), Some(reduced)) = (&base, &reduced_base) {
             pairs.push((&base.full, reduced));
         }
-        film.inertia = likelihood_ratio(&pairs, EACH);
+        let fisher = FisherSnedecor::new(EACH as f64, degrees_of_freedom.max(1) as f64).ok();
+        film.inertia = likelihood_ratio(&pairs, EACH)
+            .map(|test| over_excess(test, before_choice, fisher.as_ref()));
         let eight = match coefficients {
             Coefficients::Eight => true,
             Coefficients::Twelve => false,
             Coefficients::Automatic => film.inertia.is_some_and(|t| t.p_value >= SIGNIFICANCE),
         };
         if !eight {
+            let chosen = coefficients == Coefficients::Automatic && film.inertia.is_some();
+            film.critical = fisher
+                .filter(|_| chosen)
+                .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE));
+            film.widen(before_choice);
             return Ok(film);
         }
         let eight = 2 * EACH;
@@ -94,7 +119,44 @@ impl Film {
             *values = in_order(base, &common).0;
         }
         film.fit = reduced;
+        film.baseline_fit = reduced_base;
+        let excess = film.excess_of(tests, baseline)?;
+        film.widen(excess);
         Ok(film)
+    }
+
+    /// Returns by how much the residuals of tests and baseline exceed their noise, the larger of both.
+    fn excess_of(
+        &self,
+        tests: &BearingData,
+        baseline: Option<&BearingData>,
+    ) -> Result<f64, AnalysisError> {
+        let of_tests = excess(tests, &self.fit)?;
+        match baseline.zip(self.baseline_fit.as_ref()) {
+            Some((baseline, fit)) => Ok(of_tests.max(excess(baseline, fit)?)),
+            None => Ok(of_tests),
+        }
+    }
+
+    /// Multiplies all variances by the power of the residual over that of the noise.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227.
+    fn widen(&mut self, excess: f64) {
+        self.excess = excess;
+        self.covariance *= excess;
+        if let Some((_, covariance)) = &mut self.baseline {
+            *covariance *= excess;
+        }
+    }
+
+    /// Returns the interval of a coefficient at a level, given that the test has chosen twelve; `None` where it has
+    /// not, or where it would have chosen them whatever the coefficient.
+    pub fn interval_after_choice(&self, at: usize, level: f64) -> Option<[f64; 2]> {
+        let masses = 2 * EACH..3 * EACH;
+        let gap = gap(&self.values, &self.covariance, at, masses, self.critical?)?;
+        let estimate = [self.values[at], self.covariance[(at, at)].sqrt()];
+        conditional_interval(estimate, self.degrees_of_freedom, gap, level)
     }
 
     /// Returns K, C or M, 2×2; M is zero where it was not identified.
@@ -112,6 +174,23 @@ impl Film {
 
     pub fn values(&self) -> &[f64] {
         self.values.as_slice()
+    }
+}
+
+/// Divides the statistic of a test by the power of the residual over that of the noise.
+fn over_excess(
+    test: LikelihoodRatio,
+    excess: f64,
+    fisher: Option<&FisherSnedecor>,
+) -> LikelihoodRatio {
+    let statistic = test.statistic / excess;
+    match fisher.filter(|_| excess > 1.0) {
+        Some(fisher) => LikelihoodRatio {
+            statistic,
+            p_value: fisher.sf(statistic / test.restrictions as f64),
+            ..test
+        },
+        None => test,
     }
 }
 

@@ -17,16 +17,24 @@
 //! | `settings` | settings, as values |
 //! | `data` | f − M_s a and d from records or from tables of frequency responses |
 //! | `film` | eight or twelve coefficients, with the baseline subtracted; the likelihood-ratio test |
+//! | `selection` | intervals after the test has chosen twelve |
+//! | `rotation` | the speed of which a misfit speaks |
+//! | `checks` | checks of the records and of the residual |
 //! | `stiffness` | the dynamic stiffness line by line |
 //! | `summary` | the result: numbers, remarks |
+//! | `ross` | the coefficients in the axes of ROSS |
 //! | `speeds` | tests at several speeds and loads, and their results as one table |
 //!
 //! # Source
 //! Childs and Hale (1994), Journal of Tribology 116, 337–344; Rouvas and Childs (1993), Journal of
 //! Vibration and Acoustics 115, 264–270.
 
+mod checks;
 mod data;
 mod film;
+mod ross;
+mod rotation;
+mod selection;
 mod settings;
 mod speeds;
 mod stiffness;
@@ -61,7 +69,8 @@ pub fn identify_bearing(
     how.check()?;
     let film = Film::of(tests, baseline, how.coefficients)?;
     let lines = stiffness::lines(tests, &film)?;
-    let summary = BearingSummary::new(tests, baseline, &film, lines, how)?;
+    let checks = checks::rows(tests, baseline, &film, how.stator_mass)?;
+    let summary = BearingSummary::new(tests, baseline, &film, lines, checks, how)?;
     Ok(IdentifiedBearing { film, summary })
 }
 

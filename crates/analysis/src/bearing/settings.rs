@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::AnalysisError;
 use crate::identify::IdentifyResponses;
 use crate::identify::{LeftOut, LineChoice};
+use crate::text::compact;
 
 /// Settings of the identification of a bearing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -75,6 +76,21 @@ impl IdentifyBearing {
         }
         let (averages, points) = (self.averages, self.points.clone());
         Ok(IdentifyResponses { averages, points, band, ..IdentifyResponses::default() })
+    }
+
+    /// Refuses a speed of rotation that a record sampled at `rate_hz` cannot show: run-out would be folded onto other
+    /// lines, and the speed is more likely to be in another unit.
+    pub(super) fn check_rotation(&self, rate_hz: f64) -> Result<(), AnalysisError> {
+        let Some(rotation_hz) = self.rotation_hz.filter(|hz| *hz > 0.5 * rate_hz) else {
+            return Ok(());
+        };
+        let why = format!(
+            "{} Hz is above half the sampling rate of {} Hz: is the speed in rev/min? Then it is {} Hz",
+            compact(rotation_hz, 6),
+            compact(rate_hz, 6),
+            compact(rotation_hz / 60.0, 6)
+        );
+        Err(AnalysisError::Setting { setting: "rotation_hz", why })
     }
 
     /// Checks that every number given is positive and finite.

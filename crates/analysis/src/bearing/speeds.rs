@@ -7,11 +7,14 @@ use std::path::PathBuf;
 use mechid_io::FrequencyResponses;
 use serde::{Deserialize, Serialize};
 
+use super::film::NAMED;
 use super::{
     BearingData, BearingSummary, CoefficientRow, IdentifiedBearing, IdentifyBearing,
     identify_bearing,
 };
 use crate::AnalysisError;
+use crate::identify::rows::Uncertain;
+use crate::identify::summary::verdict;
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
 use crate::text::{compact, paged_table, significant};
 
@@ -109,8 +112,7 @@ impl BearingTable {
     /// they were not identified) in SI units, and each with its standard error. The columns without
     /// the load and the errors are the arguments of a bearing element in rotor-dynamics programs.
     pub fn csv(&self) -> String {
-        let names =
-            ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
+        let names = NAMED;
         let mut text = String::from("speed,load");
         for name in names {
             let _ = write!(text, ",{name}");
@@ -128,8 +130,12 @@ impl BearingTable {
                 let _ = write!(text, ",{:?}", of(name).map_or(0.0, |c| c.estimate.value));
             }
             for name in names {
-                let error = of(name).and_then(|c| c.estimate.standard_error);
-                let _ = write!(text, ",{:?}", error.unwrap_or(0.0));
+                // Empty where it is withheld, zero for a mass that is taken as zero.
+                let error = of(name).map_or(Some(0.0), |c| c.estimate.standard_error);
+                let _ = match error {
+                    Some(error) => write!(text, ",{error:?}"),
+                    None => write!(text, ","),
+                };
             }
         }
         text + "\n"
@@ -143,16 +149,36 @@ impl fmt::Display for BearingTable {
         for row in names.into_iter().flatten() {
             table[0].push(format!("{}, {}", row.name, row.unit));
         }
+        let coefficients = table[0].len();
+        table[0].extend(["whirl ratio".to_owned(), "critical mass, kg".to_owned()]);
         for row in &self.rows {
             let cell = |value: Option<f64>| value.map_or(String::new(), |value| compact(value, 6));
             let mut cells = vec![cell(row.rotation_hz), cell(row.load)];
-            cells.extend(row.coefficients.iter().map(|c| {
-                let error = c.estimate.standard_error.unwrap_or(0.0);
-                format!("{} ± {}", significant(c.estimate.value, 4), significant(error, 2))
+            let with_error = |estimate: &Uncertain| {
+                let value = significant(estimate.value, 4);
+                match estimate.standard_error {
+                    Some(error) => format!("{value} ± {}", significant(error, 2)),
+                    None => value,
+                }
+            };
+            cells.extend(row.coefficients.iter().map(|c| with_error(&c.estimate)));
+            cells.resize(coefficients, String::new());
+            let stability = row.stability.as_ref();
+            let of_rotor = [
+                stability.map(|stability| &stability.whirl_frequency_ratio),
+                stability.map(|stability| &stability.critical_mass),
+            ];
+            cells.extend(of_rotor.map(|value| match value {
+                Some(Some(value)) => with_error(value),
+                Some(None) => "stable".into(),
+                None => String::new(),
             }));
             table.push(cells);
         }
         f.write_str(&paged_table(&table, 6))?;
+        for row in &self.rows {
+            write!(f, "{}: {}", row.tests.join(", "), verdict(&row.checks))?;
+        }
         for row in &self.rows {
             for remark in &row.remarks {
                 writeln!(f, "note: {}: {remark}", row.tests.join(", "))?;

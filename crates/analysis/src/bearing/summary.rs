@@ -4,24 +4,30 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_bearing::{Conditions, Threshold};
+use mechid_checks::limits::DISTURBED_ALONE;
 use mechid_estimate::frequency_domain::LikelihoodRatio;
 use mechid_io::ParameterCovariance;
 use mechid_model::OilFilm;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::film::Film;
+use super::film::{Film, NAMED};
+use super::rotation::speed_of_misfit;
 use super::{BearingData, IdentifyBearing, StiffnessLine};
 use crate::AnalysisError;
+use crate::identify::checks::CheckRow;
 use crate::identify::rows::{CONFIDENCE, Uncertain, header};
+use crate::identify::summary::verdict;
 use crate::text::{compact, paragraph, significant, text_table};
 
 /// Amplitude over clearance above which the linearised film is biased.
 pub const LARGEST_AMPLITUDE: f64 = 0.05;
 
-/// Names of the coefficients, in the order of every covariance.
-const NAMES: [&str; 12] =
-    ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
+/// Half the width of an interval at 95 %, in standard errors.
+const NORMAL: f64 = 1.96;
+
+/// Relative change of the width of an interval by the choice of the test from which it is said.
+const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.
 const UNITS: [&str; 3] = ["N/m", "N·s/m", "kg"];
@@ -54,6 +60,9 @@ pub struct BearingSummary {
     pub amplitude: Option<Amplitude>,
     /// Residual power over noise power, a ratio; 1 where the noise is not known.
     pub misfit_ratio: f64,
+    /// Number by which the standard errors that follow from the noise are multiplied (Birge ratio): 1 where the residual
+    /// is no larger than the noise, `None` where it is so much larger that errors and intervals are withheld.
+    pub error_scale: Option<f64>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of spectral lines, summed over the tests.
@@ -62,6 +71,8 @@ pub struct BearingSummary {
     pub left_out_hz: Vec<f64>,
     /// Dynamic stiffness of the film line by line.
     pub dynamic_stiffness: Vec<StiffnessLine>,
+    /// Findings on the data before the fit and on the residual after it.
+    pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// The settings, which repeat the analysis.
@@ -115,9 +126,14 @@ impl BearingSummary {
         baseline: Option<&BearingData>,
         film: &Film,
         lines: Vec<StiffnessLine>,
+        checks: Vec<CheckRow>,
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
+        let error_scale = (film.excess <= DISTURBED_ALONE).then(|| film.excess.sqrt());
         let uncertain = |value: f64, variance: f64| {
+            if error_scale.is_none() {
+                return Ok(Uncertain::known(value));
+            }
             let standard_error = variance.max(0.0).sqrt();
             let degrees_of_freedom = film.degrees_of_freedom;
             let uncertain =
@@ -126,8 +142,11 @@ impl BearingSummary {
         };
         let count = film.values().len();
         let rows = (0..count).map(|at| {
-            let estimate = uncertain(film.values()[at], film.covariance()[(at, at)])?;
-            Ok(CoefficientRow { name: NAMES[at], unit: UNITS[at / 4], estimate })
+            let mut estimate = uncertain(film.values()[at], film.covariance()[(at, at)])?;
+            if let Some(interval) = film.interval_after_choice(at, CONFIDENCE) {
+                estimate.interval = estimate.interval.map(|_| interval);
+            }
+            Ok(CoefficientRow { name: NAMED[at], unit: UNITS[at / 4], estimate })
         });
         let amplitude = tests.largest_displacement.map(|largest_displacement| Amplitude {
             largest_displacement,
@@ -141,7 +160,7 @@ impl BearingSummary {
             confidence: CONFIDENCE,
             coefficients: rows.collect::<Result<_, AnalysisError>>()?,
             covariance: ParameterCovariance::new(
-                NAMES[..count].iter().map(|name| (*name).to_owned()).collect(),
+                NAMED[..count].iter().map(|name| (*name).to_owned()).collect(),
                 film.covariance(),
                 film.degrees_of_freedom,
             ),
@@ -150,14 +169,17 @@ impl BearingSummary {
             stability: None,
             amplitude,
             misfit_ratio: film.fit.misfit_ratio,
+            error_scale,
             condition_number: film.fit.estimate.condition(),
             lines: tests.data.len(),
             left_out_hz: tests.left_out_hz.clone(),
             dynamic_stiffness: lines,
+            checks,
             remarks: tests.remarks.clone(),
             analysis: how.clone(),
         };
         summary.remarks.extend(baseline.iter().flat_map(|b| b.remarks.iter().cloned()));
+        summary.remarks.extend(summary.of_intervals(tests, film));
         summary.dimensionless = summary.scaled()?;
         summary.stability = match how.rotation_hz {
             Some(hz) => summary.whirl(film, TAU * hz, &uncertain)?,
@@ -173,6 +195,47 @@ impl BearingSummary {
             ));
         }
         Ok(summary)
+    }
+
+    /// Returns what the residual and the choice of twelve coefficients do to the intervals, and the speed that the
+    /// misfit speaks of.
+    fn of_intervals(&self, tests: &BearingData, film: &Film) -> Vec<String> {
+        let mut remarks = Vec::new();
+        match self.error_scale {
+            None => remarks.push(format!(
+                "no standard errors and intervals are given: the residual power is {} × that of the noise, so the \
+                 coefficients do not describe the tests",
+                significant(film.excess, 3)
+            )),
+            Some(scale) if scale > 1.0 => remarks.push(format!(
+                "the standard errors are {} × those of the noise, as the residual is",
+                significant(scale, 3)
+            )),
+            Some(_) => {}
+        }
+        let is_moved = |at: usize| {
+            film.interval_after_choice(at, CONFIDENCE).is_some_and(|interval| {
+                let error = film.covariance()[(at, at)].sqrt();
+                let width = interval[1] - interval[0];
+                (width / (2.0 * NORMAL * error) - 1.0).abs() > MOVED
+            })
+        };
+        if self.error_scale.is_some() && (0..film.values().len()).any(is_moved) {
+            remarks.push(
+                "the intervals allow for the choice of twelve coefficients by the test, which favours large masses; with \
+                 `coefficients` twelve, given before the test, they are narrower"
+                    .into(),
+            );
+        }
+        let speed = if self.error_scale.is_none() { speed_of_misfit(&tests.data) } else { None };
+        if let Some(hz) = speed {
+            let hz = compact(hz, 3);
+            remarks.push(format!(
+                "without the lines at multiples of about {hz} Hz the tests agree: if the shaft rotates at that speed, its \
+                 run-out disturbs them (`rotation_hz` {hz})"
+            ));
+        }
+        remarks
     }
 
     fn scaled(&self) -> Result<Option<Dimensionless>, AnalysisError> {
@@ -259,7 +322,7 @@ impl BearingSummary {
             let mut all = vec![header(what)];
             all.extend(rows.iter().map(|row| {
                 let mut cells = vec![row.name.to_owned()];
-                cells.extend(row.estimate.cells());
+                cells.extend(self.cells(&row.estimate));
                 cells.push(row.unit.into());
                 cells
             }));
@@ -281,7 +344,7 @@ impl BearingSummary {
             ] {
                 let mut row = vec![name.to_owned()];
                 match value {
-                    Some(value) => row.extend(value.cells()),
+                    Some(value) => row.extend(self.cells(value)),
                     None => row.push("none: stable".into()),
                 }
                 row.resize(4, String::new());
@@ -293,7 +356,16 @@ impl BearingSummary {
         }
         text.push('\n');
         text += &self.fit_lines();
+        text += &format!("\n{}", verdict(&self.checks));
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    /// Returns value, standard error and interval.
+    pub(super) fn cells(&self, estimate: &Uncertain) -> [String; 3] {
+        match self.error_scale {
+            Some(_) => estimate.cells(),
+            None => [significant(estimate.value, 6), "withheld".into(), String::new()],
+        }
     }
 
     fn fit_lines(&self) -> String {

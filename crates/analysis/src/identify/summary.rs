@@ -337,7 +337,7 @@ impl IdentificationSummary {
 }
 
 /// Returns how many checks passed, and each warning with its sentence.
-pub(super) fn verdict(checks: &[CheckRow]) -> String {
+pub(crate) fn verdict(checks: &[CheckRow]) -> String {
     let all = checks.len();
     let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
     let mut text = match warnings.len() {

@@ -36,17 +36,17 @@ fn film(inertia: f64) -> [Matrix2<f64>; 3] {
     ]
 }
 
-fn rig(inertia: f64) -> BearingRig {
+pub(super) fn rig(inertia: f64) -> BearingRig {
     BearingRig::new(film(inertia))
 }
 
-fn with_baseline(inertia: f64) -> BearingRig {
+pub(super) fn with_baseline(inertia: f64) -> BearingRig {
     let k = Matrix2::new(6.0, 0.5, 0.3, 5.0) * 1e6;
     let c = Matrix2::new(2.0, 0.1, 0.1, 1.5) * 1e3;
     BearingRig { baseline: [k, c, Matrix2::identity() * 0.4], ..rig(inertia) }
 }
 
-fn settings(rig: &BearingRig) -> IdentifyBearing {
+pub(super) fn settings(rig: &BearingRig) -> IdentifyBearing {
     IdentifyBearing {
         stator_mass: rig.stator_mass,
         rotation_hz: Some(rig.rotation_hz),
@@ -54,7 +54,7 @@ fn settings(rig: &BearingRig) -> IdentifyBearing {
     }
 }
 
-fn measurement(test: &RigTest) -> Measurement {
+pub(super) fn measurement(test: &RigTest) -> Measurement {
     let responses = [
         (ResponseQuantity::Displacement, &test.displacement),
         (ResponseQuantity::Acceleration, &test.acceleration),
@@ -63,12 +63,12 @@ fn measurement(test: &RigTest) -> Measurement {
 }
 
 /// Tests with the shakers in turn, without noise.
-fn periods(rig: &BearingRig, amplitude: f64) -> Vec<RigTest> {
+pub(super) fn periods(rig: &BearingRig, amplitude: f64) -> Vec<RigTest> {
     let one = |(shakers, seed)| rig.period(sampling(), &lines(), amplitude, shakers, seed).unwrap();
     [(Shakers::X, 1), (Shakers::Y, 2)].map(one).to_vec()
 }
 
-fn data(rig: &BearingRig, periods: &[RigTest], count: usize, seed: u64) -> BearingData {
+pub(super) fn data(rig: &BearingRig, periods: &[RigTest], count: usize, seed: u64) -> BearingData {
     let test = |(at, period): (u64, &RigTest)| {
         measurement(&rig.measured(period, count, 10 * seed + at).unwrap())
     };

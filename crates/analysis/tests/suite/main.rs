@@ -3,6 +3,7 @@
 //! One program of many modules: each test program of its own would compile and link all crates below anew.
 
 mod bearing;
+mod bearing_checks;
 mod crosstalk;
 mod decay;
 mod decay_nonlinear;

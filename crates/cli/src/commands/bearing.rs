@@ -77,6 +77,10 @@ pub struct BearingArgs {
     /// myy, and their standard errors, one row per speed and load
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
+    /// Write the coefficients into this file (-: to standard output) in the axes of ROSS, whose load acts along −y:
+    /// speed in rad/s, kxx … myy, one row per speed and load
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    ross: Option<PathBuf>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -123,7 +127,7 @@ struct SizeArgs {
 impl BearingArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        let outputs = [&self.output, &self.plot.plot].into_iter().flatten();
+        let outputs = [&self.output, &self.ross, &self.plot.plot].into_iter().flatten();
         let inputs = [&self.input.record].into_iter().chain(&self.more).chain(&self.baseline);
         Files::default().reads(inputs).writes(outputs)
     }
@@ -184,8 +188,12 @@ impl BearingArgs {
     }
 
     fn with_table(&self, outcome: Outcome, table: &BearingTable) -> Outcome {
-        match &self.output {
+        let outcome = match &self.output {
             Some(path) => outcome.with_file(path, table.csv()),
+            None => outcome,
+        };
+        match &self.ross {
+            Some(path) => outcome.with_file(path, table.ross_csv()),
             None => outcome,
         }
     }

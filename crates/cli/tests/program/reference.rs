@@ -140,8 +140,8 @@ fn every_field_of_every_report_is_in_the_reference() {
         let command = arguments.split_whitespace().next().unwrap();
         let page = page();
         let mut section = section(&page, &format!("mechid {command}")).to_owned();
-        if command == "report" {
-            // It says all that identify says.
+        if ["report", "bearing"].contains(&command) {
+            // They say all that identify says, or its checks.
             section += self::section(&page, "mechid identify");
         }
         let mut paths = BTreeSet::new();

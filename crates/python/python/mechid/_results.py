@@ -673,6 +673,25 @@ class IdentifiedBearing(Drawn):
         told = (self._told["stability"] or {}).get(name)
         return None if told is None else _uncertain(told)
 
+    @cached_property
+    def checks(self) -> tuple[Finding, ...]:
+        """Findings on the data before the fit and on the residual after it."""
+        return tuple(_finding(row) for row in self._told["checks"])
+
+    def ross(self, release: int = 2) -> dict[str, list[float]]:
+        """Return keyword arguments of ``ross.BearingElement``: coefficients in its axes, and the speed in rad/s.
+
+        The load acts along x here and along −y there. Releases 1 and 2 call the speed ``frequency``, release 3
+        ``speed``.
+        """
+        turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+        arguments = {"frequency" if release < 3 else "speed": [2.0 * np.pi * (self._told["rotation_hz"] or 0.0)]}
+        for kind in "kcm":
+            matrix = turn @ self._matrix(kind) @ turn.T
+            for entry, value in zip(("xx", "xy", "yx", "yy"), matrix.ravel(), strict=True):
+                arguments[kind + entry] = [float(value) + 0.0]
+        return arguments
+
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={one.value:.6g}" for name, one in self.coefficients.items())
         return f"<IdentifiedBearing {self._told['tests']!r}: {values}>"

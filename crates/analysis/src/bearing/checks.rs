@@ -1,0 +1,106 @@
+//! Checks of the tests of a bearing, before and after its fit.
+
+use mechid_checks::{
+    Finding, adjust_p_values, after_spectral_fit, before_spectral_fit, fluid_inertia, instability,
+    mass_symmetry,
+};
+use mechid_estimate::frequency_domain::OutputErrorFit;
+use mechid_estimate::{Estimate, Unknowns, identified_modes};
+use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_signal::Extent;
+use mechid_spectra::FrequencyData;
+use nalgebra::DMatrix;
+
+use super::BearingData;
+use super::film::{Film, NAMED};
+use crate::AnalysisError;
+use crate::identify::checks::{CheckRow, When};
+use crate::measurement::Channels;
+
+/// A finding with the test that it belongs to, if it is one.
+type Placed<'a> = (When, Option<(&'a str, &'a Channels)>, Finding);
+
+/// Returns all findings on the tests and on the baseline tests, with one error rate for the statistical tests among
+/// them.
+pub(super) fn rows(
+    tests: &BearingData,
+    baseline: Option<&BearingData>,
+    film: &Film,
+    stator_mass: f64,
+) -> Result<Vec<CheckRow>, AnalysisError> {
+    let mut all = of_condition(tests, &film.fit)?;
+    if let Some((baseline, fit)) = baseline.zip(film.baseline_fit.as_ref()) {
+        all.extend(of_condition(baseline, fit)?);
+    }
+    let mut after = |finding| all.push((When::After, None, finding));
+    instability_of_rig(film, stator_mass)?.into_iter().for_each(&mut after);
+    if film.values().len() == NAMED.len() {
+        mass_symmetry(&film.fit.estimate).into_iter().for_each(&mut after);
+    } else {
+        let test = film.inertia.map(|test| fluid_inertia(test.statistic, test.p_value));
+        test.into_iter().for_each(&mut after);
+    }
+    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    let several = tests.records.len() + baseline.map_or(0, |b| b.records.len()) > 1;
+    let unnamed = Channels::default();
+    let row = |(when, test, finding): &Placed<'_>| {
+        let name = test.filter(|_| several).map(|(name, _)| name.to_owned());
+        CheckRow::new(*when, name, finding, test.map_or(&unnamed, |(_, channels)| channels))
+    };
+    Ok(all.iter().map(row).collect())
+}
+
+/// Returns the findings on the tests of one condition and on their fit.
+fn of_condition<'a>(
+    tests: &'a BearingData,
+    fit: &OutputErrorFit,
+) -> Result<Vec<Placed<'a>>, AnalysisError> {
+    let place = |at: usize| {
+        let record = &tests.records[at];
+        Some((record.name.as_str(), &*record.channels))
+    };
+    let first = place(0);
+    let before = before_spectral_fit(&tests.data, &Unknowns::unknown_mass(2)?)?;
+    let mut all: Vec<Placed<'a>> =
+        before.into_iter().map(|finding| (When::Before, first, finding)).collect();
+    for (at, record) in tests.records.iter().enumerate() {
+        all.extend(record.before.iter().map(|finding| (When::Before, place(at), finding.clone())));
+    }
+    let residuals = after_spectral_fit(&data_of(tests), &fit.estimate, Extent::WholePeriod)?;
+    for (at, residual) in residuals.records.iter().enumerate() {
+        let findings = residual.findings().into_iter();
+        all.extend(findings.map(|finding| (When::After, place(at), finding)));
+    }
+    Ok(all)
+}
+
+fn data_of(tests: &BearingData) -> Vec<FrequencyData> {
+    tests.records.iter().map(|record| record.data.clone()).collect()
+}
+
+/// Returns the mean of the residual power of the tests over that of their noise if the power of any test exceeds
+/// its noise significantly; 1 otherwise, and where the noise is not known.
+pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, AnalysisError> {
+    let residuals = after_spectral_fit(&data_of(tests), &fit.estimate, Extent::WholePeriod)?;
+    let mut findings: Vec<Finding> =
+        residuals.records.iter().flat_map(|residual| residual.findings()).collect();
+    adjust_p_values(&mut findings);
+    let exceeds = |finding: &Finding| match finding {
+        Finding::Misfit(misfit) => misfit.p_value.is_significant() && misfit.ratio > 1.0,
+        _ => false,
+    };
+    Ok(if findings.iter().any(exceeds) { fit.misfit_ratio.max(1.0) } else { 1.0 })
+}
+
+/// Tells whether the housing on the film and its baseline has a free response that grows: it had none while it was
+/// tested.
+fn instability_of_rig(film: &Film, stator_mass: f64) -> Result<Option<Finding>, AnalysisError> {
+    let estimate: &Estimate = &film.fit.estimate;
+    let matrix = |kind: usize| DMatrix::from_row_slice(2, 2, &film.rig.as_slice()[4 * kind..][..4]);
+    let mass = matrix(2) + DMatrix::identity(2, 2) * stator_mass;
+    let Ok(system) = SecondOrderSystem::new(mass, matrix(1), matrix(0)) else { return Ok(None) };
+    let parameters: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();
+    let rig = UncertainSystem::new(system, parameters, estimate.covariance() * film.excess)?;
+    let modes = identified_modes(&rig, estimate.degrees_of_freedom())?;
+    Ok(instability(&modes))
+}
