@@ -178,6 +178,56 @@ impl Augmented {
         log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
     }
 
+    /// Returns the log-likelihood of a model, without constants; where displacement and velocity of the first sample are
+    /// unknown, at their most likely values.
+    pub fn likelihood(&self, tuned: &Tuned, process: &LowPass) -> Result<f64, ForceError> {
+        let mut space = self.space(&tuned.model, process, tuned.noise, 10.0)?;
+        if self.start == Start::InMotion {
+            let (m, machine) = (space.states, self.rate.nrows());
+            let (mean, _) = space.smooth(space.filter(&self.data));
+            for i in 0..machine {
+                space.start_mean[i] = mean[i];
+                space.start[i * m + i] = 0.0;
+            }
+        }
+        let likelihood = space.innovations(&self.data).log_likelihood();
+        if likelihood.is_finite() { Ok(likelihood) } else { Err(ForceError::NoLikelihood) }
+    }
+
+    /// Returns the noise beside a free response if the Bayesian information criterion finds no force in the record.
+    ///
+    /// # Source
+    /// Schwarz (1978), Annals of Statistics 6, 461–464.
+    pub fn noise_without_force(&self) -> Option<f64> {
+        let forces = self.units.len();
+        let process = LowPass::new(limits::FORCE_ORDERS[0]).ok()?;
+        // As little force as a trial may have, at any corner.
+        let mut least = vec![(limits::RATIO_RANGE.start * (1.0 + 1e-9)).ln(); forces];
+        least.push((0.1 * limits::HIGHEST_CORNER).ln());
+        let without = self.trial(&process, None, &least)?;
+        let with = self.most_likely(None).ok()?;
+        let penalty = 0.5 * (forces + 1) as f64 * (self.data.len() as f64).ln();
+        (with.log_likelihood - without.log_likelihood < penalty).then_some(without.noise)
+    }
+
+    /// Number of measured channels.
+    pub fn channels(&self) -> usize {
+        self.machine.out.nrows()
+    }
+
+    /// Returns the squares of the innovations of each sample over their variances, summed over the channels.
+    pub fn energies(&self, tuned: &Tuned) -> Option<Vec<f64>> {
+        let process = LowPass::new(tuned.model.order).ok()?;
+        let space = self.space(&tuned.model, &process, tuned.noise, 10.0).ok()?;
+        let passage = self.started(space).filter(&self.data);
+        let energies: Vec<f64> = passage
+            .innovations()
+            .chunks_exact(self.channels())
+            .map(|sample| sample.iter().map(|(e, variance)| e * e / variance).sum())
+            .collect();
+        energies.iter().all(|energy| energy.is_finite()).then_some(energies)
+    }
+
     /// Returns a given model, with the noise of the scales.
     pub fn given(&self, model: &ForceModel) -> Result<Tuned, ForceError> {
         let process = LowPass::new(model.order)?;

@@ -10,6 +10,7 @@ use crate::error::ForceError;
 use crate::force_information::ErrorSpectrum;
 use crate::force_model::{ForceModel, LowPass};
 use crate::identified::IdentifiedForce;
+use crate::intermittent::quiet;
 use crate::measurement::{Measurement, Start};
 use crate::noise::{Noise, channel_sizes};
 use crate::transfer::Transfer;
@@ -61,7 +62,8 @@ pub struct KalmanForce {
 ///
 /// Each force is a stationary process with a band from 0 up to a corner frequency ([`ForceModel`]),
 /// continuous in time, without an assumption between samples. Order and corner of the band, the
-/// sizes of the forces and the noise are those of maximum likelihood. The smoother uses the whole
+/// sizes of the forces and the noise are those of maximum likelihood; where the force acts for a part of the record only,
+/// the noise is that of the other part. The smoother uses the whole
 /// record for every instant. The standard error comes from the model.
 ///
 /// For a structure on springs, accelerations and velocities do not show a constant force, and their
@@ -106,7 +108,7 @@ pub fn kalman(
     if measured.record().data().iter().all(|y| *y == 0.0) {
         return Err(ForceError::Silent);
     }
-    let scale = match tuning {
+    let mut scale = match tuning {
         Tuning::Likelihood => channel_sizes(measured.record()),
         Tuning::NoiseKnown(noise) => known(measured, noise)?,
         Tuning::Given { noise_std, model } => {
@@ -115,9 +117,21 @@ pub fn kalman(
         }
     };
     check_seen(system, measured, forced, &scale)?;
-    let augmented = Augmented::new(system, measured, forced, start, &scale)?;
+    let mut augmented = Augmented::new(system, measured, forced, start, &scale)?;
+    let mut is_quiet = false;
     let tuned = match tuning {
-        Tuning::Likelihood => augmented.most_likely(None)?,
+        Tuning::Likelihood => {
+            let tuned = augmented.most_likely(None)?;
+            match of_quiet_part(&augmented, &tuned, (system, measured, forced), &scale) {
+                Some(noise) => {
+                    scale.iter_mut().for_each(|level| *level *= noise);
+                    is_quiet = true;
+                    augmented = Augmented::new(system, measured, forced, start, &scale)?;
+                    augmented.most_likely(Some(1.0))?
+                }
+                None => tuned,
+            }
+        }
         Tuning::NoiseKnown(_) => augmented.most_likely(Some(1.0))?,
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
@@ -127,7 +141,7 @@ pub fn kalman(
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
         Residual::from_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
     });
-    let points = augmented.posterior_points(&tuned, known.then_some(1.0))?;
+    let points = augmented.posterior_points(&tuned, (known || is_quiet).then_some(1.0))?;
     let force = match points.len() {
         0 | 1 => smoothed.force,
         _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &points)?,
@@ -143,6 +157,19 @@ pub fn kalman(
         }
     };
     Ok(KalmanForce { force, ..smoothed })
+}
+
+/// Returns the noise of the part of the record in which no force acts, in the scales of the channels; `None` of a stationary
+/// force, and where one acts everywhere.
+fn of_quiet_part(
+    augmented: &Augmented,
+    tuned: &Tuned,
+    (system, measured, forced): (&SecondOrderSystem, &Measurement, &[usize]),
+    scale: &[f64],
+) -> Option<f64> {
+    let part = measured.part(quiet(augmented, tuned)?).ok()?;
+    let alone = Augmented::new(system, &part, forced, Start::InMotion, scale).ok()?;
+    alone.noise_without_force().filter(|noise| *noise > 0.0 && noise.is_finite())
 }
 
 /// Returns the part of the force in a band. Its variance is the one far from the ends of the

@@ -151,3 +151,18 @@ pub(crate) const BAND_TOLERANCE: f64 = 1e-9;
 
 /// Change of an entry for a derivative, in standard errors.
 pub(crate) const PARAMETER_STEP: f64 = 0.1;
+
+// Forces that act for a part of a record
+
+/// Number of parts of a record of which the quiet ones are looked for.
+pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
+
+/// Minimum number of consecutive parts that show the noise: a quarter of the record.
+pub(crate) const QUIET_BLOCKS: usize = 4;
+
+/// Probability of parts as different by chance, below which a force is not stationary.
+pub(crate) const INTERMITTENT_LEVEL: f64 = 0.01;
+
+/// Number of samples, the first of a record, that decide whether it begins at rest; more do not know the first state
+/// better once its free response has decayed, and take longer.
+pub(crate) const REST_SAMPLES: usize = 1024;

@@ -99,6 +99,12 @@ impl Measurement {
         Ok(Self { band_hz: Some(band_hz), ..self })
     }
 
+    /// Returns some consecutive samples.
+    pub(crate) fn part(&self, samples: std::ops::Range<usize>) -> Result<Self, ForceError> {
+        let record = self.record.window(samples.start, samples.len())?;
+        Ok(Self { record, ..self.clone() })
+    }
+
     /// Lowest and highest frequency of the force to identify, in Hz; `None`: all.
     pub fn band_hz(&self) -> Option<[f64; 2]> {
         self.band_hz

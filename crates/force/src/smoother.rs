@@ -39,6 +39,11 @@ pub(crate) struct Passage {
 }
 
 impl Passage {
+    /// Innovations with their variances, channels of a sample side by side.
+    pub fn innovations(&self) -> &[(f64, f64)] {
+        &self.innovation
+    }
+
     /// Variance of each state before the measurement of sample k.
     pub fn variances(&self, k: usize, states: usize) -> impl Iterator<Item = f64> + '_ {
         let block = &self.covariance[k.min(self.last) * states * states..][..states * states];

@@ -6,8 +6,8 @@ use mechid_force::{
     Channel, Filter, ForceError, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
     Rule, Start, Tuning, Unexplained, continuous, continuous_nonlinear,
     continuous_nonlinear_with_noise, continuous_with_noise, discretised, discretised_with_noise,
-    frequency_domain, inner_lines, kalman, regularised, with_uncertain_nonlinear_system,
-    with_uncertain_system,
+    frequency_domain, inner_lines, kalman, regularised, starts_at_rest,
+    with_uncertain_nonlinear_system, with_uncertain_system,
 };
 use mechid_model::{
     Discretisation, Response, ResponseQuantity, SecondOrderSystem, UncertainSystem,
@@ -394,13 +394,20 @@ fn smoothed(
         [] => Tuning::Likelihood,
         level => Tuning::NoiseKnown(level.to_vec()),
     };
-    let smoothed = kalman(machine.system(), motion, forced, request.start, &tuning)?;
+    let noise_std = Some(&request.noise[..]).filter(|noise| !noise.is_empty());
+    let is_found = request.start == Start::InMotion
+        && starts_at_rest(machine.system(), motion, forced, noise_std).unwrap_or(false);
+    let (start, why) = match is_found {
+        true => (Start::FromRest, format!("{why}, which begins at rest")),
+        false => (request.start, why),
+    };
+    let smoothed = kalman(machine.system(), motion, forced, start, &tuning)?;
     let fixed =
         Tuning::Given { noise_std: smoothed.noise_std.clone(), model: smoothed.model.clone() };
     let banded = of_this_band(motion, &smoothed.force)?;
     let find = |system: &SecondOrderSystem| match system == machine.system() {
         true => Ok(smoothed.force.clone()),
-        false => kalman(system, &banded, forced, request.start, &fixed).map(|found| found.force),
+        false => kalman(system, &banded, forced, start, &fixed).map(|found| found.force),
     };
     let force = with_machine(machine, &find)?;
     let mut chosen = vec![

@@ -7,6 +7,7 @@ mod common;
 mod discretised;
 mod dissertation;
 mod frequency_domain;
+mod intermittent;
 mod kalman;
 mod linearity;
 mod motion_noise;

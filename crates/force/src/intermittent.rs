@@ -1,0 +1,89 @@
+//! Forces that act for a part of a record: noise from the part in which they do not, and the rest before them.
+
+use mechid_model::SecondOrderSystem;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::augmented::{Augmented, Tuned};
+use crate::error::ForceError;
+use crate::force_model::LowPass;
+use crate::limits::{INTERMITTENT_BLOCKS, INTERMITTENT_LEVEL, QUIET_BLOCKS, REST_SAMPLES};
+use crate::measurement::{Measurement, Start};
+use crate::noise::channel_sizes;
+
+/// Returns the range of samples in which the innovations of a stationary force are smallest, if they are smaller
+/// there than chance makes them; `None` of a force that is stationary.
+///
+/// The likelihood of a stationary force takes the spectrum of a pulse, which falls with the frequency, for that of the
+/// whole record; the noise below it, which the quiet part shows, is then lost.
+///
+/// # Source
+/// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio of the variances of
+/// two parts), with Bonferroni's bound for the number of ranges.
+pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Range<usize>> {
+    let energies = augmented.energies(tuned)?;
+    let block = energies.len() / INTERMITTENT_BLOCKS;
+    if block == 0 {
+        return None;
+    }
+    let sums: Vec<f64> = energies
+        .chunks_exact(block)
+        .take(INTERMITTENT_BLOCKS)
+        .map(|part| part.iter().sum::<f64>())
+        .collect();
+    let all: f64 = sums.iter().sum();
+    let ranges = (0..INTERMITTENT_BLOCKS)
+        .flat_map(|from| (from + QUIET_BLOCKS..=INTERMITTENT_BLOCKS).map(move |to| from..to))
+        .filter(|range| range.len() < INTERMITTENT_BLOCKS);
+    let mut count = 0.0;
+    let mut best: Option<(f64, std::ops::Range<usize>)> = None;
+    for range in ranges {
+        count += 1.0;
+        let inside: f64 = sums[range.clone()].iter().sum();
+        let channels = augmented.channels();
+        let [of_inside, of_outside] = [range.len(), INTERMITTENT_BLOCKS - range.len()]
+            .map(|blocks| (blocks * block * channels) as f64);
+        let ratio = ((all - inside) / of_outside) / (inside / of_inside);
+        let p_value = FisherSnedecor::new(of_outside, of_inside).ok()?.sf(ratio);
+        // Of ranges that are as certain the longest one knows the noise best.
+        if best.as_ref().is_none_or(|(least, longest)| {
+            p_value < *least || (p_value == *least && range.len() > longest.len())
+        }) {
+            best = Some((p_value, range));
+        }
+    }
+    let (p_value, range) = best?;
+    (p_value * count < INTERMITTENT_LEVEL).then(|| range.start * block..range.end * block)
+}
+
+/// Returns whether the system is at rest at the first sample, by the Bayesian information criterion of a displacement and a
+/// velocity of every degree of freedom there; `noise_std` are the standard deviations of the channels if they are known.
+///
+/// The first samples of the record decide, under the force of maximum likelihood from rest.
+///
+/// # Errors
+/// Those of [`kalman`](crate::kalman()).
+///
+/// # Source
+/// Schwarz (1978), Annals of Statistics 6, 461–464.
+pub fn starts_at_rest(
+    system: &SecondOrderSystem,
+    measured: &Measurement,
+    forced: &[usize],
+    noise_std: Option<&[f64]>,
+) -> Result<bool, ForceError> {
+    measured.check(system.dof(), forced)?;
+    let samples = measured.sampling().len().min(REST_SAMPLES);
+    let part = measured.part(0..samples)?;
+    if part.record().data().iter().all(|y| *y == 0.0) {
+        return Ok(true);
+    }
+    let scale = noise_std.map_or_else(|| channel_sizes(part.record()), <[f64]>::to_vec);
+    let resting = Augmented::new(system, &part, forced, Start::FromRest, &scale)?;
+    let tuned = resting.most_likely(noise_std.map(|_| 1.0))?;
+    let process = LowPass::new(tuned.model.order)?;
+    let at_rest = resting.likelihood(&tuned, &process)?;
+    let moving = Augmented::new(system, &part, forced, Start::InMotion, &scale)?;
+    let in_motion = moving.likelihood(&tuned, &process);
+    let penalty = system.dof() as f64 * (samples as f64).ln();
+    Ok(!in_motion.is_ok_and(|in_motion| in_motion - at_rest > penalty))
+}
