@@ -259,31 +259,40 @@ fn without_linear_part(
     Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
-/// Probability that noise with the spectrum of the residual (channels × lines, the sizes of its lines around each) is
+/// Probability that noise with the spectra of the residual (channels × lines, the sizes of its lines around each) is
 /// correlated as much with the responses, lines of it being correlated among themselves.
+///
+/// For given absolute values the phases of the lines of noise are random. The sum over the channels of a line has one
+/// phase: noise on a force, or an unmeasured one, is in all channels alike, which a variance of each channel by itself
+/// takes for as many independent witnesses.
+///
+/// # Source
+/// White (1980), Econometrica 48, 817–838, for the variance.
 fn p_value(
     residual: &DMatrix<Complex<f64>>,
     sizes: &[Vec<f64>],
     responses: &DMatrix<Complex<f64>>,
     correlation: &[f64],
 ) -> f64 {
-    let (mut product, mut variance) = (0.0, 0.0);
-    for ((e, g), sizes) in residual.row_iter().zip(responses.row_iter()).zip(sizes) {
-        for at in (0..sizes.len()).filter(|at| sizes[*at] > 0.0) {
-            product += (e[at].conj() * g[at]).re / sizes[at];
-            for (apart, c) in correlation.iter().enumerate() {
-                let Some(size) = sizes.get(at + apart).filter(|size| **size > 0.0) else { break };
-                let times = if apart == 0 { 0.5 } else { 1.0 };
-                // By the residual of the line itself, which a narrow resonance makes larger than what is around.
-                let [here, there] = [e[at].norm() / sizes[at], e[at + apart].norm() / size];
-                let common = (g[at].conj() * g[at + apart]).re * here * there;
-                variance += times * c * common;
-            }
+    let weighted = DMatrix::from_fn(responses.nrows(), responses.ncols(), |channel, at| {
+        let size = sizes[channel][at];
+        if size > 0.0 { responses[(channel, at)] / size } else { Complex::ZERO }
+    });
+    let product = |e: usize, g: usize| residual.column(e).dotc(&weighted.column(g));
+    let (mut sum, mut variance) = (0.0, 0.0);
+    for at in 0..residual.ncols() {
+        sum += product(at, at).re;
+        for (apart, c) in correlation.iter().enumerate().take(residual.ncols() - at) {
+            let (other, times) = (at + apart, if apart == 0 { 0.5 } else { 1.0 });
+            // By the residuals of both lines, which a narrow resonance makes larger than what is around.
+            let common = product(at, at).conj() * product(at, other)
+                + product(other, at).conj() * product(other, other);
+            variance += times * c * 0.5 * common.re;
         }
     }
     if variance > 0.0 {
         let normal = Normal::standard();
-        2.0 * normal.sf(product.abs() / variance.sqrt())
+        2.0 * normal.sf(sum.abs() / variance.sqrt())
     } else {
         1.0
     }

@@ -1,10 +1,11 @@
 //! How often the checks after a fit of frequency responses and of spectra are right.
 
 use mechid_checks::{Finding, Subject, Verdict, after_response_fit, after_spectral_fit, linearity};
-use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::output_error;
-use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_estimate::{Estimate, EstimateParts, Unknowns};
+use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
+use mechid_problems::machines::{Support, chain};
 use mechid_problems::steady_lines::oscillator;
 use mechid_signal::Window;
 use mechid_signal::resample::refine;
@@ -190,4 +191,70 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
         assert!(right.iter().all(|share| *share <= 0.035), "{periods} periods: {right:?}");
         assert!(wrong > 0.95, "{periods} periods, a mass wrong by a tenth: {wrong}");
     }
+}
+
+/// Eight masses in a row of which two are driven, all of them measured; the response to the true forces, with a cubic
+/// spring of this share of the first mass's stiffness at its RMS displacement, to first order.
+fn eight_sensors(cubic: f64, seed: u64) -> Finding {
+    let system = chain(8, Support::Held, 0.02, 5);
+    let sampling = Sampling::new(0.01, 1 << 12).unwrap();
+    let drive = noise::white(sampling, 2, 100.0, 3 * seed).unwrap();
+    let on_all = |drive: &Record| {
+        let silent = vec![0.0; drive.len()];
+        let mut channels = vec![&silent[..]; 8];
+        (channels[1], channels[6]) = (drive.channel(0), drive.channel(1));
+        Record::from_channels(sampling, &channels).unwrap()
+    };
+    let force = on_all(&drive);
+    let moved =
+        |force: &Record| exact_harmonic_periodic(&system, force).unwrap().displacement().clone();
+    let x = moved(&force);
+    let square = x.column(0).norm_squared() / x.len() as f64;
+    let stiffness = cubic * system.stiffness()[(0, 0)] / square;
+    let mut loaded = force.data().clone();
+    for (load, x) in loaded.column_mut(0).iter_mut().zip(x.channel(0)) {
+        *load -= stiffness * x.powi(3);
+    }
+    let motion = moved(&Record::new(sampling, loaded).unwrap());
+    let noisy = |record: &Record, level: f64, seed: u64| {
+        noise::add_white(record, NoiseLevel::FractionOfRms(level), seed).unwrap()
+    };
+    let force = on_all(&noisy(&drive, 0.02, 3 * seed + 1));
+    let motion = noisy(&motion, 0.002, 3 * seed + 2);
+    // All known but two springs.
+    let mut unknowns = Unknowns::known_mass(system.mass()).unwrap();
+    for matrix in [Matrix::Damping, Matrix::Stiffness] {
+        for row in 0..8 {
+            for column in 0..8 {
+                if matrix == Matrix::Damping || row != column || row > 1 {
+                    let value = system.matrix(matrix)[(row, column)];
+                    unknowns = unknowns.fix(matrix, row, column, value).unwrap();
+                }
+            }
+        }
+    }
+    let estimate = Estimate::new(EstimateParts {
+        values: [0, 1].map(|at| system.stiffness()[(at, at)]).to_vec(),
+        covariance: DMatrix::identity(2, 2).into(),
+        degrees_of_freedom: 1000,
+        residual_nrmse: vec![0.02; 8],
+        condition: 1.0,
+        undetermined: Vec::new(),
+        unknowns,
+    });
+    let kind = ResponseQuantity::Displacement;
+    linearity(&estimate.unwrap(), &force, &motion, kind, [0.5, 25.0]).unwrap()
+}
+
+/// Judge: the generator. Noise on a force is in all responses alike: eight sensors are no eight witnesses. The level is
+/// 1 %: of 60 runs more than 3 exceed it with a probability of 0.003.
+#[test]
+fn noise_on_the_forces_of_eight_sensors_is_no_nonlinearity() {
+    let warned = |cubic: f64, runs: u64| {
+        let is_bad = |seed: &u64| eight_sensors(cubic, *seed).verdict() > Verdict::Good;
+        (0..runs).into_par_iter().filter(is_bad).count()
+    };
+    let (right, wrong) = (warned(0.0, 60), warned(0.1, 12));
+    assert!(right <= 3, "{right} of 60");
+    assert!(wrong >= 11, "{wrong} of 12");
 }
