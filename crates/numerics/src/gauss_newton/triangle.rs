@@ -33,7 +33,11 @@ impl Triangle {
         let columns = jacobian.ncols();
         let mut factor = TriangularFactor::new(columns + 1);
         let is_finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
-        let mut upper = if is_finite { factor.r().clone() } else { factor.r().map(|_| f64::NAN) };
+        // A factor that took no rows has no triangle.
+        let mut upper = match is_finite {
+            true => factor.r().clone(),
+            false => DMatrix::from_element(columns + 1, columns + 1, f64::NAN),
+        };
         let mut scale = DVector::from_element(columns, 1.0);
         for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
             // The columns of R have the same lengths as the columns of J.
@@ -99,5 +103,23 @@ impl Linearisation for Triangle {
 
     fn parameters(&self, coordinates: &DVector<f64>) -> DVector<f64> {
         coordinates.component_div(&self.scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A search meets parameters at which the response overflows: it has no step there, however many rows there are.
+    #[test]
+    fn a_jacobian_that_is_not_finite_has_no_step() {
+        for rows in [1, 100, 40_000] {
+            let mut jacobian = DMatrix::from_fn(rows, 2, |i, j| (i + j) as f64);
+            jacobian[(rows - 1, 1)] = f64::INFINITY;
+            let triangle = Triangle::new(&jacobian, &DVector::zeros(rows));
+            for damping in [0.0, 1e-3] {
+                assert!(triangle.factor(damping).is_none(), "{rows} rows, damping {damping}");
+            }
+        }
     }
 }
