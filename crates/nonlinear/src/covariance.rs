@@ -3,8 +3,58 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::estimate::StandardErrors;
 use super::grid::Grid;
+use super::scatter::{Misfit, PeriodScatter};
 use crate::limits::{COVARIANCE_MOST, TIME_CONSTANTS};
+
+/// Covariance of all parameters, and what it rests on.
+pub(super) struct Uncertainty {
+    pub(super) covariance: DMatrix<f64>,
+    pub(super) standard_errors: StandardErrors,
+    pub(super) freedom: usize,
+    pub(super) misfit: Option<Misfit>,
+    /// Bias of the parameters by noise in their regressors, as the periods show it; zero where they do not.
+    pub(super) bias: DVector<f64>,
+}
+
+/// What the periods show of the noise in an estimate.
+pub(super) struct ByPeriods {
+    pub(super) scatter: PeriodScatter,
+    pub(super) misfit: Misfit,
+    /// Bias of the parameters by noise in their regressors.
+    pub(super) bias: DVector<f64>,
+}
+
+impl Uncertainty {
+    /// That of the scatter of the periods as long as the residual is no more than their noise, otherwise that of the
+    /// residual or, where that could be taken as white only, of the scatter in proportion to the misfit; the degrees of
+    /// freedom are those of the first `wanted` parameters.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227, for errors in proportion to a misfit.
+    pub(super) fn new(
+        by_periods: Option<ByPeriods>,
+        wanted: usize,
+        by_residual: impl FnOnce() -> (DMatrix<f64>, StandardErrors, usize),
+    ) -> Self {
+        let Some(ByPeriods { scatter, misfit, bias }) = by_periods else {
+            let (covariance, standard_errors, freedom) = by_residual();
+            let bias = DVector::zeros(covariance.nrows());
+            return Self { covariance, standard_errors, freedom, misfit: None, bias };
+        };
+        let by_residual = misfit.is_significant().then(by_residual);
+        let (covariance, standard_errors, freedom) = match by_residual {
+            Some(blocks) if blocks.1 != StandardErrors::White => blocks,
+            is_beyond => {
+                let (covariance, standard_errors, freedom) = scatter.finish(wanted);
+                let factor = if is_beyond.is_some() { misfit.ratio } else { 1.0 };
+                (covariance * factor, standard_errors, freedom)
+            }
+        };
+        Self { covariance, standard_errors, freedom, misfit: Some(misfit), bias }
+    }
+}
 
 /// Blocks for an experiment of this duration (s), whose slowest free response decays at `rate` (1/s).
 pub(super) fn block_count(duration: f64, rate: f64) -> usize {

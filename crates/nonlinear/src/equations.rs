@@ -202,6 +202,19 @@ impl<'a> Equations<'a> {
         })
     }
 
+    /// Regressors of one equation in a row, each with the place of its coefficient.
+    pub(super) fn regressors<'b>(
+        &'b self,
+        columns: &'b Columns,
+        row: usize,
+        dof: usize,
+    ) -> impl Iterator<Item = (usize, Complex<f64>)> + 'b {
+        let entry = move |(at, coefficient): &(usize, Coefficient)| {
+            (*at, self.entry(columns, row, *coefficient))
+        };
+        self.coefficients[dof].iter().map(entry)
+    }
+
     /// Returns whether a coefficient stands in the equation of this degree of freedom.
     pub(super) fn concerns(&self, dof: usize) -> bool {
         !self.coefficients[dof].is_empty()

@@ -7,7 +7,7 @@ use mechid_model::{Matrix, NonlinearParameter, NonlinearSystem, Terms, Uncertain
 use mechid_numerics::{Uncertain, check_size};
 use nalgebra::{DMatrix, DVector};
 
-use super::{ChannelPhase, Weighting};
+use super::{ChannelPhase, Misfit, Weighting};
 
 /// A parameter with its name and unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +23,9 @@ pub struct NamedParameter {
 /// Origin of the standard errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
+    /// Noise of force and response as this many periods of all records show it: the errors hold for noise of any
+    /// colour, and for a residual that is no more than that noise.
+    Periods(usize),
     /// Scatter of the scores over this many blocks of time: the errors hold for a residual of any
     /// colour, and where the model misses part of the response.
     Blocks(usize),
@@ -41,12 +44,36 @@ pub struct NonlinearEstimate {
     pub(super) channels: ChannelPhase,
     pub(super) weighting: Weighting,
     pub(super) standard_errors: StandardErrors,
+    pub(super) misfit: Option<Misfit>,
+    /// Bias of the parameters by noise in their regressors, as several periods show it.
+    pub(super) bias: DVector<f64>,
     pub(super) unexplained: Vec<f64>,
     pub(super) ranges: Vec<[f64; 2]>,
     pub(super) equations: usize,
 }
 
 impl NonlinearEstimate {
+    /// A linear system with terms whose coefficients are zero: the start of a search.
+    pub(super) fn without_force(linear: &Estimate, terms: &Terms) -> Result<Self, EstimateError> {
+        terms.check_dof(linear.dof())?;
+        linear.unknowns().check_unrelated("a fit with nonlinear terms")?;
+        Ok(Self {
+            linear: linear.clone(),
+            terms: terms.clone(),
+            coefficients: vec![0.0; terms.len()],
+            parameters: Vec::new(),
+            covariance: DMatrix::zeros(0, 0),
+            channels: ChannelPhase::default(),
+            weighting: Weighting::default(),
+            standard_errors: StandardErrors::White,
+            misfit: None,
+            bias: DVector::zeros(0),
+            unexplained: Vec::new(),
+            ranges: Vec::new(),
+            equations: 0,
+        })
+    }
+
     /// The linear part: M̂, Ĉ, K̂ with their covariance. Its modes are those of small amplitudes, apart from
     /// terms with a slope at rest.
     pub fn linear(&self) -> &Estimate {
@@ -116,6 +143,12 @@ impl NonlinearEstimate {
     /// Returns the origin of the standard errors.
     pub fn standard_errors(&self) -> StandardErrors {
         self.standard_errors
+    }
+
+    /// Returns the residual of the mean periods against the noise that the periods show; `None` of open records and of
+    /// single periods.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.misfit
     }
 
     /// Part of each degree of freedom's response (a ratio, one for each) that the model does not

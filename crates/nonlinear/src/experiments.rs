@@ -26,7 +26,15 @@ pub struct SteadyExperiments {
     dof: usize,
     measured: ResponseQuantity,
     grid: Grid,
-    steady: Vec<Steady>,
+    steady: Vec<Experiment>,
+}
+
+/// One experiment.
+struct Experiment {
+    /// The mean of its periods.
+    mean: Steady,
+    /// The periods one by one, where there are several.
+    periods: Vec<Steady>,
 }
 
 /// Lines 0, 1, … of one period, without that at half the sampling rate: lines × degrees of freedom.
@@ -70,21 +78,39 @@ impl SteadyExperiments {
         force.check_same_sampling(response)?;
         check_size("channels of the force", self.dof, force.channels())?;
         check_size("channels of the response", self.dof, response.channels())?;
-        let [force, response] = [force, response].map(|r| r.period_mean(self.period.len()));
-        let (force, response) = (force?, response?);
-        check_sampling(self.period, force.sampling())?;
-        let force = Spectrum::of(&force);
-        let lines = self.period.len().div_ceil(2);
-        self.steady.push(Steady {
-            force: force.lines().rows(0, lines).into_owned(),
-            displacement: displacement_lines(&Spectrum::of(&response), self.measured),
-        });
+        let len = self.period.len();
+        let [mean_force, mean_response] = [force, response].map(|r| r.period_mean(len));
+        let mean = self.period_of(&mean_force?, &mean_response?)?;
+        let count = match force.len() / len {
+            0 | 1 => 0,
+            several => several,
+        };
+        let one = |period: usize| {
+            let [force, response] = [force, response].map(|r| r.window(period * len, len));
+            self.period_of(&force?, &response?)
+        };
+        let periods = (0..count).map(one).collect::<Result<_, _>>()?;
+        self.steady.push(Experiment { mean, periods });
         Ok(())
+    }
+
+    fn period_of(&self, force: &Record, response: &Record) -> Result<Steady, EstimateError> {
+        check_sampling(self.period, force.sampling())?;
+        let lines = self.period.len().div_ceil(2);
+        Ok(Steady {
+            force: Spectrum::of(force).lines().rows(0, lines).into_owned(),
+            displacement: displacement_lines(&Spectrum::of(response), self.measured),
+        })
     }
 
     /// Experiments so far.
     pub fn count(&self) -> usize {
         self.steady.len()
+    }
+
+    /// Quantity of the responses.
+    pub fn measured(&self) -> ResponseQuantity {
+        self.measured
     }
 
     /// Degrees of freedom n.
@@ -109,7 +135,20 @@ impl SteadyExperiments {
         terms: &Terms,
         channels: &ChannelPhase,
     ) -> Vec<Columns> {
-        self.steady.par_iter().map(|one| self.columns_of(one, rows, terms, channels)).collect()
+        let mean = |one: &Experiment| self.columns_of(&one.mean, rows, terms, channels);
+        self.steady.par_iter().map(mean).collect()
+    }
+
+    /// Columns of every period of an experiment at some lines; none of a single period.
+    pub(super) fn columns_of_periods(
+        &self,
+        experiment: usize,
+        rows: &[usize],
+        terms: &Terms,
+        channels: &ChannelPhase,
+    ) -> Vec<Columns> {
+        let periods = self.steady[experiment].periods.par_iter();
+        periods.map(|one| self.columns_of(one, rows, terms, channels)).collect()
     }
 
     fn columns_of(
@@ -177,8 +216,8 @@ impl SteadyExperiments {
     /// freedom.
     pub(super) fn displacements(&self, channels: &ChannelPhase) -> Vec<DMatrix<Complex<f64>>> {
         let corrections = self.corrections(channels);
-        let corrected = |one: &Steady| {
-            let mut lines = one.displacement.clone();
+        let corrected = |one: &Experiment| {
+            let mut lines = one.mean.displacement.clone();
             for (mut row, [_, correction]) in lines.row_iter_mut().zip(&corrections) {
                 row.iter_mut().for_each(|line| *line *= *correction);
             }
@@ -201,8 +240,8 @@ impl SteadyExperiments {
     pub(super) fn ranges(&self, terms: &Terms, channels: &ChannelPhase) -> Vec<[f64; 2]> {
         let corrections = self.corrections(channels);
         let mut ranges = vec![[0.0f64; 2]; terms.len()];
-        for steady in &self.steady {
-            let signals = self.signals(steady, &corrections, terms);
+        for Experiment { mean, .. } in &self.steady {
+            let signals = self.signals(mean, &corrections, terms);
             for (term, range) in terms.iter().zip(&mut ranges) {
                 for k in 0..EXPERIMENT_FINER * self.period.len() {
                     for (kind, largest) in range.iter_mut().enumerate() {

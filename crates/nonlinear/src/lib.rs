@@ -13,6 +13,7 @@
 //! | choose terms | [`select_terms`] |
 //! | fit steady periods, fast and without start values | [`equation_error`] on [`SteadyExperiments`] |
 //! | fit any record, without bias from noise on the response | [`output_error`], started from it |
+//! | fit a sweep, a random or a hammer record | [`output_error_of_open_records`], started from a linear fit |
 //! | look at the restoring force, within the data and beyond | [`NonlinearEstimate::restoring_forces`], [`NonlinearEstimate::extrapolations`] |
 //! | predict a response | [`predict()`], from the [`fitted_start`] |
 
@@ -27,7 +28,9 @@ mod grid;
 mod limits;
 mod output_error;
 mod predict;
+mod propagation;
 mod restoring;
+mod scatter;
 mod selection;
 mod shape;
 mod simulate;
@@ -38,9 +41,12 @@ pub use distortion::{Distortion, Kind, Level, distortion};
 pub use equation_error::{EquationErrorOptions, equation_error};
 pub use estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 pub use experiments::SteadyExperiments;
-pub use output_error::{NonlinearFit, SteppedRecord, output_error};
+pub use output_error::{
+    NonlinearFit, SteppedRecord, best_output_error, output_error, output_error_of_open_records,
+};
 pub use predict::{fitted_start, predict};
 pub use restoring::{Extrapolation, REACH, RestoringForce};
-pub use selection::{Criterion, Selection, SelectionStep, select_terms};
+pub use scatter::Misfit;
+pub use selection::{Criterion, Selection, SelectionStep, least_certain, select_terms};
 pub use shape::ShapeConstants;
 pub use weighting::Weighting;

@@ -57,8 +57,8 @@ pub(crate) const RESTORING_NEGLIGIBLE: f64 = 0.01;
 /// Level of the test on experiments held out.
 pub(crate) const SELECTION_LEVEL: f64 = 0.05;
 
-/// Level of the test on a coefficient.
-pub(crate) const SELECTION_ZERO: f64 = 0.01;
+/// Level of the tests on a coefficient, for all candidates together, and on a residual.
+pub(crate) const SIGNIFICANT: f64 = 0.01;
 
 /// Step of a derivative with respect to a constant, relative to its size or scale.
 pub(crate) const SHAPE_STEP: f64 = 1e-5;
@@ -90,3 +90,10 @@ pub(crate) const WEIGHTING_GROUPS: usize = 32;
 
 /// Part of the largest residual power of an equation below which none is taken to lie.
 pub(crate) const WEIGHTING_FLOOR: f64 = 1e-12;
+
+/// Windows, in all, that open records are cut into for the first search: the response to a wrong start runs out of step
+/// with the measured one over many cycles, which many minima follow from.
+pub(crate) const OPEN_WINDOWS: usize = 16;
+
+/// Scatter of the periods of a record over its RMS below which it is rounding, and no noise to compare a residual with.
+pub(crate) const SCATTER_ROUNDING: f64 = 1e-9;

@@ -9,8 +9,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::equation_error::{EquationErrorOptions, equation_error, weighted};
 use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
-use super::{SteadyExperiments, Weighting};
-use crate::limits::{SELECTION_LEVEL, SELECTION_ZERO};
+use super::{NonlinearEstimate, SteadyExperiments, Weighting};
+use crate::limits::{SELECTION_LEVEL, SIGNIFICANT};
 
 /// Criterion by which a term is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -23,8 +23,8 @@ pub enum Criterion {
     /// The extended Bayesian information criterion: the misfit must fall by more than its
     /// logarithmic price for a parameter chosen among so many. Because it takes the residual as
     /// white, the terms added are looked at again when all are there: one whose coefficient does not
-    /// differ from zero by its standard error over blocks of time, at 1 % for all candidates together,
-    /// is removed.
+    /// differ from zero by its standard error, at 1 % for all candidates together, is removed
+    /// ([`least_certain`]).
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771.
@@ -133,39 +133,57 @@ pub fn select_terms(
     let mut removed = Vec::new();
     if criterion == Criterion::Information {
         let options = EquationErrorOptions { weighting, ..Default::default() };
-        while let Some(name) = uncertain(data, unknowns, &terms, candidates, &options)? {
-            let mut kept = terms.iter().filter(|term| term.name() != name).cloned();
-            terms = kept.try_fold(Terms::none(), |kept, term| kept.and(term))?;
+        while terms.len() > given.len() {
+            let fit = equation_error(data, unknowns, &terms, &options)?;
+            let Some(name) = least_certain(&fit, candidates)? else { break };
+            terms = without(&terms, &name)?;
             removed.push(name);
         }
     }
     Ok(Selection { terms, steps, refused, removed })
 }
 
-/// Returns the least certain of the candidates among some terms, if its coefficient is not
-/// distinguishable from zero.
-fn uncertain(
-    data: &SteadyExperiments,
-    unknowns: &Unknowns,
-    terms: &Terms,
+/// Returns the name of the least certain of the candidates among the terms of a fit, if its coefficient is not
+/// distinguishable from zero, at 1 % for all candidates together: Student's t with the degrees of freedom of the fit, of
+/// the coefficient less the bias that noise in the regressors makes, as far as several periods show it.
+///
+/// # Errors
+/// [`EstimateError::NoSuchParameter`] if the fit has lost a term of its own.
+pub fn least_certain(
+    fit: &NonlinearEstimate,
     candidates: &Terms,
-    options: &EquationErrorOptions,
 ) -> Result<Option<String>, EstimateError> {
     let is_candidate = |term: &&Term| candidates.iter().any(|other| other.name() == term.name());
-    if !terms.iter().any(|term| is_candidate(&term)) {
-        return Ok(None);
-    }
-    let fit = equation_error(data, unknowns, terms, options)?;
     let mut least: Option<(f64, String)> = None;
-    for term in terms.iter().filter(is_candidate) {
-        let estimate = fit.parameter(term.name())?.estimate;
-        let [low, high] = estimate.interval(1.0 - SELECTION_ZERO / candidates.len() as f64)?;
+    for term in fit.terms().iter().filter(is_candidate) {
+        let mut estimate = fit.parameter(term.name())?.estimate;
+        let place = fit.parameters().iter().position(|parameter| parameter.name == term.name());
+        estimate.value -= place.and_then(|at| fit.bias.get(at)).copied().unwrap_or(0.0);
+        let [low, high] = estimate.interval(1.0 - SIGNIFICANT / candidates.len() as f64)?;
         let certainty = estimate.value.abs() / estimate.standard_error;
         if low <= 0.0 && high >= 0.0 && least.as_ref().is_none_or(|(least, _)| certainty < *least) {
             least = Some((certainty, term.name().to_owned()));
         }
     }
     Ok(least.map(|(_, name)| name))
+}
+
+/// The terms but for one.
+fn without(terms: &Terms, name: &str) -> Result<Terms, EstimateError> {
+    let mut kept = terms.iter().filter(|term| term.name() != name).cloned();
+    Ok(kept.try_fold(Terms::none(), |kept, term| kept.and(term))?)
+}
+
+impl Selection {
+    /// Removes a term that turned out to be uncertain.
+    ///
+    /// # Errors
+    /// [`EstimateError::Model`] if the others make no list of terms.
+    pub fn remove(&mut self, name: String) -> Result<(), EstimateError> {
+        self.terms = without(&self.terms, &name)?;
+        self.removed.push(name);
+        Ok(())
+    }
 }
 
 /// Weighted squares that some columns leave.

@@ -92,6 +92,28 @@ fn mirrored(record: &Record) -> Result<Record, EstimateError> {
     Ok(Record::new(sampling, data)?)
 }
 
+/// Small motions beside a response, between a sample and the next.
+pub(super) struct Transition {
+    /// Derivatives of the state at the next sample by the state at this one, 2n × 2n.
+    pub(super) state: DMatrix<f64>,
+    /// Derivatives of the acceleration by the state at this sample, n × 2n.
+    pub(super) acceleration: DMatrix<f64>,
+}
+
+/// Rates at the stages of a step, and the first of a sampling interval.
+struct Stages {
+    first: Vec<f64>,
+    rates: [Vec<f64>; 4],
+    at: Vec<f64>,
+}
+
+impl Stages {
+    fn new(len: usize) -> Self {
+        let zeros = || vec![0.0; len];
+        Self { first: zeros(), rates: [zeros(), zeros(), zeros(), zeros()], at: zeros() }
+    }
+}
+
 /// A nonlinear system stepped by the classical Runge–Kutta rule together with the tangent of the same
 /// rule, so that the derivatives are those of the computed response.
 ///
@@ -152,6 +174,32 @@ impl<'a> Tangent<'a> {
     /// The response from a start; `None` if it overflows.
     pub(super) fn run(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
         let (n, width) = (self.system.dof(), 1 + self.directions.len());
+        let mut z = self.initial(start, width);
+        let mut state = DMatrix::zeros(force.samples, 3 * n);
+        let mut derivatives = vec![DMatrix::zeros(force.samples, 3 * n); self.directions.len()];
+        let (mut stages, mut before) = (Stages::new(z.len()), z.clone());
+        for sample in 0..force.samples {
+            before.copy_from_slice(&z);
+            if !self.interval(force, sample, &mut z, &mut stages) {
+                return None;
+            }
+            let all = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
+            for (column, course) in all {
+                let start = 2 * n * column;
+                for entry in 0..2 * n {
+                    course[(sample, entry)] = before[start + entry];
+                }
+                for dof in 0..n {
+                    course[(sample, 2 * n + dof)] = stages.first[start + n + dof];
+                }
+            }
+        }
+        Some(Course { state, derivatives, end: z })
+    }
+
+    /// State and derivatives at the start.
+    fn initial(&self, start: &InitialState, width: usize) -> Vec<f64> {
+        let n = self.system.dof();
         let mut z = vec![0.0; 2 * n * width];
         z[..n].copy_from_slice(start.displacement().as_slice());
         z[n..2 * n].copy_from_slice(start.velocity().as_slice());
@@ -160,42 +208,63 @@ impl<'a> Tangent<'a> {
                 z[2 * n * (1 + at) + entry] = 1.0;
             }
         }
-        let mut state = DMatrix::zeros(force.samples, 3 * n);
-        let mut derivatives = vec![DMatrix::zeros(force.samples, 3 * n); self.directions.len()];
-        let [mut k1, mut k2, mut k3, mut k4, mut at] = [(); 5].map(|()| vec![0.0; z.len()]);
-        let h = force.dt / force.steps as f64;
+        z
+    }
+
+    /// The motions beside the response from a start, from sample to sample, linearised: the directions are those of
+    /// the initial state. `None` if the response overflows.
+    pub(super) fn transitions(
+        &mut self,
+        force: &FineForce,
+        start: &InitialState,
+    ) -> Option<Vec<Transition>> {
+        let n = self.system.dof();
+        let mut z = self.initial(start, 1 + self.directions.len());
+        let at_start = z[2 * n..].to_vec();
+        let mut stages = Stages::new(z.len());
+        let mut transitions = Vec::with_capacity(force.samples);
         for sample in 0..force.samples {
-            for step in 0..force.steps {
-                let place = 2 * (sample * force.steps + step);
-                self.rate(&z, force.values.column(place).as_slice(), &mut k1);
-                if step == 0 {
-                    let all = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
-                    for (column, course) in all {
-                        let start = 2 * n * column;
-                        for entry in 0..2 * n {
-                            course[(sample, entry)] = z[start + entry];
-                        }
-                        for dof in 0..n {
-                            course[(sample, 2 * n + dof)] = k1[start + n + dof];
-                        }
-                    }
-                }
-                let middle = force.values.column(place + 1);
-                towards(&z, 0.5 * h, &k1, &mut at);
-                self.rate(&at, middle.as_slice(), &mut k2);
-                towards(&z, 0.5 * h, &k2, &mut at);
-                self.rate(&at, middle.as_slice(), &mut k3);
-                towards(&z, h, &k3, &mut at);
-                self.rate(&at, force.values.column(place + 2).as_slice(), &mut k4);
-                for (i, z) in z.iter_mut().enumerate() {
-                    *z += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-                }
-            }
-            if !z.iter().all(|value| value.is_finite()) {
+            z[2 * n..].copy_from_slice(&at_start);
+            if !self.interval(force, sample, &mut z, &mut stages) {
                 return None;
             }
+            let rates = DMatrix::from_column_slice(2 * n, 2 * n, &stages.first[2 * n..]);
+            transitions.push(Transition {
+                state: DMatrix::from_column_slice(2 * n, 2 * n, &z[2 * n..]),
+                acceleration: rates.rows(n, n).into_owned(),
+            });
         }
-        Some(Course { state, derivatives, end: z })
+        Some(transitions)
+    }
+
+    /// Leads state and derivatives over a sampling interval; false if they overflow.
+    fn interval(
+        &mut self,
+        force: &FineForce,
+        sample: usize,
+        z: &mut [f64],
+        stages: &mut Stages,
+    ) -> bool {
+        let h = force.dt / force.steps as f64;
+        let Stages { first, rates: [k1, k2, k3, k4], at } = stages;
+        for step in 0..force.steps {
+            let place = 2 * (sample * force.steps + step);
+            self.rate(z, force.values.column(place).as_slice(), k1);
+            if step == 0 {
+                first.copy_from_slice(k1);
+            }
+            let middle = force.values.column(place + 1);
+            towards(z, 0.5 * h, k1, at);
+            self.rate(at, middle.as_slice(), k2);
+            towards(z, 0.5 * h, k2, at);
+            self.rate(at, middle.as_slice(), k3);
+            towards(z, h, k3, at);
+            self.rate(at, force.values.column(place + 2).as_slice(), k4);
+            for (i, z) in z.iter_mut().enumerate() {
+                *z += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+            }
+        }
+        z.iter().all(|value| value.is_finite())
     }
 
     /// ż of state and derivatives (columns of 2n entries) under a force.

@@ -76,10 +76,10 @@ pub struct Fitted {
 pub struct WithTerms {
     /// The estimate.
     pub estimate: NonlinearEstimate,
-    /// Evidence against a linear system in the first record, before any model.
-    pub distortion: Distortion,
-    /// Points of the restoring-force surface of the first record.
-    pub restoring: RestoringForce,
+    /// Evidence against a linear system in the first record, before any model; `None` of open records.
+    pub distortion: Option<Distortion>,
+    /// Points of the restoring-force surface of the first record; `None` of open records.
+    pub restoring: Option<RestoringForce>,
     /// Selection of terms; `None` where there were no candidates.
     pub selection: Option<SelectionSummary>,
 }

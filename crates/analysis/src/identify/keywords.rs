@@ -286,8 +286,8 @@ impl Keywords {
                 ));
             }
         };
-        if self.extent == Some(Extent::Open) {
-            return Err(refused("extent", "nonlinear terms are fitted to whole periods"));
+        if self.extent == Some(Extent::Open) && self.method == Some(Method::LeastSquares) {
+            return Err(refused("method", "open records take maximum-likelihood"));
         }
         let searched = |constant| self.search.contains(&constant);
         let search = ShapeConstants {
@@ -302,7 +302,7 @@ impl Keywords {
             search,
             weighting: self.weighting.unwrap_or_default(),
         };
-        Ok(Source::Terms(TermFit { terms, estimator, lines }))
+        Ok(Source::Terms(TermFit { terms, estimator, extent: self.extent, lines }))
     }
 
     fn lines(&self) -> SpectralLines {
@@ -390,12 +390,13 @@ impl From<Source> for Keywords {
                 let hits = Some(rule);
                 Self { hits, noise: noise(response), force_noise: force, ..none }.with_lines(lines)
             }
-            Source::Terms(TermFit { terms, estimator, lines }) => {
-                let method = match estimator {
-                    TermEstimator::EquationError => Method::LeastSquares,
-                    TermEstimator::OutputError => Method::MaximumLikelihood,
+            Source::Terms(TermFit { terms, estimator, extent, lines }) => {
+                let method = match (estimator, extent) {
+                    (_, Some(Extent::Open)) => None,
+                    (TermEstimator::EquationError, _) => Some(Method::LeastSquares),
+                    (TermEstimator::OutputError, _) => Some(Method::MaximumLikelihood),
                 };
-                Self { method: Some(method), ..Self::from(terms) }.with_lines(lines)
+                Self { method, extent, ..Self::from(terms) }.with_lines(lines)
             }
             Source::Segments(SegmentFit { estimator, segments, method, lines }) => {
                 let segment = Some(segments).filter(|segments| !is_default(segments));
@@ -512,7 +513,7 @@ mod tests {
             (r#"{"extent": "period", "force_noise": [1]}"#, "force_noise"),
             (r#"{"method": "least-squares", "noise": "white"}"#, "noise"),
             (r#"{"nonlinear": "k3: x1^3", "noise": "white"}"#, "noise"),
-            (r#"{"nonlinear": "k3: x1^3", "extent": "open"}"#, "extent"),
+            (r#"{"nonlinear": "k3: x1^3", "extent": "open", "method": "least-squares"}"#, "method"),
             (r#"{"nonlinear": "k3: x1^3", "criterion": "held-out"}"#, "criterion"),
             (r#"{"weighting": "response"}"#, "weighting"),
         ] {

@@ -7,7 +7,7 @@
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `tables`, `tabulated` | frequency responses that were measured elsewhere, and such tables as data |
-//! | `nonlinear` | whole periods with nonlinear terms |
+//! | `nonlinear`, `open_terms` | whole periods and open records with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
 //! | `counts` | equations and memory that a fit needs, before any work |
@@ -36,6 +36,7 @@ pub mod lines;
 pub mod mass;
 pub mod nonlinear;
 mod open_records;
+mod open_terms;
 pub mod options;
 pub mod prediction;
 mod remarks;
@@ -91,6 +92,7 @@ use crate::hits::{self, HitNoise};
 use crate::machine::Machine;
 use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
 use crate::modes::resonances;
+pub use mechid_nonlinear::RestoringForce;
 
 /// Unexplained part of the response above which the result says so.
 pub const CONSPICUOUS: f64 = 0.05;
@@ -257,7 +259,7 @@ impl Identify {
             Source::Hits(HitFit { noise, lines, .. }) => {
                 Ok(open(noise, lines, Excitation::Hits(hit_noise))?.fitted)
             }
-            Source::Terms(how) => nonlinear::fit(records, unknowns, how),
+            Source::Terms(how) => nonlinear::fit(records, unknowns, how, period_given),
             Source::Segments(how) => responses::fit(records, unknowns, how, period_given),
             Source::Samples(_) if unknowns.is_related() => {
                 let why =

@@ -1,21 +1,22 @@
 //! Fits of whole periods with nonlinear terms beside M, C and K.
 
-use mechid_checks::{Finding, Verdict, before_spectral_fit, steady_periods};
+use mechid_checks::{Finding, NoiseSource, PValue, before_spectral_fit, steady_periods};
 use mechid_estimate::Unknowns;
-use mechid_model::Terms;
+use mechid_model::{Term, Terms};
 use mechid_nonlinear::{
-    ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
-    StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error,
-    output_error, select_terms,
+    ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, NonlinearEstimate, REACH,
+    Selection, ShapeConstants, StandardErrors, SteadyExperiments, SteppedRecord, Weighting,
+    best_output_error, distortion, equation_error, least_certain, select_terms,
 };
 use mechid_signal::{Extent, Record};
 use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
-use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
+use super::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
 use super::lines::LineChoice;
+use super::open_terms;
 use super::options::{Nonlinear, TermEstimator, TermFit};
 use super::prediction::{Model, Prediction};
 use super::remarks::one_motion_of;
@@ -42,11 +43,14 @@ pub struct NonlinearSummary {
     pub parameters: Vec<TermRow>,
     /// Weighting of the lines that was used.
     pub weighting: Weighting,
-    /// Number of blocks of time whose scatter gives the standard errors; `None` if the residual was
-    /// taken as white.
+    /// Number of blocks of time whose scatter gives the standard errors; `None` if the scatter of the periods does, or
+    /// the residual was taken as white.
     pub blocks: Option<usize>,
-    /// Evidence against a linear system in the first record, before any model.
-    pub distortion: DistortionRow,
+    /// Number of periods whose scatter gives the standard errors; `None` if another does.
+    pub periods: Option<usize>,
+    /// Evidence against a linear system in the first record, before any model; `None` of open records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<DistortionRow>,
     /// Growth of each term, constant forces apart, beyond the data.
     pub extrapolation: Vec<ExtrapolationRow>,
     /// Selection of terms; `None` where there were no candidates.
@@ -120,17 +124,22 @@ pub struct DistortionRow {
     pub text: String,
 }
 
-/// Fits whole periods of one or several records of the same period with nonlinear terms: by least
-/// squares on the equation of motion, or from there by output error.
+/// Fits records with nonlinear terms: whole periods by least squares on the equation of motion, or from there by output
+/// error; open ones by output error from a linear fit on.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     how: &TermFit,
+    period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
-    fitted(records, unknowns, how).map_err(|error| match error {
-        AnalysisError::Setting { .. } => error,
-        other => no_period(records).unwrap_or(other),
-    })
+    match how.extent {
+        Some(Extent::Open) => open_terms::fit(records, unknowns, how),
+        None if !period_given => match open_terms::no_period(records)? {
+            Some(refusal) => Err(refusal),
+            None => fitted(records, unknowns, how),
+        },
+        _ => fitted(records, unknowns, how),
+    }
 }
 
 fn fitted(
@@ -138,7 +147,7 @@ fn fitted(
     unknowns: &Unknowns,
     how: &TermFit,
 ) -> Result<Fitted, AnalysisError> {
-    let TermFit { terms: how, estimator, lines } = how;
+    let TermFit { terms: how, estimator, lines, .. } = how;
     let rule = lines.rule();
     let first = &records[0].held;
     let (kind, dofs) = (first.response().1, first.force.channels());
@@ -147,21 +156,9 @@ fn fitted(
     for Windowed { held, .. } in records {
         data.push(&held.force, held.response().0)?;
     }
-    let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
-    let selection = select(&data, unknowns, how)?;
-    let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
-    let start = equation_error(&data, unknowns, terms, &options)?;
-    let (estimator, estimated) = match estimator {
-        TermEstimator::EquationError => {
-            ("least squares on the equation of motion, in the frequency domain", start)
-        }
-        TermEstimator::OutputError => {
-            let stepped: Vec<SteppedRecord> =
-                records.iter().map(|r| mean_period(&r.held)).collect::<Result<_, _>>()?;
-            let estimate = output_error(&stepped, kind, &start)?.estimate;
-            ("output error on the mean periods, started from least squares", estimate)
-        }
-    };
+    let mut selection = select(&data, unknowns, how)?;
+    let (name, stepped) = stepped(records, *estimator)?;
+    let estimated = estimated(&data, unknowns, how, &stepped, &mut selection)?;
     let experiments: Vec<[&Record; 2]> =
         records.iter().map(|r| [&r.held.force, r.held.response().0]).collect();
     let seen = distortion(&band, &experiments, kind, unknowns)?;
@@ -171,14 +168,12 @@ fn fitted(
         Some(data) => before_spectral_fit(data, unknowns)?,
         None => Vec::new(),
     };
-    let mut remarks = one_motion_of(first);
-    if estimated.standard_errors() == StandardErrors::White {
-        remarks.push(
-            "the record is too short for standard errors from the scatter of blocks of time: they \
-             take the residual as white"
-                .into(),
-        );
-    }
+    let misfit = estimated.misfit();
+    // Noise on the force colours what the mean period leaves: the scatter of the periods knows it.
+    let residuals = match misfit {
+        Some(_) => Vec::new(),
+        None => steady_residuals(records, &model)?,
+    };
     let restoring = estimated.restoring_forces(&data)?.swap_remove(0);
     let linear = estimated.linear().clone();
     Ok(Fitted {
@@ -187,16 +182,47 @@ fn fitted(
         before_all,
         before,
         after: vec![Vec::new(); records.len()],
-        residuals: steady_residuals(records, &model)?,
-        remarks,
+        after_all: misfit.map(finding).into_iter().collect(),
+        misfit: misfit
+            .map(|misfit| Misfit { ratio: misfit.ratio, noise: "estimated from the periods" }),
+        residuals,
+        remarks: remarks(first, &estimated),
         nonlinear: Some(WithTerms {
             estimate: estimated,
-            distortion: seen,
-            restoring,
+            distortion: Some(seen),
+            restoring: Some(restoring),
             selection: selection.map(|selection| SelectionSummary::of(selection, how)),
         }),
-        ..Fitted::new(Domain::Frequency, estimator, Prediction::Steady, linear)
+        ..Fitted::new(Domain::Frequency, name, Prediction::Steady, linear)
     })
+}
+
+/// Returns the name of an estimator, and the records that it simulates.
+fn stepped(
+    records: &[Windowed],
+    estimator: TermEstimator,
+) -> Result<(&'static str, Vec<SteppedRecord>), AnalysisError> {
+    Ok(match estimator {
+        TermEstimator::EquationError => {
+            ("least squares on the equation of motion, in the frequency domain", Vec::new())
+        }
+        TermEstimator::OutputError => (
+            "output error on the mean periods, started from least squares",
+            records.iter().map(|record| whole_periods(&record.held)).collect::<Result<_, _>>()?,
+        ),
+    })
+}
+
+fn remarks(first: &Block, estimated: &NonlinearEstimate) -> Vec<String> {
+    let mut remarks = one_motion_of(first);
+    if estimated.standard_errors() == StandardErrors::White {
+        remarks.push(
+            "the record is too short for standard errors from the scatter of blocks of time: they \
+             take the residual as white"
+                .into(),
+        );
+    }
+    remarks
 }
 
 /// Returns the findings on the periods of each record, and their mean spectra on the lines that the force drives, of all
@@ -222,22 +248,6 @@ fn driven_spectra(
     Ok((findings, spectra))
 }
 
-/// Returns the reason why a fit fails whose window is taken for one period and does not look like one.
-fn no_period(records: &[Windowed]) -> Option<AnalysisError> {
-    records.iter().find_map(|Windowed { held, .. }| {
-        let looked = steady_periods(&held.force, held.response().0, held.period).ok()?;
-        let is_none = held.period == held.force.len()
-            && looked.iter().any(|finding| finding.verdict() > Verdict::Good);
-        is_none.then(|| AnalysisError::Setting {
-            setting: "nonlinear",
-            why: format!(
-                "nonlinear terms are fitted to whole periods, and {} is none: its end does not meet its beginning",
-                held.file
-            ),
-        })
-    })
-}
-
 /// Chooses among the candidates; `None` where there are none.
 fn select(
     data: &SteadyExperiments,
@@ -258,8 +268,8 @@ fn select(
     Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
 }
 
-/// Returns, record by record, the part of the response that the steady state under the measured force
-/// leaves, means apart.
+/// Returns, record by record, the part of the response that the steady state under the measured force leaves, means
+/// apart.
 fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>, AnalysisError> {
     let mut residuals = Vec::new();
     for Windowed { held, .. } in records {
@@ -275,11 +285,57 @@ fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>
     Ok(residuals)
 }
 
-fn mean_period(held: &Block) -> Result<SteppedRecord, AnalysisError> {
-    Ok(SteppedRecord {
-        force: held.force.period_mean(held.period)?,
-        response: held.response().0.period_mean(held.period)?,
-        extent: Extent::WholePeriod,
+fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
+    let periods = held.force.len() / held.period;
+    let whole = |record: &Record| record.window(0, periods * held.period);
+    let (force, response) = (whole(&held.force)?, whole(held.response().0)?);
+    Ok(SteppedRecord { force, response, extent: Extent::WholePeriod, periods })
+}
+
+/// Estimates the terms, by output error on `stepped` records where there are any, and removes candidates that turn out
+/// to be uncertain: least squares, by which they were chosen, is biased by noise on the response.
+fn estimated(
+    data: &SteadyExperiments,
+    unknowns: &Unknowns,
+    how: &Nonlinear,
+    stepped: &[SteppedRecord],
+    selection: &mut Option<Selection>,
+) -> Result<NonlinearEstimate, AnalysisError> {
+    let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
+    loop {
+        let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
+        let start = equation_error(data, unknowns, terms, &options)?;
+        let estimate = match stepped {
+            [] => start,
+            _ => {
+                // A constant inside a law may be far from the one given.
+                let shape = ShapeConstants { laws: true, ..how.search };
+                let has_constants = |term: &Term| !term.law().constants().is_empty();
+                let is_open = !how.search.laws && terms.iter().any(has_constants);
+                let options = EquationErrorOptions { shape, ..options };
+                let other = is_open.then(|| equation_error(data, unknowns, terms, &options).ok());
+                let starts: Vec<_> = [start].into_iter().chain(other.flatten()).collect();
+                best_output_error(stepped, data.measured(), &starts)?.estimate
+            }
+        };
+        let uncertain = match how.criterion {
+            Criterion::Information => least_certain(&estimate, &how.candidates)?,
+            Criterion::HeldOut => None,
+        };
+        match (selection.as_mut(), uncertain) {
+            (Some(selection), Some(name)) => selection.remove(name)?,
+            _ => return Ok(estimate),
+        }
+    }
+}
+
+/// The residual against the noise of the periods, as a check.
+fn finding(misfit: mechid_nonlinear::Misfit) -> Finding {
+    Finding::Misfit(mechid_checks::Misfit {
+        ratio: misfit.ratio,
+        p_value: PValue::of(misfit.p_value),
+        source: NoiseSource::Periods,
+        concentration: None,
     })
 }
 
@@ -302,14 +358,18 @@ impl NonlinearSummary {
             weighting: fit.weighting(),
             blocks: match fit.standard_errors() {
                 StandardErrors::Blocks(count) => Some(count),
-                StandardErrors::White => None,
+                _ => None,
             },
-            distortion: DistortionRow {
+            periods: match fit.standard_errors() {
+                StandardErrors::Periods(count) => Some(count),
+                _ => None,
+            },
+            distortion: distortion.as_ref().map(|distortion| DistortionRow {
                 even: distortion.even,
                 odd: distortion.odd,
                 linear_leaves: distortion.linear_leaves,
                 text: distortion.to_string(),
-            },
+            }),
             extrapolation: fit.extrapolations()?.into_iter().map(ExtrapolationRow::of).collect(),
             selection: selection.clone(),
         })
@@ -317,7 +377,9 @@ impl NonlinearSummary {
 
     /// Returns the findings before the fit and the amplitudes that hold the terms, a sentence each.
     pub(super) fn text(&self) -> String {
-        let mut text = format!("before the fit: {}\n", self.distortion.text);
+        let before = self.distortion.as_ref();
+        let mut text =
+            before.map(|row| format!("before the fit: {}\n", row.text)).unwrap_or_default();
         text += &self.selection.as_ref().map(SelectionSummary::text).unwrap_or_default();
         for row in &self.parameters {
             if let Some([x, v]) = row.largest {

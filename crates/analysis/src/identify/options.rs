@@ -55,7 +55,7 @@ pub enum Source {
     Open(OpenFit),
     /// Hits of a hammer, each an open record of its own.
     Hits(HitFit),
-    /// Spectral lines of whole periods, with nonlinear springs and dampers beside M, C and K.
+    /// Whole periods or open records, with nonlinear springs and dampers beside M, C and K.
     Terms(TermFit),
     /// Frequency responses, averaged over segments.
     Segments(SegmentFit),
@@ -137,9 +137,11 @@ pub struct HitFit {
 pub struct TermFit {
     /// Springs and dampers.
     pub terms: Nonlinear,
-    /// Estimator.
+    /// Estimator from whole periods; open records take output error.
     pub estimator: TermEstimator,
-    /// Spectral lines.
+    /// Extent of the windows; `None`: periods, which they must look like if none is given.
+    pub extent: Option<Extent>,
+    /// Spectral lines; of open records those of the linear fit from which the search starts.
     pub lines: SpectralLines,
 }
 

@@ -97,7 +97,10 @@ impl Prediction {
         let system = match model {
             Model::Linear(system) => system,
             Model::Nonlinear { system, channels } => {
-                return steady_state(system, *channels, measured);
+                return match self {
+                    Prediction::Steady => steady_state(system, *channels, measured),
+                    Prediction::Sampled { .. } => from_fitted_start(system, measured),
+                };
             }
         };
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
@@ -132,6 +135,16 @@ pub(crate) fn steady_state(
     let start = periodic_start(&motion, kind)?;
     let steady = nonlinear::predict(system, &force, Extent::WholePeriod, &start)?;
     shown(&steady, channels, measured.force.len() / period)
+}
+
+/// Returns the response of a nonlinear system to the measured force of an open record, from the start that fits it best.
+fn from_fitted_start(
+    system: &NonlinearSystem,
+    measured: &Block,
+) -> Result<Response, EstimateError> {
+    let (force, motions) = (&measured.force, measured.responses());
+    let start = nonlinear::fitted_start(system, force, &motions)?;
+    nonlinear::predict(system, force, Extent::Open, &start)
 }
 
 /// A response as the channels show it, over a number of periods.

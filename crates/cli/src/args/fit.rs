@@ -137,7 +137,8 @@ struct NonlinearArgs {
     /// Springs and dampers to fit beside mass, damping and stiffness, each `name: law`: powers of x1
     /// and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and (v1-v2), |v1| v1,
     /// v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with that clearance (m) on either
-    /// side, tanh(v1/0.01) for friction smoothed below that velocity (m/s), x1^0 for a constant force
+    /// side, tanh(v1/0.01) for friction smoothed below that velocity (m/s), x1^0 for a constant force.
+    /// They are fitted to whole periods or, with --extent open, to any record
     #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
     /// Terms to try besides, written in the same way: one after the other the most useful is added, as

@@ -278,6 +278,7 @@ fn a_prescribed_response_is_predicted_and_fitted() {
         force: force.clone(),
         response: response.displacement().clone(),
         extent: Extent::WholePeriod,
+        periods: 1,
     };
     let fit = output_error(&[record], ResponseQuantity::Displacement, &begin.unwrap()).unwrap();
     for (value, expected) in [("kc", 120.0), ("cq", 3.0), ("k11", 900.0), ("m22", 1.0)]

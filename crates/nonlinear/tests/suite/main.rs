@@ -1,6 +1,8 @@
 //! Nonlinear terms, judged by exact steady states, seeded experiments and the Silverbox.
 
 mod exact;
+mod gap;
+mod periods;
 mod silverbox;
 mod stepped;
 mod study;

@@ -118,6 +118,7 @@ fn output_error_predicts_as_well() {
         force: part(&record, 0, start_of(q), REALISATION),
         response: part(&record, 1, start_of(q), REALISATION),
         extent: Extent::WholePeriod,
+        periods: 1,
     });
     let found = output_error(&stepped, DISPLACEMENT, &start).unwrap();
     let system = found.estimate.system().unwrap();

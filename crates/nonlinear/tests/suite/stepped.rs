@@ -21,6 +21,16 @@ pub fn steady<const N: usize>(
     forces: &[Vec<Cosine>; N],
     acceleration: impl Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N],
 ) -> (Record, Record) {
+    steady_after(SETTLED, sampling, forces, acceleration)
+}
+
+/// The same in the last of so many periods from rest.
+pub fn steady_after<const N: usize>(
+    settled: usize,
+    sampling: Sampling,
+    forces: &[Vec<Cosine>; N],
+    acceleration: impl Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N],
+) -> (Record, Record) {
     let omega0 = sampling.omega0();
     let force = |t: f64| {
         let mut all = [0.0; N];
@@ -41,9 +51,9 @@ pub fn steady<const N: usize>(
     let table: Vec<_> = (0..len).map(at).collect();
     let mut z = [[0.0; N]; 2];
     let mut x = vec![vec![0.0; len]; N];
-    for period in 0..SETTLED {
+    for period in 0..settled {
         for sample in 0..len {
-            if period + 1 == SETTLED {
+            if period + 1 == settled {
                 x.iter_mut().zip(z[0]).for_each(|(channel, value)| channel[sample] = value);
             }
             z = step(&z, dt, &table[sample], &rate);

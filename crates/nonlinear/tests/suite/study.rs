@@ -23,7 +23,7 @@ fn sampling() -> Sampling {
     Sampling::new(std::f64::consts::TAU * 100.0 / LEN as f64, LEN).unwrap()
 }
 
-fn runs(in_suite: u64) -> u64 {
+pub fn runs(in_suite: u64) -> u64 {
     std::env::var("MECHID_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(in_suite)
 }
 
@@ -71,9 +71,8 @@ fn identify(
     let data = steady_data(force, response, 201);
     let options = EquationErrorOptions::default();
     let start = equation_error(&data, unknowns, terms, &options).unwrap();
-    let mean = |record: &Record| record.period_mean(LEN).unwrap();
-    let record =
-        SteppedRecord { force: mean(force), response: mean(response), extent: Extent::WholePeriod };
+    let (force, response) = (force.clone(), response.clone());
+    let record = SteppedRecord { force, response, extent: Extent::WholePeriod, periods: PERIODS };
     let found = output_error(&[record], DISPLACEMENT, &start).unwrap().estimate;
     // A start that is estimated rests on the first block alone; the intervals of the rest do not.
     let freedom = found.linear().degrees_of_freedom();

@@ -121,8 +121,8 @@ impl ToFigure for Identified {
     /// nonlinear terms, the restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
-        if let Some(fitted) = &self.fitted().nonlinear {
-            return restoring::figure(&title, fitted);
+        if let Some((fitted, points)) = restoring::of(self) {
+            return restoring::figure(&title, fitted, points);
         }
         match self.drawn_spectra() {
             Some(data) => {

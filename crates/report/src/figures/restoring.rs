@@ -1,9 +1,11 @@
 //! Restoring force of a system with nonlinear terms: its surface, its springs and dampers, and the
 //! residual.
 
-use mechid_analysis::identify::WithTerms;
+use mechid_analysis::Identified;
 use mechid_analysis::identify::rows::CONFIDENCE;
+use mechid_analysis::identify::{RestoringForce, WithTerms};
 use mechid_analysis::text::{compact, significant};
+
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 use crate::ReportError;
@@ -23,11 +25,24 @@ const REACH: f64 = 1.2;
 /// Returns four panels for each degree of freedom: the measured points of the surface over
 /// displacement and velocity; spring and damper with their confidence intervals, and the measured
 /// points minus the rest of the model; the residual over the displacement.
+/// Returns the nonlinear terms of a fit of whole periods with the points of their surface.
+pub fn of(identified: &Identified) -> Option<(&WithTerms, &RestoringForce)> {
+    let fitted = identified.fitted().nonlinear.as_ref()?;
+    Some((fitted, fitted.restoring.as_ref()?))
+}
+
+/// Returns four panels for each degree of freedom: the measured points of the surface over displacement and
+/// velocity; spring and damper with their confidence intervals, beside the points less the rest of
+/// the model; the residual over the displacement.
 ///
 /// # Errors
 /// [`ReportError::Estimate`] if an interval cannot be computed.
-pub fn figure(title: &str, fitted: &WithTerms) -> Result<Figure, ReportError> {
-    let (points, dofs) = (&fitted.restoring, fitted.restoring.displacement.channels());
+pub fn figure(
+    title: &str,
+    fitted: &WithTerms,
+    points: &RestoringForce,
+) -> Result<Figure, ReportError> {
+    let dofs = points.displacement.channels();
     let every = points.displacement.len().div_ceil(SHOWN);
     let mut figure = Figure::new(format!("Restoring force: {title}")).columns(2);
     for dof in 0..dofs {
@@ -83,7 +98,7 @@ fn side(
     residual: &[f64],
     spring: bool,
 ) -> Result<Vec<Curve>, ReportError> {
-    let dofs = fitted.restoring.displacement.channels();
+    let dofs = fitted.estimate.linear().dof();
     let force = |value: f64| {
         let mut moved = vec![0.0; dofs];
         moved[dof] = value;

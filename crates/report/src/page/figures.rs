@@ -383,10 +383,10 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
 
 /// Draws the restoring force of a system with nonlinear terms, for the first record.
 pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
-    let Some(fitted) = &identified.fitted().nonlinear else { return Ok(None) };
+    let Some((fitted, points)) = surface::of(identified) else { return Ok(None) };
     let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
                    confidence intervals, drawn to 1.2 times the amplitudes measured, and what they leave.";
-    let figure = surface::figure("first record", fitted)?;
+    let figure = surface::figure("first record", fitted, points)?;
     drawn("restoring-force".into(), figure, caption.into()).map(Some)
 }
 

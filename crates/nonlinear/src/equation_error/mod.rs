@@ -1,5 +1,7 @@
 //! Least squares on the equation of motion with nonlinear columns.
 
+mod uncertainty;
+
 use mechid_estimate::EstimateParts;
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_estimate::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
@@ -10,14 +12,13 @@ use mechid_signal::message;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::SteadyExperiments;
-use super::covariance::{BlockScores, InTime, block_count, in_time};
+use super::covariance::Uncertainty;
 use super::equations::Equations;
-use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
+use super::estimate::{NamedParameter, NonlinearEstimate};
 use super::experiments::Columns;
-use super::grid::Grid;
 use super::shape::{Shape, ShapeConstants, fit_shape};
 use super::weighting::{Weighting, Weights};
-use crate::limits::{FEWEST, WEIGHTING_ROUNDS, WEIGHTING_SETTLED};
+use crate::limits::{WEIGHTING_ROUNDS, WEIGHTING_SETTLED};
 
 /// Settings of [`equation_error`]: weighting of the rows, and constants to search for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -34,7 +35,8 @@ pub struct EquationErrorOptions {
 /// products folds back, and transformed: they are columns like any other. All lines of the fit count,
 /// those without force too: on them stands what the nonlinear forces and the response have to cancel.
 /// The rows are weighted by what is found of the equation error's spectrum ([`Weighting`]); the
-/// standard errors rest on the scatter of the scores ([`StandardErrors`]).
+/// standard errors rest on the scatter of the periods or of the scores
+/// ([`StandardErrors`](super::StandardErrors)).
 ///
 /// Shape constants are found by Gauss–Newton steps on the residual that the linear parameters leave
 /// (variable projection); the covariance is of all parameters together.
@@ -168,8 +170,8 @@ impl Fit {
         let residuals = equations.residuals(&self.columns, &self.coefficients);
         let slopes = shape.slopes(equations, &self.coefficients, &residuals)?;
         let (inverse, condition) = self.inverse(equations, shape, &slopes)?;
-        let (covariance, standard_errors, freedom) =
-            self.covariance(equations, &residuals, &slopes, &inverse);
+        let Uncertainty { covariance, standard_errors, freedom, misfit, bias } =
+            self.uncertainty(equations, shape, &residuals, &slopes, &inverse);
         let free = equations.free.len();
         let linear = Estimate::new(EstimateParts {
             unknowns: equations.unknowns.clone(),
@@ -200,6 +202,8 @@ impl Fit {
             channels: shape.channels(),
             weighting: self.weights.kind,
             standard_errors,
+            misfit,
+            bias,
             unexplained,
             ranges: equations.data.ranges(shape.terms(), &shape.channels()),
             terms: shape.terms().clone(),
@@ -228,52 +232,6 @@ impl Fit {
         let solution = both.solve()?;
         check_determined(&names(equations, shape), &solution.undetermined)?;
         Ok((solution.unscaled_covariance, solution.condition))
-    }
-
-    fn covariance(
-        &self,
-        equations: &Equations<'_>,
-        residuals: &[DMatrix<Complex<f64>>],
-        slopes: &[Vec<DMatrix<Complex<f64>>>],
-        inverse: &DMatrix<f64>,
-    ) -> (DMatrix<f64>, StandardErrors, usize) {
-        let (data, weights) = (equations.data, &self.weights.of_rows);
-        let parameters = inverse.nrows();
-        let blocks = block_count(data.period().duration(), self.slowest_decay(equations));
-        if blocks * data.count() >= FEWEST {
-            let lines = data.period().len().div_ceil(2);
-            let grid = Grid::new(lines, data.period().len());
-            let time = |values: &[Complex<f64>]| in_time(&grid, lines, &equations.rows, values);
-            let mut scores = BlockScores::new(parameters);
-            for ((columns, residual), slopes) in self.columns.iter().zip(residuals).zip(slopes) {
-                let part = |dof: usize| {
-                    let weigh = |values: &DMatrix<Complex<f64>>| {
-                        let one = |row: usize| values[(row, dof)] * weights[(row, dof)];
-                        time(&(0..equations.rows.len()).map(one).collect::<Vec<_>>())
-                    };
-                    let columns_of_dof = equations.weighted(columns, weights, dof);
-                    let mut regressors: Vec<_> =
-                        columns_of_dof.map(|(at, values)| (at, time(&values))).collect();
-                    let more = slopes.iter().enumerate();
-                    regressors.extend(more.map(|(at, d)| (equations.count() + at, weigh(d))));
-                    InTime { regressors, residual: weigh(residual) }
-                };
-                let parts: Vec<_> = (0..data.dof()).map(part).collect();
-                scores.push(blocks, &parts);
-            }
-            let count = scores.count();
-            if let Some((covariance, freedom)) = scores.covariance(inverse, parameters) {
-                return (covariance, StandardErrors::Blocks(count), freedom);
-            }
-        }
-        let square: f64 = residuals
-            .iter()
-            .flat_map(|residual| residual.iter().zip(weights.iter()))
-            .map(|(e, w)| (e * *w).norm_sqr())
-            .sum();
-        let freedom = equations.equations().saturating_sub(parameters);
-        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
-        (inverse * variance, StandardErrors::White, freedom)
     }
 
     /// Rate (1/s) at which the slowest mode of the linear part decays; 0 if there is no such part.

@@ -1,35 +1,29 @@
 //! The simulated response fitted to the measured one.
 
+mod open;
+mod record;
+mod starts;
+mod uncertainty;
+
 use mechid_estimate::EstimateParts;
-use mechid_estimate::NAMED_PARAMETERS;
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
-use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
+use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Term, Terms};
 use mechid_numerics::gauss_newton::{Residuals, minimise_residuals};
-use mechid_numerics::least_squares::LeastSquares;
-use mechid_numerics::triangular::TriangularFactor;
 use mechid_numerics::{NumericsError, Uncertain, check_size};
-use mechid_signal::{Extent, Record, message};
+use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::covariance::{BlockScores, InTime, block_count};
+pub use self::open::output_error_of_open_records;
+pub use self::record::SteppedRecord;
+pub use self::starts::best_output_error;
+use super::covariance::Uncertainty;
 use super::equation_error::slowest_decay;
-use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
+use super::estimate::{NamedParameter, NonlinearEstimate};
 use super::limits::SEARCH_STEPS;
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
-use crate::limits::{FEWEST, OUTPUT_FORGOTTEN};
-
-/// A record for [`output_error`].
-#[derive(Debug, Clone)]
-pub struct SteppedRecord {
-    /// Force, samples × degrees of freedom, in N.
-    pub force: Record,
-    /// Response, samples × degrees of freedom, in m, m/s or m/s².
-    pub response: Record,
-    /// Extent of the record: a whole period of a force that repeats, or open.
-    pub extent: Extent,
-}
+use crate::limits::OUTPUT_FORGOTTEN;
 
 /// A [`NonlinearEstimate`] by output error, with what its search tells.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +47,10 @@ pub struct NonlinearFit {
 /// [`equation_error`](super::equation_error) gives it, whose delay and phase of the channels are kept.
 /// Channels are weighted by the size of what is left of each.
 ///
-/// The standard errors count the colour of the residual ([`StandardErrors::Blocks`]): where the model
-/// misses a resonance's damping by a little, the white formula is several times too small.
+/// The standard errors follow from the noise of force and response as several periods show it
+/// ([`StandardErrors::Periods`]), carried through the system, as long as the residual is no more than that noise
+/// ([`NonlinearEstimate::misfit`]). Otherwise they count the colour of the residual ([`StandardErrors::Blocks`]):
+/// where the model misses a resonance's damping by a little, the white formula is several times too small.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,
@@ -87,15 +83,14 @@ pub fn output_error(
     let mut theta = theta;
     // The size of what is left of several channels is known after the first search.
     for round in 0..2 {
-        let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS)
-            .ok_or(EstimateError::NotConverged { searches: 1, steps })
-            .and_then(|minimum| match minimum.converged {
-                true => Ok(minimum),
-                false => Err(EstimateError::NotConverged { searches: 1, steps: minimum.steps }),
-            })?;
+        let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
+        let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS).ok_or(lost(steps))?;
         steps += minimum.steps;
         theta = minimum.parameters;
         problem.residual(&theta, &mut residual);
+        if !minimum.converged {
+            return Err(lost(minimum.steps));
+        }
         if n == 1 || round == 1 {
             break;
         }
@@ -110,6 +105,8 @@ struct Prepared {
     force: FineForce,
     /// The force at the samples.
     plain: Record,
+    /// Deviations of the periods from their mean: samples × channels of the response, then of the force.
+    deviations: Vec<DMatrix<f64>>,
 }
 
 struct Problem<'a> {
@@ -142,9 +139,9 @@ impl<'a> Problem<'a> {
         });
         let shared = entries.chain(terms).chain(constants).collect();
         let prepared = records.iter().map(|record| {
-            let (plain, response) = start.channels().correct(&record.force, &record.response)?;
+            let (plain, response, deviations) = record.prepared(start.channels())?;
             let force = FineForce::sufficient(&plain, system, record.extent, &at_rest)?;
-            Ok(Prepared { response, force, plain })
+            Ok(Prepared { response, force, plain, deviations })
         });
         let records = prepared.collect::<Result<Vec<_>, EstimateError>>()?;
         if records.is_empty() {
@@ -257,6 +254,20 @@ impl<'a> Problem<'a> {
         initial(&theta.rows(first, len).into_owned()).ok()
     }
 
+    /// The largest |q| (m) and |q̇| (m/s) of the coordinate of each term in the simulated responses.
+    fn ranges(&self, system: &NonlinearSystem) -> Vec<[f64; 2]> {
+        let n = self.dof();
+        let largest = |term: &Term, part: usize| {
+            let of = |course: &Course| {
+                let columns = course.state.columns(part * n, n);
+                let signs = DVector::from_fn(n, |dof, _| term.coordinate().sign(dof));
+                (columns * signs).amax()
+            };
+            self.courses.iter().map(of).fold(0.0, f64::max)
+        };
+        system.terms().iter().map(|term| [0, 1].map(|part| largest(term, part))).collect()
+    }
+
     fn finish(
         self,
         theta: &DVector<f64>,
@@ -267,7 +278,8 @@ impl<'a> Problem<'a> {
         let system = self.system(theta).ok_or(wrong.clone())?;
         let (n, shared, free) = (self.dof(), self.shared.len(), self.free.len());
         let inverse = self.inverse(theta.len())?;
-        let (covariance, standard_errors, freedom) = self.covariance(theta, &inverse);
+        let Uncertainty { covariance, standard_errors, freedom, misfit, bias } =
+            self.uncertainty(theta, &system, &inverse);
         let covariance = covariance.view((0, 0), (shared, shared)).into_owned();
         let rmse = self.residual_rms();
         let around_mean = |dof: usize| {
@@ -313,72 +325,17 @@ impl<'a> Problem<'a> {
                 channels: start.channels(),
                 weighting: start.weighting(),
                 standard_errors,
+                misfit,
+                bias,
                 unexplained,
-                ranges: start.ranges().to_vec(),
+                ranges: match start.ranges() {
+                    [] => self.ranges(&system),
+                    measured => measured.to_vec(),
+                },
                 terms: system.terms().clone(),
                 equations: self.len(),
             },
         })
-    }
-
-    /// (JᵀJ)⁻¹ of all parameters, where the residual was last evaluated.
-    fn inverse(&self, parameters: usize) -> Result<DMatrix<f64>, EstimateError> {
-        let mut jacobian = DMatrix::zeros(self.len(), parameters);
-        self.jacobian(&mut jacobian);
-        let mut factor = TriangularFactor::new(parameters);
-        if !factor.push(&[jacobian.as_view()]) {
-            return Err(NumericsError::Overflow.into());
-        }
-        let mut rows = LeastSquares::new(parameters, 1);
-        rows.push_rows(factor.r().as_view(), DMatrix::zeros(parameters, 1).as_view())?;
-        let solution = rows.solve()?;
-        if !solution.undetermined.is_empty() {
-            let at = |at: usize| solution.undetermined.iter().any(|d| d.involved[at]);
-            let open = self.free.iter().enumerate().filter(|(i, _)| at(*i)).map(|(_, p)| p);
-            return Err(EstimateError::Undetermined {
-                parameters: message::list(open, ", ", NAMED_PARAMETERS),
-                directions: "they change the simulated response in the same way".to_owned(),
-            });
-        }
-        Ok(solution.unscaled_covariance)
-    }
-
-    fn covariance(
-        &self,
-        theta: &DVector<f64>,
-        inverse: &DMatrix<f64>,
-    ) -> (DMatrix<f64>, StandardErrors, usize) {
-        let n = self.dof();
-        let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
-        let blocks = |record: &Prepared| block_count(record.response.sampling().duration(), rate);
-        let order = self.measured.derivative_order();
-        if self.records.iter().map(blocks).sum::<usize>() >= FEWEST {
-            let mut scores = BlockScores::new(theta.len());
-            for (at, (record, course)) in self.records.iter().zip(&self.courses).enumerate() {
-                let part = |dof: usize| {
-                    let weight = 1.0 / self.levels[dof];
-                    let derivatives = course.derivatives.iter().enumerate();
-                    let regressors = derivatives.map(|(d, derivative)| {
-                        let column = derivative.column(order * n + dof) * weight;
-                        (self.place(at, d), column.as_slice().to_vec())
-                    });
-                    let gap = self.gap(at, record, dof) * weight;
-                    InTime { regressors: regressors.collect(), residual: gap.as_slice().to_vec() }
-                };
-                scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
-            }
-            let count = scores.count();
-            if let Some((covariance, freedom)) = scores.covariance(inverse, self.shared.len()) {
-                return (covariance, StandardErrors::Blocks(count), freedom);
-            }
-        }
-        let square: f64 = (0..n)
-            .flat_map(|dof| self.records.iter().enumerate().map(move |(at, r)| (dof, at, r)))
-            .map(|(dof, at, record)| (self.gap(at, record, dof) / self.levels[dof]).norm_squared())
-            .sum();
-        let freedom = self.len().saturating_sub(theta.len());
-        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
-        (inverse * variance, StandardErrors::White, freedom)
     }
 }
 

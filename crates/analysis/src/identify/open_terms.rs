@@ -1,0 +1,122 @@
+//! Fits of open records, such as sweeps, with nonlinear terms beside M, C and K.
+
+use mechid_checks::{Verdict, steady_periods};
+use mechid_estimate::Unknowns;
+use mechid_model::Discretisation;
+use mechid_nonlinear::{NonlinearEstimate, SteppedRecord, output_error_of_open_records};
+use mechid_signal::{Extent, Record};
+
+use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
+use super::keywords::Domain;
+use super::open_records::{self, Excitation};
+use super::options::{Nonlinear, OpenNoise, TermFit};
+use super::prediction::{Model, Prediction};
+use super::remarks::one_motion_of;
+use crate::AnalysisError;
+use crate::measurement::Windowed;
+
+/// Fits the samples of open records by output error. The search starts from the linear fit of the lines that the forces
+/// drive, or that `how` chooses.
+pub(super) fn fit(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    how: &TermFit,
+) -> Result<Fitted, AnalysisError> {
+    let TermFit { terms: Nonlinear { terms, candidates, search, .. }, lines, .. } = how;
+    let refuse = |setting, why: &str| Err(AnalysisError::Setting { setting, why: why.into() });
+    if !candidates.is_empty() {
+        return refuse(
+            "candidates",
+            "terms are chosen from whole periods: an open record has none",
+        );
+    }
+    if search.delay || search.phase {
+        return refuse("search", "delay and phase of the channels are found from whole periods");
+    }
+    let (noise, excitation) = (OpenNoise::default(), Excitation::Lasting);
+    let linear = open_records::fit(records, unknowns, lines.rule(), &noise, excitation)?.fitted;
+    let stepped: Vec<SteppedRecord> = records
+        .iter()
+        .map(|Windowed { held, .. }| SteppedRecord {
+            force: held.force.clone(),
+            response: held.response().0.clone(),
+            extent: Extent::Open,
+            periods: 1,
+        })
+        .collect();
+    let kind = records[0].held.response().1;
+    let estimate = output_error_of_open_records(&stepped, kind, &linear.estimate, terms)?.estimate;
+    let prediction = Prediction::Sampled {
+        discretisation: Discretisation::FirstOrderHold,
+        extent: Extent::Open,
+    };
+    let of_start = "the windows are no periods: the simulated response was fitted to their samples, each from a start of \
+                    its own";
+    Ok(Fitted {
+        equations: estimate.equations() / unknowns.dof(),
+        before_all: linear.before_all,
+        before: linear.before,
+        after: vec![Vec::new(); records.len()],
+        residuals: residuals(records, &estimate, prediction)?,
+        remarks: one_motion_of(&records[0].held).into_iter().chain([of_start.to_owned()]).collect(),
+        frequency: linear.frequency,
+        drawn: linear.drawn,
+        ..Fitted::new(
+            Domain::Time,
+            "output error on open records, started from a linear fit",
+            prediction,
+            estimate.linear().clone(),
+        )
+    }
+    .with_terms(estimate))
+}
+
+impl Fitted {
+    /// The same with nonlinear terms that were found in open records.
+    fn with_terms(mut self, estimate: NonlinearEstimate) -> Self {
+        self.nonlinear =
+            Some(WithTerms { estimate, distortion: None, restoring: None, selection: None });
+        self
+    }
+}
+
+/// Returns, record by record, the part of the response that the simulated one leaves.
+fn residuals(
+    records: &[Windowed],
+    estimate: &NonlinearEstimate,
+    prediction: Prediction,
+) -> Result<Vec<Residual>, AnalysisError> {
+    let model = Model::Nonlinear { system: estimate.system()?, channels: estimate.channels() };
+    let mut residuals = Vec::new();
+    for Windowed { held, .. } in records {
+        let fitted = held.response().0.clone();
+        let kind = held.response().1;
+        let compared = prediction.predict(&model, held)?;
+        let Some(predicted) = compared.into_iter().find(|compared| compared.kind == kind) else {
+            continue;
+        };
+        residuals.push(Residual::Samples(SampleResidual {
+            samples: Record::new(fitted.sampling(), fitted.data() - predicted.predicted.data())?,
+            fitted,
+            force: held.force.clone(),
+            noise_span: 0,
+        }));
+    }
+    Ok(residuals)
+}
+
+/// Returns why windows that are not said to be periods cannot be taken for such.
+pub(super) fn no_period(records: &[Windowed]) -> Result<Option<AnalysisError>, AnalysisError> {
+    for Windowed { held, .. } in records {
+        let looked = steady_periods(&held.force, held.response().0, held.period)?;
+        if looked.iter().any(|finding| finding.verdict() > Verdict::Good) {
+            let why = format!(
+                "nonlinear terms are fitted to whole periods unless `extent` is open, and {} is none: its end does \
+                 not meet its beginning",
+                held.file
+            );
+            return Ok(Some(AnalysisError::Setting { setting: "nonlinear", why }));
+        }
+    }
+    Ok(None)
+}

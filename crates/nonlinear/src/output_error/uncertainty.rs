@@ -1,0 +1,202 @@
+//! Standard errors of an output-error fit, and whether its residual is noise.
+
+use mechid_estimate::{EstimateError, NAMED_PARAMETERS};
+use mechid_model::NonlinearSystem;
+use mechid_numerics::NumericsError;
+use mechid_numerics::gauss_newton::Residuals;
+use mechid_numerics::least_squares::LeastSquares;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_signal::{Record, Spectrum, message};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::{Prepared, Problem};
+use crate::covariance::{BlockScores, ByPeriods, InTime, Uncertainty, block_count};
+use crate::equation_error::slowest_decay;
+use crate::estimate::StandardErrors;
+use crate::limits::FEWEST;
+use crate::propagation::Propagation;
+use crate::scatter::{Line, PeriodScatter, Powers};
+use crate::simulate::{Direction, Tangent};
+
+impl Problem<'_> {
+    /// (JᵀJ)⁻¹ of all parameters, where the residual was last evaluated.
+    pub(super) fn inverse(&self, parameters: usize) -> Result<DMatrix<f64>, EstimateError> {
+        let mut jacobian = DMatrix::zeros(self.len(), parameters);
+        self.jacobian(&mut jacobian);
+        let mut factor = TriangularFactor::new(parameters);
+        if !factor.push(&[jacobian.as_view()]) {
+            return Err(NumericsError::Overflow.into());
+        }
+        let mut rows = LeastSquares::new(parameters, 1);
+        rows.push_rows(factor.r().as_view(), DMatrix::zeros(parameters, 1).as_view())?;
+        let solution = rows.solve()?;
+        if !solution.undetermined.is_empty() {
+            let at = |at: usize| solution.undetermined.iter().any(|d| d.involved[at]);
+            let open = self.free.iter().enumerate().filter(|(i, _)| at(*i)).map(|(_, p)| p);
+            return Err(EstimateError::Undetermined {
+                parameters: message::list(open, ", ", NAMED_PARAMETERS),
+                directions: "they change the simulated response in the same way".to_owned(),
+            });
+        }
+        Ok(solution.unscaled_covariance)
+    }
+
+    /// The covariance of all parameters: by the noise that the periods show if the residual is no more than that,
+    /// otherwise by blocks of time or, of a short record, as if the residual were white.
+    pub(super) fn uncertainty(
+        &self,
+        theta: &DVector<f64>,
+        system: &NonlinearSystem,
+        inverse: &DMatrix<f64>,
+    ) -> Uncertainty {
+        let by_periods = self.by_periods(theta, system, inverse);
+        Uncertainty::new(by_periods, self.shared.len(), || self.by_residual(theta, inverse))
+    }
+
+    /// Scatter of the parameters by the noise on force and response, and the test of the residual against it; `None`
+    /// unless all records have several periods.
+    fn by_periods(
+        &self,
+        theta: &DVector<f64>,
+        system: &NonlinearSystem,
+        inverse: &DMatrix<f64>,
+    ) -> Option<ByPeriods> {
+        let (mut scatter, mut powers) = (PeriodScatter::new(theta.len()), Powers::default());
+        let n = self.dof();
+        let directions: Vec<Direction> = (0..2 * n).map(Direction::Initial).collect();
+        let inverse_mass = system.linear().mass().clone().try_inverse()?;
+        for (at, record) in self.records.iter().enumerate() {
+            if record.deviations.is_empty() {
+                return None;
+            }
+            let start = self.initial(theta, at)?;
+            let transitions =
+                Tangent::new(system, &directions).transitions(&record.force, &start)?;
+            let dt = record.response.sampling().dt();
+            let carried = Propagation::new(&transitions, &inverse_mass, dt, self.measured);
+            scatter.count(record.deviations.len());
+            self.scatter_of(at, &carried, theta.len(), inverse, &mut scatter)?;
+            self.compare(at, &carried, &mut powers)?;
+        }
+        // Noise on the response is in no regressor.
+        let bias = DVector::zeros(theta.len());
+        Some(ByPeriods { scatter, misfit: powers.misfit()?, bias })
+    }
+
+    /// Adds the lines of a record to the scatter of the parameters.
+    fn scatter_of(
+        &self,
+        at: usize,
+        carried: &Propagation<'_>,
+        parameters: usize,
+        inverse: &DMatrix<f64>,
+        scatter: &mut PeriodScatter,
+    ) -> Option<()> {
+        let (record, course) = (&self.records[at], &self.courses[at]);
+        let (n, first) = (self.dof(), self.measured.derivative_order() * self.dof());
+        let spectra = |samples: DMatrix<f64>| lines_of(record, samples);
+        let weights = course.derivatives.iter().map(|derivative| {
+            let mut of_response = derivative.columns(first, n).into_owned();
+            for (mut column, level) in of_response.column_iter_mut().zip(&self.levels) {
+                column /= level * level;
+            }
+            let of_force = -carried.adjoint(&of_response);
+            let mut all = DMatrix::zeros(of_response.nrows(), 2 * n);
+            all.columns_mut(0, n).copy_from(&of_response);
+            all.columns_mut(n, n).copy_from(&of_force);
+            spectra(all)
+        });
+        let weights: Vec<_> = weights.collect::<Option<_>>()?;
+        let deviations: Vec<_> =
+            record.deviations.iter().map(|d| spectra(d.clone())).collect::<Option<_>>()?;
+        let len = record.response.len();
+        for line in 0..deviations[0].nrows() {
+            let mut sensitivities = DMatrix::zeros(2 * n, parameters);
+            for (direction, weights) in weights.iter().enumerate() {
+                let place = self.place(at, direction);
+                sensitivities.column_mut(place).copy_from(&weights.row(line).transpose());
+            }
+            let of_period = |channel, period: usize| deviations[period][(line, channel)];
+            let (weight, is_real) = product_weight(line, len);
+            let deviations = DMatrix::from_fn(2 * n, deviations.len(), of_period);
+            let line = Line { deviations: &deviations, weight, is_real };
+            scatter.push(inverse, &sensitivities, &line);
+        }
+        Some(())
+    }
+
+    /// Compares the residual of a record with the noise that its periods show of it.
+    fn compare(&self, at: usize, carried: &Propagation<'_>, powers: &mut Powers) -> Option<()> {
+        let (record, n) = (&self.records[at], self.dof());
+        let noise = record.deviations.iter().map(|deviations| {
+            let of_force = carried.response(&deviations.columns(n, n).into_owned());
+            lines_of(record, deviations.columns(0, n) - of_force)
+        });
+        let noise: Vec<_> = noise.collect::<Option<_>>()?;
+        let gaps: Vec<DVector<f64>> = (0..n).map(|dof| self.gap(at, record, dof)).collect();
+        let residual = lines_of(record, DMatrix::from_columns(&gaps))?;
+        let response = lines_of(record, record.response.data().clone())?;
+        let (len, periods) = (record.response.len(), noise.len());
+        for line in 0..residual.nrows() {
+            let (weight, is_real) = product_weight(line, len);
+            // Noise on a force is in all channels alike: together they count as one.
+            let power = |lines: &DMatrix<Complex<f64>>| {
+                let of = |(dof, level): (usize, &f64)| (lines[(line, dof)] / *level).norm_sqr();
+                weight * self.levels.iter().enumerate().map(of).sum::<f64>()
+            };
+            let scatter = noise.iter().map(power).sum::<f64>() / (periods * (periods - 1)) as f64;
+            powers.push([power(&residual), scatter, power(&response)], periods, is_real);
+        }
+        Some(())
+    }
+
+    fn by_residual(
+        &self,
+        theta: &DVector<f64>,
+        inverse: &DMatrix<f64>,
+    ) -> (DMatrix<f64>, StandardErrors, usize) {
+        let n = self.dof();
+        let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
+        let blocks = |record: &Prepared| block_count(record.response.sampling().duration(), rate);
+        let order = self.measured.derivative_order();
+        if self.records.iter().map(blocks).sum::<usize>() >= FEWEST {
+            let mut scores = BlockScores::new(theta.len());
+            for (at, (record, course)) in self.records.iter().zip(&self.courses).enumerate() {
+                let part = |dof: usize| {
+                    let weight = 1.0 / self.levels[dof];
+                    let derivatives = course.derivatives.iter().enumerate();
+                    let regressors = derivatives.map(|(d, derivative)| {
+                        let column = derivative.column(order * n + dof) * weight;
+                        (self.place(at, d), column.as_slice().to_vec())
+                    });
+                    let gap = self.gap(at, record, dof) * weight;
+                    InTime { regressors: regressors.collect(), residual: gap.as_slice().to_vec() }
+                };
+                scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
+            }
+            let count = scores.count();
+            if let Some((covariance, freedom)) = scores.covariance(inverse, self.shared.len()) {
+                return (covariance, StandardErrors::Blocks(count), freedom);
+            }
+        }
+        let square: f64 = (0..n)
+            .flat_map(|dof| self.records.iter().enumerate().map(move |(at, r)| (dof, at, r)))
+            .map(|(dof, at, record)| (self.gap(at, record, dof) / self.levels[dof]).norm_squared())
+            .sum();
+        let freedom = self.len().saturating_sub(theta.len());
+        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
+        (inverse * variance, StandardErrors::White, freedom)
+    }
+}
+
+/// Spectrum of samples on the time axis of a record, lines × channels; `None` if they are not finite.
+fn lines_of(record: &Prepared, samples: DMatrix<f64>) -> Option<DMatrix<Complex<f64>>> {
+    let record = Record::new(record.response.sampling(), samples).ok()?;
+    Some(Spectrum::of(&record).lines().clone())
+}
+
+/// Factor of a line's products in a sum of products over so many samples, and whether the line is real.
+fn product_weight(line: usize, samples: usize) -> (f64, bool) {
+    let is_real = line == 0 || 2 * line == samples;
+    (samples as f64 * if is_real { 1.0 } else { 0.5 }, is_real)
+}

@@ -1,0 +1,121 @@
+//! Noise on the samples of a force, carried to the response and back.
+
+use mechid_model::ResponseQuantity;
+use nalgebra::{DMatrix, DVector};
+
+use super::simulate::Transition;
+
+/// The response to small changes of the samples of a force beside a course, linearised.
+///
+/// Between the samples a force is band-limited; here each sample is a push of its impulse, half of it before
+/// the sample and half after: the same up to half the sampling rate.
+pub(super) struct Propagation<'a> {
+    transitions: &'a [Transition],
+    inverse_mass: &'a DMatrix<f64>,
+    dt: f64,
+    measured: ResponseQuantity,
+}
+
+impl<'a> Propagation<'a> {
+    pub(super) fn new(
+        transitions: &'a [Transition],
+        inverse_mass: &'a DMatrix<f64>,
+        dt: f64,
+        measured: ResponseQuantity,
+    ) -> Self {
+        Self { transitions, inverse_mass, dt, measured }
+    }
+
+    fn dof(&self) -> usize {
+        self.inverse_mass.nrows()
+    }
+
+    /// Derivatives of the measured response by the state at a sample, n × 2n.
+    fn shown(&self, sample: usize) -> DMatrix<f64> {
+        let n = self.dof();
+        let part = |first: usize| {
+            DMatrix::from_fn(n, 2 * n, |row, column| f64::from(column == first + row))
+        };
+        match self.measured {
+            ResponseQuantity::Displacement => part(0),
+            ResponseQuantity::Velocity => part(n),
+            ResponseQuantity::Acceleration => self.transitions[sample].acceleration.clone(),
+        }
+    }
+
+    fn is_acceleration(&self) -> bool {
+        self.measured == ResponseQuantity::Acceleration
+    }
+
+    /// The change of the response (samples × n) by one of the force (N, samples × n), from the same start.
+    pub(super) fn response(&self, force: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.dof();
+        let mut response = DMatrix::zeros(force.nrows(), n);
+        let mut state = DVector::zeros(2 * n);
+        for (sample, transition) in self.transitions.iter().enumerate() {
+            let push = self.inverse_mass * force.row(sample).transpose();
+            for half in 0..2 {
+                for dof in 0..n {
+                    state[n + dof] += 0.5 * self.dt * push[dof];
+                }
+                if half == 0 {
+                    let mut shown = self.shown(sample) * &state;
+                    if self.is_acceleration() {
+                        shown += &push;
+                    }
+                    response.row_mut(sample).copy_from(&shown.transpose());
+                }
+            }
+            state = &transition.state * state;
+        }
+        response
+    }
+
+    /// The weights (samples × n) of a force's changes in the sum of the products of the response's changes with
+    /// given weights (samples × n): the adjoint of [`Propagation::response`].
+    pub(super) fn adjoint(&self, weights: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.dof();
+        let mut of_force = DMatrix::zeros(weights.nrows(), n);
+        let mut later = DVector::<f64>::zeros(2 * n);
+        for (sample, transition) in self.transitions.iter().enumerate().rev() {
+            let weight = weights.row(sample).transpose();
+            let here = self.shown(sample).transpose() * &weight;
+            let after = transition.state.transpose() * later;
+            let mut push = (here.rows(n, n) * 0.5 + after.rows(n, n)) * self.dt;
+            if self.is_acceleration() {
+                push += &weight;
+            }
+            let load = self.inverse_mass.transpose() * push;
+            of_force.row_mut(sample).copy_from(&load.transpose());
+            later = here + after;
+        }
+        of_force
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ⟨g, L e⟩ = ⟨Lᵀ g, e⟩ for every quantity, with transitions that change.
+    #[test]
+    fn the_adjoint_is_one() {
+        let (n, samples) = (2, 12);
+        let number = |i: usize, j: usize| ((7 * i + 5 * j + 1) as f64).sin();
+        let transitions: Vec<_> = (0..samples)
+            .map(|at| Transition {
+                state: DMatrix::from_fn(2 * n, 2 * n, |i, j| 0.4 * number(i + at, j)),
+                acceleration: DMatrix::from_fn(n, 2 * n, |i, j| number(i, j + at)),
+            })
+            .collect();
+        let inverse_mass = DMatrix::from_fn(n, n, |i, j| number(i + 3, j) + f64::from(i == j));
+        let force = DMatrix::from_fn(samples, n, number);
+        let weights = DMatrix::from_fn(samples, n, |i, j| number(j, i + 2));
+        for measured in ResponseQuantity::ALL {
+            let propagation = Propagation::new(&transitions, &inverse_mass, 0.3, measured);
+            let forward = propagation.response(&force).dot(&weights);
+            let backward = propagation.adjoint(&weights).dot(&force);
+            assert!((forward - backward).abs() < 1e-12 * forward.abs(), "{measured:?}");
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Standard errors and misfit from how the periods of a record differ.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::estimate::StandardErrors;
+use crate::limits::{SCATTER_ROUNDING, SIGNIFICANT};
+
+/// Power of what a model leaves of the mean periods, against what their scatter accounts for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Residual power over that of the noise (pure number): 1 if the model is right.
+    pub ratio: f64,
+    /// Probability that noise alone leaves as much (pure number).
+    pub p_value: f64,
+}
+
+impl Misfit {
+    /// Returns whether the model misses more than noise.
+    pub(super) fn is_significant(self) -> bool {
+        self.p_value < SIGNIFICANT
+    }
+}
+
+/// Deviations of the periods of an experiment from their mean on one line, each complex or real.
+pub(super) struct Line<'a> {
+    /// Deviations, channels × periods.
+    pub(super) deviations: &'a DMatrix<Complex<f64>>,
+    /// Factor of a product of two values, conjugate and plain, in a sum over samples.
+    pub(super) weight: f64,
+    /// Whether the values are real: those of the mean, and at half the sampling rate.
+    pub(super) is_real: bool,
+}
+
+/// Covariance of parameters by the noise that the periods show, line by line.
+///
+/// An estimate from mean periods moves with the noise e on them by G Σ Re(ḡ e), the sum being over lines
+/// and channels, g the sensitivities of the residuals and G = (AᵀA)⁻¹. The deviations of the periods from
+/// their mean have that noise, whatever its spectrum and however the channels are correlated; lines of stationary
+/// noise are independent, so that each adds degrees of freedom.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 2
+/// (sample covariances of periods) and 9 (covariance of estimates); Satterthwaite (1946), Biometrics Bulletin
+/// 2, 110–114, for the degrees of freedom.
+pub(super) struct PeriodScatter {
+    covariance: DMatrix<f64>,
+    sums: DVector<f64>,
+    /// Squares of the contributions over the degrees of freedom of each.
+    squares: DVector<f64>,
+    periods: usize,
+}
+
+impl PeriodScatter {
+    pub(super) fn new(parameters: usize) -> Self {
+        Self {
+            covariance: DMatrix::zeros(parameters, parameters),
+            sums: DVector::zeros(parameters),
+            squares: DVector::zeros(parameters),
+            periods: 0,
+        }
+    }
+
+    /// Counts the periods of an experiment.
+    pub(super) fn count(&mut self, periods: usize) {
+        self.periods += periods;
+    }
+
+    /// Adds a line with the sensitivities of its residuals, channels × parameters, and G.
+    pub(super) fn push(
+        &mut self,
+        inverse: &DMatrix<f64>,
+        sensitivities: &DMatrix<Complex<f64>>,
+        line: &Line<'_>,
+    ) {
+        let periods = line.deviations.ncols() as f64;
+        // Sums of real parts: of a complex number each part has half of its variance.
+        let part = if line.is_real { 1.0 } else { 0.5 };
+        let scale = line.weight.powi(2) * part / (periods * (periods - 1.0));
+        let freedom = (periods - 1.0) * if line.is_real { 1.0 } else { 2.0 };
+        let products = sensitivities.adjoint() * line.deviations;
+        let mut variances = DVector::zeros(self.sums.len());
+        for part in [inverse * products.map(|z| z.re), inverse * products.map(|z| z.im)] {
+            self.covariance.gemm(scale, &part, &part.transpose(), 1.0);
+            for (variance, row) in variances.iter_mut().zip(part.row_iter()) {
+                *variance += scale * row.norm_squared();
+            }
+        }
+        self.squares += variances.component_mul(&variances) / freedom;
+        self.sums += variances;
+    }
+
+    /// The covariance with the degrees of freedom of that of the first `wanted` parameters that has least.
+    pub(super) fn finish(self, wanted: usize) -> (DMatrix<f64>, StandardErrors, usize) {
+        let of = |(sum, square): (&f64, &f64)| sum * sum / square;
+        let each = self.sums.iter().zip(self.squares.iter()).take(wanted).map(of);
+        let least = each.filter(|freedom| freedom.is_finite()).fold(f64::INFINITY, f64::min);
+        let freedom = if least.is_finite() { (least as usize).max(1) } else { 1 };
+        (self.covariance, StandardErrors::Periods(self.periods), freedom)
+    }
+}
+
+/// Powers of the mean residual and of the scatter of the periods, line by line.
+#[derive(Default)]
+pub(super) struct Powers {
+    residual: f64,
+    noise: f64,
+    signal: f64,
+    /// Squares of the noise over the degrees of freedom of the residual and of the scatter.
+    squares: [f64; 2],
+}
+
+impl Powers {
+    /// Adds a line: the squared absolute value of its mean residual and the mean square deviation of the mean that its
+    /// `periods` show, both weighted, beside the power of the signal.
+    pub(super) fn push(
+        &mut self,
+        [residual, noise, signal]: [f64; 3],
+        periods: usize,
+        is_real: bool,
+    ) {
+        let parts = if is_real { 1.0 } else { 2.0 };
+        self.residual += residual;
+        self.noise += noise;
+        self.signal += signal;
+        self.squares[0] += noise * noise / parts;
+        self.squares[1] += noise * noise / (parts * (periods - 1) as f64);
+    }
+
+    /// The test whether the residual has more power than the noise; `None` where the periods differ by rounding alone.
+    ///
+    /// # Source
+    /// Satterthwaite (1946), as for the standard errors: sums of squares of unequal variance.
+    pub(super) fn misfit(&self) -> Option<Misfit> {
+        if self.noise <= SCATTER_ROUNDING.powi(2) * self.signal {
+            return None;
+        }
+        let ratio = self.residual / self.noise;
+        let [of_residual, of_noise] = self.squares.map(|square| self.noise * self.noise / square);
+        let by_chance = FisherSnedecor::new(of_residual, of_noise).ok()?;
+        ratio.is_finite().then(|| Misfit { ratio, p_value: by_chance.sf(ratio) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mean of P values on L lines: its variance is that of the values over P, with 2 L (P − 1) degrees of freedom,
+    /// fewer where the values of the lines are found to differ.
+    #[test]
+    fn a_mean_has_the_variance_of_its_values() {
+        let (lines, periods) = (50, 4);
+        let value = |line: usize, period: usize| {
+            let at = (line * periods + period) as f64;
+            Complex::from_polar(1.0, 12.9898 * at * at)
+        };
+        let inverse = DMatrix::from_element(1, 1, 1.0 / lines as f64);
+        let mut scatter = PeriodScatter::new(1);
+        let mut squares = 0.0;
+        for line in 0..lines {
+            let all: Vec<_> = (0..periods).map(|period| value(line, period)).collect();
+            let mean = all.iter().sum::<Complex<f64>>() / periods as f64;
+            let deviations = DMatrix::from_fn(1, periods, |_, period| all[period] - mean);
+            squares += deviations.norm_squared();
+            let sensitivities = DMatrix::from_element(1, 1, Complex::from(1.0));
+            let line = Line { deviations: &deviations, weight: 1.0, is_real: false };
+            scatter.push(&inverse, &sensitivities, &line);
+        }
+        let (covariance, _, freedom) = scatter.finish(1);
+        let (p, l) = (periods as f64, lines as f64);
+        let expected = 0.5 * squares / (p * (p - 1.0)) / (l * l);
+        assert!((covariance[(0, 0)] / expected - 1.0).abs() < 1e-12);
+        assert!((150..=300).contains(&freedom), "{freedom}");
+    }
+}
