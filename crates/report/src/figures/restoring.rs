@@ -5,7 +5,6 @@ use mechid_analysis::Identified;
 use mechid_analysis::identify::rows::CONFIDENCE;
 use mechid_analysis::identify::{RestoringForce, WithTerms};
 use mechid_analysis::text::{compact, significant};
-
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 use crate::ReportError;
@@ -22,18 +21,15 @@ const POINTS: usize = 81;
 /// Range of the curves, as a multiple of the largest displacement and velocity in the data.
 const REACH: f64 = 1.2;
 
-/// Returns four panels for each degree of freedom: the measured points of the surface over
-/// displacement and velocity; spring and damper with their confidence intervals, and the measured
-/// points minus the rest of the model; the residual over the displacement.
 /// Returns the nonlinear terms of a fit of whole periods with the points of their surface.
 pub fn of(identified: &Identified) -> Option<(&WithTerms, &RestoringForce)> {
     let fitted = identified.fitted().nonlinear.as_ref()?;
     Some((fitted, fitted.restoring.as_ref()?))
 }
 
-/// Returns four panels for each degree of freedom: the measured points of the surface over displacement and
-/// velocity; spring and damper with their confidence intervals, beside the points less the rest of
-/// the model; the residual over the displacement.
+/// Returns four panels for each degree of freedom: the measured points of the surface over
+/// displacement and velocity; spring and damper with their confidence intervals, and the measured
+/// points minus the rest of the model; the residual over the displacement.
 ///
 /// # Errors
 /// [`ReportError::Estimate`] if an interval cannot be computed.
