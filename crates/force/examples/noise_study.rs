@@ -1,4 +1,4 @@
-//! Prints the tables of `docs/book/src/choose/force.md`:
+//! Prints the tables of `docs/book/src/studies/force.md`:
 //! `cargo run --release -p mechid-force --example noise_study`, with `-- known` the first of them alone, with
 //! `-- coverage 200` that of the intervals, over 200 records each, or `-- accelerations 100` for accelerations alone.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]

@@ -21,7 +21,7 @@ use crate::state_space::exact_transition;
 ///
 /// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by 6M/Δt²
 /// (linear). Euler's rule is exact for no motion: at a line ω it returns the force times M(e^{iωΔt}
-/// − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `choose/force.md`.
+/// − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `theory/force.md`.
 ///
 /// Cost: one exponential of order 4n, then one product of samples × 2n by 2n × n.
 ///

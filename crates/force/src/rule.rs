@@ -19,7 +19,7 @@ pub enum Rule {
     /// This mean needs the variances of force and noise, the colour of the force, the share of
     /// driven components and the number of singular values they cover; all are those of maximum
     /// likelihood. It is the recommended rule, and the only one here that minimises the error of
-    /// the force, not of the response. The book (`choose/force.md`) compares the others.
+    /// the force, not of the response. The book (`studies/force.md`) compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///

@@ -60,7 +60,7 @@ fn row(experiment: &Experiment, scatter: &Scatter, name: &str) -> String {
     )
 }
 
-/// The comparison in the book (`choose/estimators.md`), computed: all of it to be written there, otherwise the
+/// The comparison in the book (`studies/estimators.md`), computed: all of it to be written there, otherwise the
 /// rows that no other test has.
 fn table() -> Vec<Option<String>> {
     let is_written = std::env::var_os("MECHID_BLESS").is_some();

@@ -231,7 +231,7 @@ fn the_force_of_the_bearing_from_512_samples() {
 #[test]
 fn the_discretised_force_is_a_fraction_of_the_force_and_a_residual() {
     let machine = dissertation_sdof();
-    // Printed in the book, choose/force.md.
+    // Printed in the book, theory/force.md.
     for (npi, printed) in [(20.0, 0.398), (3.4, 0.483)] {
         let sampling = npi_sampling(npi, 256, machine.natural_frequency()).unwrap();
         let force = excitation(sampling, 1, 50.0);

@@ -1,4 +1,4 @@
-//! The promises of the book (`choose/force.md`), and that its tables are the ones the study gives.
+//! The promises of the book (`studies/force.md`), and that its tables are the ones the study gives.
 
 use crate::study::coverage::{INTERVALS, SHAPES, coverage};
 use crate::study::{
@@ -27,7 +27,7 @@ fn tokens(text: &str) -> Vec<Result<f64, String>> {
 
 /// The tables of the book, from the one that starts with `header` on.
 fn printed(header: &str) -> String {
-    let book = include_str!("../../../../docs/book/src/choose/force.md");
+    let book = include_str!("../../../../docs/book/src/studies/force.md");
     let start = book.find(header).expect("the book has the study's tables");
     book[start..]
         .lines()
@@ -48,7 +48,7 @@ fn assert_printed(header: &str, found: &str) {
         };
         assert!(
             same,
-            "choose/force.md says {old:?}, the study {new:?}: run the example noise_study"
+            "studies/force.md says {old:?}, the study {new:?}: run the example noise_study"
         );
     }
 }

@@ -5,8 +5,8 @@
 ///
 /// With the variable `MECHID_BLESS` set the rows are rewritten instead, from all of them.
 pub fn documented(start: &str, end: &str, computed: &[Option<String>]) {
-    let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/choose/estimators.md");
-    let text = std::fs::read_to_string(place).expect("choose/estimators.md");
+    let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/studies/estimators.md");
+    let text = std::fs::read_to_string(place).expect("studies/estimators.md");
     let from = text.find(start).expect("start of the table") + start.len();
     let to = text.find(end).expect("end of the table");
     let head: Vec<&str> = text[from..to].lines().take(2).collect();

@@ -1,4 +1,4 @@
-//! The noise study of the book (`choose/force.md`): displacement only, noise of 1 % and 5 %, every method.
+//! The noise study of the book (`studies/force.md`): displacement only, noise of 1 % and 5 %, every method.
 //!
 //! Used by the example that writes the tables and by the test that checks them.
 
@@ -269,7 +269,7 @@ fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> 
     (1..points.len() - 1).max_by(|a, b| curvature(*a).total_cmp(&curvature(*b))).unwrap()
 }
 
-/// The first table of the book (`choose/force.md`): the excited lines are known.
+/// The first table of the book (`studies/force.md`): the excited lines are known.
 pub fn known_table() -> String {
     table(&KNOWN, true)
 }
@@ -314,7 +314,7 @@ pub fn rule_rows() -> Vec<RuleRow> {
     rows
 }
 
-/// The third table of the book (`choose/force.md`).
+/// The third table of the book (`studies/force.md`).
 pub fn rule_table(rows: &[RuleRow]) -> String {
     let mut out = String::from(
         "| Excited | Noise | Filter | likelihood | GCV | L-curve | textbook corner |\n\
