@@ -8,7 +8,7 @@ use crate::responses::AveragedSegments;
 pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
 
 /// Prefix of a third line of description that states the segments over which the responses are
-/// averages, in the order of [`AveragedSegments::numbers`].
+/// averaged, in the order of [`AveragedSegments::numbers`].
 pub(super) const SEGMENTS: &str = "SEGMENTS ";
 
 /// Description of the function in a dataset 58.
