@@ -185,10 +185,8 @@ impl Augmented {
         if self.start == Start::InMotion {
             let (m, machine) = (space.states, self.rate.nrows());
             let (mean, _) = space.smooth(space.filter(&self.data));
-            for i in 0..machine {
-                space.start_mean[i] = mean[i];
-                space.start[i * m + i] = 0.0;
-            }
+            space.start_mean[..machine].copy_from_slice(&mean[..machine]);
+            (0..machine).for_each(|i| space.start[i * m + i] = 0.0);
         }
         let likelihood = space.innovations(&self.data).log_likelihood();
         if likelihood.is_finite() { Ok(likelihood) } else { Err(ForceError::NoLikelihood) }

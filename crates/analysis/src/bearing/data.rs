@@ -30,6 +30,8 @@ pub struct BearingData {
     pub(super) names: Vec<String>,
     /// Rows of all tests, with their noise where it is known.
     pub(super) data: FrequencyData,
+    /// Distance of the lines of a test, in Hz; 0 of a single frequency.
+    pub(super) spacing_hz: f64,
     /// The rows of each test, with the checks made of its record.
     pub(super) records: Vec<TestRecord>,
     /// Source of the noise, in words; `None` where it is not known.
@@ -173,6 +175,7 @@ impl BearingData {
         Ok(Self {
             names,
             data,
+            spacing_hz,
             records: vec![record],
             noise,
             largest_displacement: None,
@@ -233,6 +236,7 @@ impl BearingData {
         Ok(Self {
             names: vec![held.file.clone()],
             data,
+            spacing_hz,
             records: vec![record],
             noise,
             largest_displacement: Some(largest_orbit(&d)),
@@ -281,7 +285,7 @@ fn distinct(mut numbers: Vec<f64>) -> Vec<f64> {
 }
 
 /// Smallest distance between different frequencies, in Hz; 0 of a single one.
-pub(super) fn spacing(omega: &[f64]) -> f64 {
+fn spacing(omega: &[f64]) -> f64 {
     let sorted = distinct(omega.to_vec());
     let smallest = sorted.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest / TAU } else { 0.0 }

@@ -226,9 +226,13 @@ impl Fitted {
         }
     }
 
-    /// M if the film has no inertia: that of the baseline, estimated from both; zero without one.
+    /// M if the film has no inertia: that of the baseline, estimated from both; as good as zero without one.
     fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
-        let Some(base) = base else { return Ok(Matrix2::zeros()) };
+        // The checks of a fit need masses that can be inverted: far below rounding.
+        let Some(base) = base else {
+            let least = self.values.rows(EACH, EACH).amax() * f64::EPSILON * f64::EPSILON;
+            return Ok(Matrix2::from_diagonal_element(least));
+        };
         let of = |fitted: &Self| {
             let at = 2 * EACH;
             let covariance = fitted.covariance.view((at, at), (EACH, EACH)).into_owned();

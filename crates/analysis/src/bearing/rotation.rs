@@ -9,27 +9,35 @@ use mechid_model::ResponseQuantity;
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix};
 
-use super::data::{rotates, spacing};
+use super::BearingData;
+use super::data::rotates;
 
 /// Number of lines over those near the multiples of a speed: of more lines chance finds some speed that holds any few.
 const LINES_PER_MULTIPLE: usize = 4;
 
-/// Returns the speed, in Hz, without whose multiples the tests agree with a film up to their noise, or nearly; `None` if
-/// there is none. Of several it is the one with the fewest lines.
+/// Number of speeds that are tried at most.
+const MOST_SPEEDS: usize = 10_000;
+
+/// Difference of the Bayesian information criterion up to which speeds are as likely as the best.
+const ALIKE: f64 = 6.0;
+
+/// Returns the range of the speed, in Hz, without whose multiples the tests agree with a film up to their noise, or nearly; `None` if
+/// there is none. It holds the speeds of least Bayesian information criterion.
 ///
 /// The film is that of least squares on the equation of motion, of each speed anew: what the disturbed lines did to it
 /// goes with them.
 ///
 /// # Source
-/// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases.
-pub(super) fn speed_of_misfit(data: &FrequencyData) -> Option<f64> {
+/// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases; Schwarz (1978), Annals of
+/// Statistics 6, 461–464.
+pub(super) fn speed_of_misfit(tests: &BearingData) -> Option<[f64; 2]> {
+    let (data, spacing_hz) = (&tests.data, tests.spacing_hz);
     let all: Vec<usize> = (0..data.len()).collect();
     let whole = residual_power(data, &all)?;
-    let spacing_hz = spacing(data.omega());
     let highest = data.omega().iter().copied().fold(0.0, f64::max) / TAU;
-    let mut speeds: Vec<(usize, f64)> = Vec::new();
+    let mut speeds: Vec<(f64, f64)> = Vec::new();
     let mut hz = 2.0 * spacing_hz;
-    while hz > 0.0 && hz <= highest {
+    while hz > 0.0 && hz <= highest && speeds.len() < MOST_SPEEDS {
         let kept: Vec<usize> = all
             .iter()
             .copied()
@@ -41,16 +49,18 @@ pub(super) fn speed_of_misfit(data: &FrequencyData) -> Option<f64> {
             && power <= DISTURBED_ALONE
             && whole - power >= CONCENTRATED * (whole - 1.0)
         {
-            speeds.push((removed, hz));
+            // A line that is left out has a response and a force of its own, two complex numbers.
+            let [kept, removed, all] =
+                [kept.len(), removed, all.len()].map(|count| (4 * count) as f64);
+            speeds.push((kept * power + removed * all.ln(), hz));
         }
         // The highest multiple moves by half the distance of the lines.
         hz *= 1.0 + 0.5 * spacing_hz / highest;
     }
-    let fewest = speeds.iter().map(|(removed, _)| *removed).min()?;
-    let hz: Vec<f64> =
-        speeds.into_iter().filter(|(removed, _)| *removed == fewest).map(|(_, hz)| hz).collect();
-    // Speeds in the middle of those with the same lines.
-    Some(hz[hz.len() / 2])
+    let best = speeds.iter().map(|(criterion, _)| *criterion).reduce(f64::min)?;
+    let alike = speeds.iter().filter(|(criterion, _)| criterion - best <= ALIKE);
+    let hz = || alike.clone().map(|(_, hz)| *hz);
+    Some([hz().fold(f64::INFINITY, f64::min), hz().fold(0.0, f64::max)])
 }
 
 /// Residual power of some rows over that of their noise.

@@ -227,12 +227,13 @@ impl BearingSummary {
                     .into(),
             );
         }
-        let speed = if self.error_scale.is_none() { speed_of_misfit(&tests.data) } else { None };
-        if let Some(hz) = speed {
-            let hz = compact(hz, 3);
+        let speed = if self.error_scale.is_none() { speed_of_misfit(tests) } else { None };
+        if let Some([low, high]) = speed {
             remarks.push(format!(
-                "without the lines at multiples of about {hz} Hz the tests agree: if the shaft rotates at that speed, its \
-                 run-out disturbs them (`rotation_hz` {hz})"
+                "without the lines at multiples of a frequency from {} to {} Hz the tests agree: if the shaft rotates at \
+                 that speed, its run-out disturbs them (`rotation_hz`)",
+                compact(low, 3),
+                compact(high, 3)
             ));
         }
         remarks

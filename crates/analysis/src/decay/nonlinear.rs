@@ -1,9 +1,7 @@
 //! What a free decay shows beside linear modes: a backbone, harmonics, a second hit.
 
-use mechid_checks::limits::SIGNIFICANCE;
 use mechid_estimate::IdentifiedMode;
 use mechid_modal::free_decay::Backbone;
-use mechid_signal::message;
 use serde::Serialize;
 
 use super::summary::DecaySummary;
@@ -13,6 +11,8 @@ use crate::text::{compact, significant, text_table};
 
 /// Highest multiple of a frequency that is looked for.
 const HIGHEST_HARMONIC: u32 = 7;
+/// Part of the frequency of a mode that the errors of a multiple reach at most.
+const HARMONIC_REACH: f64 = 0.1;
 /// Number of standard errors within which a frequency is a multiple of another.
 const HARMONIC_ERRORS: f64 = 4.0;
 
@@ -68,10 +68,8 @@ impl BackboneRow {
 }
 
 impl DecaySummary {
-    /// Names the modes whose frequency is a multiple of that of a stronger one.
-    ///
-    /// Of a mode that is not linear these are the frequencies within four standard errors of the multiples of its own, which
-    /// change with the amplitude. Elsewhere chance must hardly put a frequency as near to any multiple.
+    /// Names the modes whose frequency is, within four standard errors, a multiple of that of the mode that is not linear,
+    /// which changes with the amplitude. Of linear modes a multiple says nothing.
     pub(super) fn name_harmonics(&mut self, modes: &[IdentifiedMode]) {
         let named: Vec<Option<Harmonic>> =
             (0..modes.len()).map(|at| self.harmonic(modes, at)).collect();
@@ -79,38 +77,23 @@ impl DecaySummary {
     }
 
     fn harmonic(&self, modes: &[IdentifiedMode], at: usize) -> Option<Harmonic> {
-        let frequency = modes[at].damped_frequency_hz;
-        let energy = |at: usize| self.modes[at].energy_share;
-        let replaced = self.backbone.as_ref().map(|b| b.modes.as_slice()).unwrap_or_default();
-        if replaced.contains(&(at + 1)) {
+        let backbone = self.backbone.as_ref()?;
+        if backbone.modes.contains(&(at + 1)) {
             return None;
         }
-        if let Some(backbone) = &self.backbone {
-            let hz = || backbone.points.iter().map(|point| point.frequency_hz.value);
-            let (low, high) = (hz().fold(f64::INFINITY, f64::min), hz().fold(0.0, f64::max));
-            let reach = HARMONIC_ERRORS * frequency.standard_error;
-            let order = (2..=HIGHEST_HARMONIC).find(|order| {
-                let multiple = f64::from(*order);
-                (multiple * low - reach..=multiple * high + reach).contains(&frequency.value)
-            });
-            let strongest =
-                replaced.iter().max_by(|a, b| energy(**a - 1).total_cmp(&energy(**b - 1)));
-            // The band of a frequency that is hardly known holds a multiple by chance.
-            if let Some((order, of_mode)) = order.zip(strongest).filter(|_| reach < 0.1 * low) {
-                return Some(Harmonic { of_mode: *of_mode, order });
-            }
-        }
-        let near = |other: usize| {
-            let fundamental = modes[other].damped_frequency_hz;
-            let order = (frequency.value / fundamental.value).round();
-            let error = frequency.standard_error.hypot(order * fundamental.standard_error);
-            let apart = (frequency.value - order * fundamental.value).abs();
-            let by_chance = 2.0 * HARMONIC_ERRORS * error / fundamental.value;
-            let is_multiple = (2.0..=f64::from(HIGHEST_HARMONIC)).contains(&order);
-            (is_multiple && apart <= HARMONIC_ERRORS * error && by_chance <= SIGNIFICANCE)
-                .then_some(Harmonic { of_mode: other + 1, order: order as u32 })
-        };
-        (0..modes.len()).filter(|other| energy(*other) > energy(at)).find_map(near)
+        let frequency = modes[at].damped_frequency_hz;
+        let hz = || backbone.points.iter().map(|point| point.frequency_hz.value);
+        let (low, high) = (hz().fold(f64::INFINITY, f64::min), hz().fold(0.0, f64::max));
+        let reach = HARMONIC_ERRORS * frequency.standard_error;
+        let order = (2..=HIGHEST_HARMONIC).find(|order| {
+            let multiple = f64::from(*order);
+            (multiple * low - reach..=multiple * high + reach).contains(&frequency.value)
+        });
+        let energy = |number: usize| self.modes[number - 1].energy_share;
+        let strongest = backbone.modes.iter().max_by(|a, b| energy(**a).total_cmp(&energy(**b)));
+        // The band of a frequency that is hardly known holds a multiple by chance.
+        let (order, of_mode) = order.zip(strongest).filter(|_| reach < HARMONIC_REACH * low)?;
+        Some(Harmonic { of_mode: *of_mode, order })
     }
 
     /// What speaks against a sum of decaying oscillations.
@@ -140,8 +123,8 @@ impl DecaySummary {
         }
         if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {
             remarks.push(format!(
-                "{} were found, as many as are looked for: there may be more (`max_modes`)",
-                message::count(self.modes.len(), "mode")
+                "as many modes were found as are looked for, {}: there may be more (`max_modes`)",
+                self.modes.len()
             ));
         }
         for (number, row) in (1..).zip(&self.modes) {

@@ -1,7 +1,7 @@
 //! The beginning of a free decay.
 
 use mechid_checks::limits::SIGNIFICANCE;
-use mechid_signal::Record;
+use mechid_signal::{Record, Spectrum};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Part of the largest sum of squares at which the decay begins.
@@ -10,6 +10,11 @@ const LEVEL: f64 = 0.8;
 const REST: usize = 4;
 /// Number of parts in which the amplitude is followed over time.
 const PARTS: usize = 8;
+/// Least number of parts that show whether the amplitude was held at first.
+const FEWEST: usize = 5;
+/// Twice the logarithm of a likelihood ratio that is strong evidence: with less, the decay begins late rather than
+/// before its release.
+const STRONG_EVIDENCE: f64 = 6.0;
 
 /// Returns the last sample, counted from 0, at which the squares of all channels, each over its own power, sum
 /// up to [`LEVEL`] of their largest sum or more; the first such sample if the amplitude falls from there on, and the first
@@ -27,14 +32,37 @@ pub(super) fn release(record: &Record) -> usize {
         return 0;
     };
     // A pull or a shaker holds the amplitude before the release; a light decay loses some of it all the time.
-    let between = crests(&sums[first..=last]);
-    if between.iter().all(is_large) && trend(&between) < 0.0 && falls_throughout(&between) {
+    let energies = energies(record, &sums[first..=last], first);
+    if trend(&energies) < 0.0 && falls_throughout(&energies) {
         return first;
     }
     // A growth multiplies the amplitude in equal times.
     let logarithms: Vec<f64> = crests(&sums[..=last]).iter().map(|crest| crest.ln()).collect();
     let rises = (sums.len() - last) * PARTS < sums.len() && trend(&logarithms) > 0.0;
     if rises { 0 } else { last }
+}
+
+/// Returns the logarithm of the mean of the `sums` from the sample `first` on over stretches of whole periods of the
+/// strongest line; none of a record without one, or of too few periods.
+fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
+    let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
+    let spectrum = Spectrum::of(&part.without_mean());
+    let power = |line: usize| -> f64 {
+        let each = (0..record.channels()).map(|channel| {
+            let largest = part.column(channel).amax();
+            if largest > 0.0 { (spectrum.line(line, channel) / largest).norm_sqr() } else { 0.0 }
+        });
+        each.sum()
+    };
+    let Some(strongest) = (1..spectrum.len()).max_by(|a, b| power(*a).total_cmp(&power(*b))) else {
+        return Vec::new();
+    };
+    let period = part.len() as f64 / strongest as f64;
+    let periods = (sums.len() as f64 / (PARTS as f64 * period)).floor().max(1.0);
+    let stretch = (periods * period).round() as usize;
+    let mean = |part: &[f64]| (part.iter().sum::<f64>() / part.len() as f64).ln();
+    let all: Vec<f64> = sums.chunks_exact(stretch.max(1)).map(mean).collect();
+    if all.len() < FEWEST { Vec::new() } else { all }
 }
 
 /// Returns the largest sums of some parts of equal length; none of a stretch that is too short.
@@ -44,11 +72,11 @@ fn crests(sums: &[f64]) -> Vec<f64> {
     if part == 0 { Vec::new() } else { sums.chunks_exact(part).take(PARTS).map(of_part).collect() }
 }
 
-/// Returns whether a line describes falling values as well as values that are held for some time and fall then, by the
-/// Bayesian information criterion.
+/// Returns whether a line describes falling values so much better than values that are held for some time and fall then
+/// that they were not held, by twice the logarithm of the likelihood.
 ///
 /// # Source
-/// Schwarz (1978), Annals of Statistics 6, 461–464.
+/// Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795, for what strong evidence is.
 fn falls_throughout(values: &[f64]) -> bool {
     let count = values.len() as f64;
     // Residual of a constant up to a place and a line from there on.
@@ -61,17 +89,17 @@ fn falls_throughout(values: &[f64]) -> bool {
             .fold([0.0; 3], |[xy, xx, yy], (x, y)| [xy + x * y, xx + x * x, yy + y * y]);
         all - products * products / squares
     };
-    let held = (2..values.len().saturating_sub(1)).map(left).fold(f64::INFINITY, f64::min);
-    left(0).powf(count) <= held.powf(count) * count
+    let held = (1..values.len().saturating_sub(2)).map(left).fold(f64::INFINITY, f64::min);
+    count * (left(0) / held).ln() <= -STRONG_EVIDENCE
 }
 
-/// Returns the slope of some values, or of none of which scatter hardly makes it as steep: 0.
+/// Returns the slope of some values, and 0 where their scatter may make it as steep.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1.
 fn trend(values: &[f64]) -> f64 {
     let count = values.len() as f64;
-    if values.len() < PARTS {
+    if values.len() < FEWEST {
         return 0.0;
     }
     let (middle, mean) = (0.5 * (count - 1.0), values.iter().sum::<f64>() / count);

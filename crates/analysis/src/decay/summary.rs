@@ -122,6 +122,8 @@ impl DecaySummary {
             })
         });
         let columns = whole.names.response(kind);
+        // What modes that are missing leave is not the response to a second hit.
+        let may_be_more = how.modes.is_none() && estimate.modes().len() == how.max_modes;
         let mut summary = Self {
             file: whole.file.clone(),
             quantity: kind,
@@ -133,7 +135,7 @@ impl DecaySummary {
             confidence: CONFIDENCE,
             modes: modes.collect::<Result<_, AnalysisError>>()?,
             backbone: estimate.backbone().map(BackboneRow::new).transpose()?,
-            excited_again_s: estimate.restart().map(|at| {
+            excited_again_s: estimate.restart().filter(|_| !may_be_more).map(|at| {
                 (first_sample - whole.first_sample + at) as f64 / measurement.sampling().rate_hz()
                     + how.from_s.unwrap_or(0.0)
             }),

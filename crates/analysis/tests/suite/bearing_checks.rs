@@ -60,14 +60,15 @@ fn run_out_under_a_wrong_speed_is_named_and_no_interval_is_given() {
     let summary = found.summary();
     assert!(warnings(&found).iter().any(|text| text.contains("residual power is")), "{found}");
     assert_eq!(summary.error_scale, None);
-    let named = summary.remarks.iter().find_map(|remark| remark.split("(`rotation_hz` ").nth(1));
-    let speed: f64 = named.and_then(|rest| rest.trim_end_matches(')').parse().ok()).unwrap_or(0.0);
-    assert!((speed - 50.0).abs() < 1.5, "{found}");
+    let named = summary.remarks.iter().find_map(|remark| remark.split("a frequency from ").nth(1));
+    let numbers: Vec<f64> =
+        named.unwrap_or("").split(' ').filter_map(|word| word.parse().ok()).collect();
+    assert!(numbers[0] <= 50.0 && 50.0 <= numbers[1] && numbers[1] < 55.0, "{found}");
     assert!(summary.coefficients.iter().all(|c| c.estimate.interval.is_none()), "{found}");
     assert!(found.to_string().contains("withheld"), "{found}");
     // Errors that are withheld are empty cells, and not zero.
     let table = BearingTable::new([found]).csv();
-    assert!(table.lines().nth(1).unwrap().ends_with(",,"), "{table}");
+    assert!(table.lines().nth(1).unwrap().contains(",,,,,,,,"), "{table}");
 }
 
 #[test]

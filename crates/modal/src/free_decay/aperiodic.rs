@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::backbone::inverse;
 use super::fit::Data;
-use super::limits::{FASTEST_DECAY, RATE_REFINEMENTS, SLOWEST_RETURN};
+use super::limits::{FASTEST_DECAY, FREE_DECAY_SURE, RATE_REFINEMENTS, SLOWEST_RETURN};
 
 /// Rates of decays without oscillation, with what the record says of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,10 @@ pub(super) fn aperiodic(data: &Data) -> Option<Aperiodic> {
     let errors = errors(data, &rates)?;
     let mut rates: Vec<[f64; 2]> =
         rates.into_iter().zip(errors).map(|(rate, error)| [rate, error]).collect();
+    // Rates of two decays that are one, or of noise, are not known.
+    if rates.iter().any(|[rate, error]| FREE_DECAY_SURE * error > *rate || error.is_nan()) {
+        return None;
+    }
     rates.sort_by(|a, b| a[0].total_cmp(&b[0]));
     Some(Aperiodic { rates, criterion })
 }
@@ -114,6 +119,6 @@ fn errors(data: &Data, rates: &[f64]) -> Option<Vec<f64>> {
         let jacobian = DMatrix::from_columns(&columns);
         information += jacobian.tr_mul(&jacobian) / variance.max(f64::MIN_POSITIVE);
     }
-    let covariance = information.try_inverse()?;
+    let covariance = inverse(&information)?;
     Some(covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect())
 }

@@ -210,6 +210,15 @@ impl<'a> Target<'a> {
     }
 }
 
+/// Returns the inverse of a matrix of scalar products, whose columns may be of different units; `None` of a singular one.
+pub(super) fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = gram.diagonal().map(|g| if g > 0.0 { g.sqrt().recip() } else { 0.0 });
+    let scaling = DMatrix::from_diagonal(&scale);
+    let identity = DMatrix::identity(gram.nrows(), gram.ncols());
+    let inverse = (&scaling * gram * &scaling).cholesky()?.solve(&identity);
+    Some(&scaling * inverse * &scaling)
+}
+
 /// Minimiser of ‖J x − r‖, with columns of unit length and without directions of rounding.
 fn least_squares(jacobian: DMatrix<f64>, residual: &DVector<f64>) -> Option<DVector<f64>> {
     let lengths: Vec<f64> =
@@ -363,7 +372,7 @@ fn points(
     let unknowns = fitted.flow.values.len() + 2 * target.data.channels();
     let freedom = fitted.residual.len().checked_sub(unknowns).filter(|left| *left > 0)?;
     let variance = fitted.residual.norm_squared() / freedom as f64;
-    let covariance = jacobian.tr_mul(&jacobian).try_inverse()? * variance;
+    let covariance = inverse(&jacobian.tr_mul(&jacobian))? * variance;
     let [cos, sin] = fitted.amplitudes[reference];
     let size = cos.hypot(sin);
     let path = fitted.flow.path(len)?;

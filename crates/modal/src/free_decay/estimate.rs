@@ -15,7 +15,6 @@ use super::backbone::{Backbone, backbone};
 use super::fit::{Data, Fit};
 use super::limits::{ESTIMATE_LAGS, LEAST_ONSET, ONSET_SHARE};
 use super::poles::{Pole, linear_columns};
-use super::restart::restart;
 
 /// A mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +99,11 @@ impl FreeDecayEstimate {
     /// Sample, counted from 0, at which the response is excited again; `None` if it is not.
     pub fn restart(&self) -> Option<usize> {
         self.restart
+    }
+
+    /// The same, excited again at a sample, unless its strongest mode is not linear.
+    pub(super) fn with_restart(self, restart: Option<usize>) -> Self {
+        Self { restart: restart.filter(|_| self.backbone.is_none()), ..self }
     }
 
     /// The modes by rising frequency.
@@ -214,7 +218,6 @@ pub(super) fn estimate(
     let energies = energies(data, fit, &relative);
     let total: f64 = energies.iter().sum();
     let backbone = backbone(data, fit, &energies, scale, record.sampling().dt());
-    let restart = if backbone.is_none() { restart(data, fit) } else { None };
     let mut modes = Vec::new();
     for (at, energy) in energies.iter().enumerate() {
         let mut mode = mode(&spread, record, at, &relative, energy / total)?;
@@ -241,7 +244,7 @@ pub(super) fn estimate(
             channels,
             fitted: Record::new(record.sampling(), fitted)?,
             backbone,
-            restart,
+            restart: None,
             degrees_of_freedom: spread.degrees_of_freedom,
         })
     }))

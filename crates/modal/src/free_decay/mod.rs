@@ -23,6 +23,7 @@ pub use self::error::FreeDecayError;
 pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
 use self::fit::{Data, Fit};
 use self::limits::{FINE, FREE_DECAY_SURE, MAX_STEPS, MOST_MODES, MOST_SAMPLES, SAMPLES_PER_MODE};
+use self::restart::restart;
 use self::select::Search;
 
 /// Settings of [`free_decay`].
@@ -113,6 +114,7 @@ pub fn free_decay(
     let most = asked.min(samples / SAMPLES_PER_MODE);
     let failed = FreeDecayError::NotConverged { searches: 1, steps: MAX_STEPS };
     let search = Search::new(&data);
+    let mut excited_again = None;
     let best = match settings.modes {
         Some(modes) => search.exactly(modes).ok_or(failed.clone())?,
         None => {
@@ -126,12 +128,18 @@ pub fn free_decay(
                     needed,
                 });
             }
+            // The colour of a noise may stand for what a second hit leaves.
+            let surplus = selected.white.criterion(&data) - selected.best.criterion(&data);
+            excited_again = restart(&data, &selected.white.fit)
+                .filter(|(_, decrease)| *decrease > surplus)
+                .map(|(sample, _)| sample);
             selected.best
         }
     };
     let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
     let fit = data.refined(&best.fit.poles, &best.fit.noise, FINE).ok_or(failed.clone())?;
     let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
+    let found = found.with_restart(excited_again);
     for mode in found.modes() {
         let growth = &mode.mode.growth_rate;
         if mode.energy_share > 0.5 && growth.value > FREE_DECAY_SURE * growth.standard_error {

@@ -6,13 +6,13 @@ use super::fit::{Data, Fit};
 use super::limits::RESTART_PLACES;
 use super::poles::linear_columns;
 
-/// Returns the first sample of a second excitation, counted from 0: amplitudes of their own before and after it lower
-/// the Bayesian information criterion most, and at all; `None` where none does.
+/// Returns the first sample of a second excitation, counted from 0, and the decrease of the Bayesian information criterion
+/// by amplitudes of their own before and after it; `None` where nothing lowers it.
 ///
 /// # Source
 /// Bai & Perron (1998), Econometrica 66, 47–78 (changes of coefficients at unknown times); Schwarz (1978), Annals of
 /// Statistics 6, 461–464.
-pub(super) fn restart(data: &Data, fit: &Fit) -> Option<usize> {
+pub(super) fn restart(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     let len = data.len();
     let coarse = (len / RESTART_PLACES).max(1);
     let (_, place) = best(data, fit, (coarse..len).step_by(coarse).collect())?;
@@ -20,7 +20,8 @@ pub(super) fn restart(data: &Data, fit: &Fit) -> Option<usize> {
     let fine = (around.len() / RESTART_PLACES).max(1);
     let (gain, place) = best(data, fit, around.step_by(fine).collect())?;
     let unknowns = linear_columns(&fit.poles, data.constant) * data.channels() + 1;
-    (gain > unknowns as f64 * (len as f64).ln()).then_some(place)
+    let decrease = gain - unknowns as f64 * (len as f64).ln();
+    (decrease > 0.0).then_some((place, decrease))
 }
 
 /// Returns the place of the largest decrease of minus twice the log likelihood, with the decrease.

@@ -58,10 +58,20 @@ impl Pair {
     }
 }
 
+impl Candidate {
+    /// Bayesian information criterion.
+    pub(super) fn criterion(&self, data: &Data) -> f64 {
+        let unknowns = self.fit.poles.len() * (2 + 2 * data.channels());
+        self.cost + unknowns as f64 * (data.len() as f64).ln()
+    }
+}
+
 /// Result of a search.
 #[derive(Debug)]
 pub(super) struct Selected {
     pub best: Candidate,
+    /// The best one with white noise.
+    pub white: Candidate,
     /// Decrease of minus twice the log likelihood by the first decay.
     pub first_gain: f64,
 }
@@ -106,8 +116,8 @@ impl<'a> Search<'a> {
             last = next;
         }
         let Pair { white, coloured } = best;
-        let best = if cost(&coloured) < cost(&white) { coloured } else { white };
-        Some(Selected { best, first_gain })
+        let best = if cost(&coloured) < cost(&white) { coloured } else { white.clone() };
+        Some(Selected { best, white, first_gain })
     }
 
     /// So many decays, those of the record as it is: with the number given, an autoregression must not
