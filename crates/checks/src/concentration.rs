@@ -136,24 +136,6 @@ fn refined(chosen: &[f64], first: f64) -> f64 {
     products / squares
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn multiples_of_a_rotation_are_named_and_chance_is_not() {
-        let all: Vec<f64> = (6..=64).map(|line| 4.0 * f64::from(line)).collect();
-        // 50 Hz lies between two lines, 100 Hz on one.
-        let of_rotation = [48.0, 52.0, 100.0, 148.0, 152.0, 200.0];
-        let divisor = common_divisor(&of_rotation, &all).unwrap();
-        assert!((divisor - 50.0).abs() < 0.5, "{divisor}");
-        assert_eq!(common_divisor(&[48.0, 100.0], &all), None);
-        assert_eq!(common_divisor(&[60.0, 104.0, 172.0, 236.0], &all), None);
-        assert_eq!(common_divisor(&[60.0], &all), None);
-        assert_eq!(common_divisor(&[60.0], &[60.0]), None);
-    }
-}
-
 /// The lines of all records by rising frequency.
 fn lines(parts: &[Part<'_>]) -> Vec<Line> {
     let all = parts.iter().enumerate().flat_map(|(record, part)| {
@@ -170,4 +152,22 @@ fn lines(parts: &[Part<'_>]) -> Vec<Line> {
         }
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn multiples_of_a_rotation_are_named_and_chance_is_not() {
+        let all: Vec<f64> = (6..=64).map(|line| 4.0 * f64::from(line)).collect();
+        // 50 Hz lies between two lines, 100 Hz on one.
+        let of_rotation = [48.0, 52.0, 100.0, 148.0, 152.0, 200.0];
+        let divisor = common_divisor(&of_rotation, &all).unwrap();
+        assert!((divisor - 50.0).abs() < 0.5, "{divisor}");
+        assert_eq!(common_divisor(&[48.0, 100.0], &all), None);
+        assert_eq!(common_divisor(&[60.0, 104.0, 172.0, 236.0], &all), None);
+        assert_eq!(common_divisor(&[60.0], &all), None);
+        assert_eq!(common_divisor(&[60.0], &[60.0]), None);
+    }
 }
