@@ -48,9 +48,10 @@ pub struct NonlinearFit {
 /// Channels are weighted by the size of what is left of each.
 ///
 /// The standard errors follow from the noise of force and response as several periods show it
-/// ([`StandardErrors::Periods`]), carried through the system, as long as the residual is no more than that noise
-/// ([`NonlinearEstimate::misfit`]). Otherwise they count the colour of the residual ([`StandardErrors::Blocks`]):
-/// where the model misses a resonance's damping by a little, the white formula is several times too small.
+/// ([`Periods`](super::StandardErrors::Periods)), carried through the system, as long as the residual is no more than
+/// that noise ([`NonlinearEstimate::misfit`]). Otherwise they count the colour of the residual
+/// ([`Blocks`](super::StandardErrors::Blocks)): where the model misses a resonance's damping by a little, the white
+/// formula is several times too small.
 ///
 /// # Errors
 /// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,

@@ -64,7 +64,7 @@ impl Problem<'_> {
         let (mut scatter, mut powers) = (PeriodScatter::new(theta.len()), Powers::default());
         let n = self.dof();
         let directions: Vec<Direction> = (0..2 * n).map(Direction::Initial).collect();
-        let inverse_mass = system.linear().mass().clone().try_inverse()?;
+        let inverse_mass = system.linear().mass().clone().lu().solve(&DMatrix::identity(n, n))?;
         for (at, record) in self.records.iter().enumerate() {
             if record.deviations.is_empty() {
                 return None;

@@ -34,10 +34,8 @@ impl Triangle {
         let mut factor = TriangularFactor::new(columns + 1);
         let is_finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
         // A factor that took no rows has no triangle.
-        let mut upper = match is_finite {
-            true => factor.r().clone(),
-            false => DMatrix::from_element(columns + 1, columns + 1, f64::NAN),
-        };
+        let none = || DMatrix::from_element(columns + 1, columns + 1, f64::NAN);
+        let mut upper = if is_finite { factor.r().clone() } else { none() };
         let mut scale = DVector::from_element(columns, 1.0);
         for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
             // The columns of R have the same lengths as the columns of J.
