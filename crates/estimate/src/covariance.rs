@@ -58,6 +58,17 @@ impl Covariance {
         }
     }
 
+    /// Returns the covariance times `factor`, a pure number.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        match self {
+            Self::Full(all) => Self::Full(all * factor),
+            Self::Product(product) => {
+                Self::Product(Product { residual: &product.residual * factor, ..product.clone() })
+            }
+        }
+    }
+
     /// Says that the data leave a parameter open: its variance is infinite, its covariances are NaN.
     pub fn leave_open(&mut self, at: usize) {
         match self {

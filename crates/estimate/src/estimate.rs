@@ -236,6 +236,18 @@ impl Estimate {
         })
     }
 
+    /// The same estimate with standard errors `scale` times as large (a pure number), which is known to that many
+    /// degrees of freedom: the Birge ratio, where the data disagree beyond their noise.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227.
+    #[must_use]
+    pub fn with_error_scale(mut self, scale: f64, degrees_of_freedom: usize) -> Self {
+        self.covariance = self.covariance.scaled(scale * scale);
+        self.degrees_of_freedom = self.degrees_of_freedom.min(degrees_of_freedom.max(1));
+        self
+    }
+
     /// One estimated entry by its name, such as `"k12"`.
     ///
     /// # Errors

@@ -209,58 +209,67 @@ impl Errors {
 
     /// Covariance of the parameters, and the degrees of freedom of the variance that has the fewest.
     fn covariance(&self, records: &[(Frf, Vec<usize>)]) -> (DMatrix<f64>, usize) {
-        let count = self.q.ncols();
-        let influence = &self.q * self.root.transpose();
-        let mut covariance = DMatrix::<f64>::zeros(count, count);
-        let (mut spread, mut inflation) = (DVector::<f64>::zeros(count), 1.0_f64);
-        let mut first = 0;
-        for (frf, dofs) in records {
-            let lines = frf.omega().len();
-            if !frf.has_error_covariance() {
-                continue;
-            }
-            let pairs: Vec<(usize, usize)> =
-                (0..dofs.len()).flat_map(|i| (0..self.dof).map(move |o| (o, i))).collect();
-            // Row of a line, of an output and an input, in units of its weight.
-            let at = |line: usize, (output, input): (usize, usize)| {
-                2 * (self.dof * (first + input * lines + line) + output)
-            };
-            let of = |line: usize, pair: (usize, usize), parameter: usize| {
-                let row = at(line, pair);
-                Complex::new(influence[(row, parameter)], influence[(row + 1, parameter)])
-            };
-            let own = (frf.averages() - dofs.len() as f64).max(1.0);
-            let mut shares = DMatrix::<f64>::zeros(lines, count);
-            for line in 0..lines {
-                let local = DMatrix::from_fn(pairs.len(), pairs.len(), |a, b| {
-                    frf.error_covariance(line, [pairs[a], pairs[b]]).unwrap_or_default()
-                });
-                let here = DMatrix::from_fn(pairs.len(), count, |a, p| of(line, pairs[a], p));
-                let mut around = DMatrix::zeros(pairs.len(), count);
-                for (other, c) in frf.correlated_lines(line) {
-                    around += DMatrix::from_fn(pairs.len(), count, |a, p| {
-                        of(other, pairs[a], p) * Complex::from(c)
-                    });
-                }
-                let part = (here.adjoint() * local * around).map(|z| z.re);
-                shares.row_mut(line).copy_from(&part.diagonal().transpose());
-                covariance += (&part + part.transpose()) * 0.5;
-            }
-            for line in 0..lines {
-                for (other, c) in frf.correlated_lines(line) {
-                    for parameter in 0..count {
-                        spread[parameter] +=
-                            c * shares[(line, parameter)] * shares[(other, parameter)] / own;
-                    }
-                }
-            }
-            let freedom = frf.deviations().max(3.0);
-            inflation = inflation.max(freedom / (freedom - 2.0));
-            first += lines * dofs.len();
-        }
-        let variances = covariance.diagonal();
-        let freedom = variances.iter().zip(spread.iter()).map(|(v, s)| 2.0 * v * v / s.max(0.0));
-        let fewest = freedom.fold(f64::INFINITY, f64::min).clamp(1.0, 1e6);
-        (covariance * inflation, fewest as usize)
+        covariance_of_errors(records, self.dof, &(&self.q * self.root.transpose()))
     }
+}
+
+/// Returns the covariance of the sums Σ b e of the weighted errors e of averaged responses, of `dof` outputs, with one
+/// column of `influence` each, and the degrees of freedom of the variance that has the fewest.
+pub(crate) fn covariance_of_errors(
+    records: &[(Frf, Vec<usize>)],
+    dof: usize,
+    influence: &DMatrix<f64>,
+) -> (DMatrix<f64>, usize) {
+    let count = influence.ncols();
+    let mut covariance = DMatrix::<f64>::zeros(count, count);
+    let (mut spread, mut inflation) = (DVector::<f64>::zeros(count), 1.0_f64);
+    let mut first = 0;
+    for (frf, dofs) in records {
+        let lines = frf.omega().len();
+        if !frf.has_error_covariance() {
+            continue;
+        }
+        let pairs: Vec<(usize, usize)> =
+            (0..dofs.len()).flat_map(|i| (0..dof).map(move |o| (o, i))).collect();
+        // Row of a line, of an output and an input, in units of its weight.
+        let at = |line: usize, (output, input): (usize, usize)| {
+            2 * (dof * (first + input * lines + line) + output)
+        };
+        let of = |line: usize, pair: (usize, usize), parameter: usize| {
+            let row = at(line, pair);
+            Complex::new(influence[(row, parameter)], influence[(row + 1, parameter)])
+        };
+        let own = (frf.averages() - dofs.len() as f64).max(1.0);
+        let mut shares = DMatrix::<f64>::zeros(lines, count);
+        for line in 0..lines {
+            let local = DMatrix::from_fn(pairs.len(), pairs.len(), |a, b| {
+                frf.error_covariance(line, [pairs[a], pairs[b]]).unwrap_or_default()
+            });
+            let here = DMatrix::from_fn(pairs.len(), count, |a, p| of(line, pairs[a], p));
+            let mut around = DMatrix::zeros(pairs.len(), count);
+            for (other, c) in frf.correlated_lines(line) {
+                around += DMatrix::from_fn(pairs.len(), count, |a, p| {
+                    of(other, pairs[a], p) * Complex::from(c)
+                });
+            }
+            let part = (here.adjoint() * local * around).map(|z| z.re);
+            shares.row_mut(line).copy_from(&part.diagonal().transpose());
+            covariance += (&part + part.transpose()) * 0.5;
+        }
+        for line in 0..lines {
+            for (other, c) in frf.correlated_lines(line) {
+                for parameter in 0..count {
+                    spread[parameter] +=
+                        c * shares[(line, parameter)] * shares[(other, parameter)] / own;
+                }
+            }
+        }
+        let freedom = frf.deviations().max(3.0);
+        inflation = inflation.max(freedom / (freedom - 2.0));
+        first += lines * dofs.len();
+    }
+    let variances = covariance.diagonal();
+    let freedom = variances.iter().zip(spread.iter()).map(|(v, s)| 2.0 * v * v / s.max(0.0));
+    let fewest = freedom.fold(f64::INFINITY, f64::min).clamp(1.0, 1e6);
+    (covariance * inflation, fewest as usize)
 }

@@ -122,3 +122,10 @@ pub(crate) const ROWS_PER_EQUATION: usize = 10;
 
 /// Pairs reduced at a time.
 pub(crate) const TRANSITION_BLOCK: usize = 256;
+
+/// Number of parts into which the band of a fit, or the time of a record, is split to compare what they say: fewer
+/// average an error of the model away, more have too few lines each.
+pub(crate) const PARTS: usize = 4;
+
+/// Information of a part about a combination of parameters, relative to that of all data, below which it says nothing.
+pub(crate) const PART_INFORMS: f64 = 1e-9;

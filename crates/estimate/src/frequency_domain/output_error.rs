@@ -122,6 +122,7 @@ fn with_known_noise(
         misfit_ratio: best.minimum.cost / expected,
         deviance: Some(best.minimum.cost / inflation),
         noise: noise.models().to_vec(),
+        spectrum: noise.clone(),
     };
     finish(data, unknowns, &mut misfit, &best, scale)
 }

@@ -44,6 +44,8 @@ pub struct OutputErrorFit {
     /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
     /// periods, or one from the residual; none where the noise is known beforehand.
     pub noise: Vec<NoiseModel>,
+    /// Noise by which the lines were weighted: stated, or found from the residual up to its common level.
+    pub spectrum: NoiseSpectrum,
     /// Loads of the ends of open records, `None` where all rows belong to periods.
     pub ends: Option<EndLoads>,
     /// Sinusoids of each open record that were found beside the response to the forces and taken off it; none where
@@ -154,6 +156,7 @@ pub(super) struct Scale {
     pub(super) misfit_ratio: f64,
     pub(super) deviance: Option<f64>,
     pub(super) noise: Vec<NoiseModel>,
+    pub(super) spectrum: NoiseSpectrum,
 }
 
 impl Scale {
@@ -230,6 +233,7 @@ pub(super) fn finish(
         searches: best.searches,
         agreeing: best.agreeing,
         noise: scale.noise,
+        spectrum: scale.spectrum,
         ends,
         sinusoids: Vec::new(),
     })

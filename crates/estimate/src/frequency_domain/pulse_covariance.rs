@@ -34,22 +34,36 @@ pub(super) fn excess(
     let covariance = |row: usize| noise.covariance(row).clone();
     let closed = data.without_transient(tau);
     let mut sensitivity = Whitened::of(&closed, unknowns, &values, covariance)?.sensitivity;
-    let to_force = |dof: usize| {
-        let whitened = Whitened::residual_of(&data.of_force(dof), unknowns, &values, covariance)?;
-        Some(whitened.residual)
-    };
-    let responses = ForceResponses((0..n).map(to_force).collect::<Option<_>>()?);
+    let responses = ForceResponses::new(data, unknowns, &values, noise)?;
     for record in 0..data.transient().ncols() / 2 {
-        remove_transient(data, record, &responses, &mut sensitivity)?;
+        let (rows, transient) = transient_basis(data, record, &responses)?;
+        let mut part = sensitivity.rows_mut(rows.start, rows.len());
+        let explained = transient.tr_mul(&part);
+        part -= transient * explained;
     }
     let (q, root) = orthonormal(sensitivity)?;
     Some(&root * scatter(data, &responses, &q) * root.transpose())
 }
 
 /// Weighted responses to a force on each degree of freedom, 1 N on every line.
-struct ForceResponses(Vec<DVector<f64>>);
+pub(super) struct ForceResponses(Vec<DVector<f64>>);
 
 impl ForceResponses {
+    pub(super) fn new(
+        data: &FrequencyData,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+        noise: &NoiseSpectrum,
+    ) -> Option<Self> {
+        let covariance = |row: usize| noise.covariance(row).clone();
+        let to_force = |dof: usize| {
+            let force = data.of_force(dof);
+            let whitened = Whitened::residual_of(&force, unknowns, values, covariance)?;
+            Some(whitened.residual)
+        };
+        (0..data.dof()).map(to_force).collect::<Option<_>>().map(Self)
+    }
+
     /// Returns the weighted response of some rows to a force of this amplitude on degree of freedom `dof`.
     fn to(
         &self,
@@ -72,13 +86,13 @@ impl ForceResponses {
     }
 }
 
-/// Removes from the sensitivities what the loads of the transient of an open record explain.
-fn remove_transient(
+/// Returns the residuals of an open record and orthonormal columns that span what the loads of its transient explain
+/// of them.
+pub(super) fn transient_basis(
     data: &FrequencyData,
     record: usize,
     responses: &ForceResponses,
-    sensitivity: &mut DMatrix<f64>,
-) -> Option<()> {
+) -> Option<(Range<usize>, DMatrix<f64>)> {
     let n = data.dof();
     let rows = data.open_record(record)?.rows;
     let scaled = (0..2 * 3 * n).map(|load| {
@@ -90,14 +104,11 @@ fn remove_transient(
         response / length
     });
     let q = DMatrix::from_columns(&scaled.collect::<Vec<_>>()).qr().q();
-    let mut part = sensitivity.rows_mut(2 * n * rows.start, 2 * n * rows.len());
-    let explained = q.tr_mul(&part);
-    part -= q * explained;
-    Some(())
+    Some((2 * n * rows.start..2 * n * rows.end, q))
 }
 
 /// Returns Q and R⁻¹ of the sensitivities J = Q R, `None` if J has dependent columns.
-fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+pub(super) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let lengths: Vec<f64> = sensitivity.column_iter().map(|column| column.norm()).collect();
     for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
         if *length > 0.0 {
@@ -112,7 +123,11 @@ fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f
 }
 
 /// Returns the covariance of Qᵀr by the noise of all pulses, less what independent lines would have.
-fn scatter(data: &FrequencyData, responses: &ForceResponses, q: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn scatter(
+    data: &FrequencyData,
+    responses: &ForceResponses,
+    q: &DMatrix<f64>,
+) -> DMatrix<f64> {
     let (n, count) = (data.dof(), q.ncols());
     let mut excess = DMatrix::<f64>::zeros(count, count);
     for pulse in data.pulses() {

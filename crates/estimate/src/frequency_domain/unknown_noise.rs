@@ -77,6 +77,7 @@ pub(super) fn with_unknown_noise(
         misfit_ratio: 1.0,
         deviance: None,
         noise: if is_white { vec![NoiseModel::White] } else { noise.models().to_vec() },
+        spectrum: noise.clone(),
     };
     Ok(OutputErrorFit { sinusoids, ..finish(data, unknowns, &mut misfit, &fit, scale)? })
 }

@@ -258,6 +258,13 @@ impl NoiseSpectrum {
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
     }
 
+    /// Returns the covariance of means of fewer periods: every entry times `factor`, a pure number.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.covariance.iter_mut().for_each(|c| c.scale_mut(factor));
+        self
+    }
+
     /// Returns the rows of `self`, then those of `other`: the noise of two experiments.
     pub fn chain(&self, other: &Self) -> Self {
         Self {

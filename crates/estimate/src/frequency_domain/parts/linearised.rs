@@ -1,0 +1,109 @@
+//! Weighted residual of a fit and its sensitivities, without what transients explain.
+
+use std::ops::Range;
+
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
+use nalgebra::{DMatrix, DVector};
+
+use crate::Unknowns;
+use crate::frequency_domain::Whitened;
+use crate::frequency_domain::pulse_covariance::{ForceResponses, orthonormal, transient_basis};
+
+/// Weighted residual and sensitivities at some values of the parameters.
+pub(super) struct Linearised {
+    /// e, without what the transients explain.
+    pub(super) residual: DVector<f64>,
+    /// Orthonormal columns Q that the parameters explain, without what the transients explain.
+    pub(super) basis: DMatrix<f64>,
+    /// Change of every parameter by one of each column, parameters × columns.
+    pub(super) root: DMatrix<f64>,
+    /// Residuals of each open record, and orthonormal columns that its transient explains of them.
+    pub(super) transients: Vec<(Range<usize>, DMatrix<f64>)>,
+    /// Responses to unit forces, where the noise of forces acts for some samples only.
+    pub(super) responses: Option<ForceResponses>,
+    /// Qᵀe.
+    coefficients: DVector<f64>,
+}
+
+impl Linearised {
+    /// Linearises open records, given as they are and without the loads of their ends. `None` where a receptance does
+    /// not exist, a covariance is singular, or the sensitivities are dependent.
+    pub(super) fn new(
+        [data, closed]: [&FrequencyData; 2],
+        unknowns: &Unknowns,
+        entries: &DVector<f64>,
+        noise: &NoiseSpectrum,
+    ) -> Option<Self> {
+        let covariance = |row: usize| noise.covariance(row).clone();
+        let Whitened { mut residual, mut sensitivity } =
+            Whitened::of(closed, unknowns, entries, covariance)?;
+        let responses = match data.transient().ncols() > 0 {
+            true => Some(ForceResponses::new(data, unknowns, entries, noise)?),
+            false => None,
+        };
+        let mut transients = Vec::new();
+        if let Some(responses) = &responses {
+            for record in 0..data.transient().ncols() / 2 {
+                transients.push(transient_basis(data, record, responses)?);
+            }
+        }
+        for (rows, transient) in &transients {
+            let mut part = residual.rows_mut(rows.start, rows.len());
+            part -= transient * transient.tr_mul(&part);
+        }
+        remove(&transients, &mut sensitivity);
+        let (basis, root) = orthonormal(sensitivity)?;
+        let coefficients = basis.tr_mul(&residual);
+        let responses = responses.filter(|_| !data.pulses().is_empty());
+        Some(Self { residual, basis, root, transients, responses, coefficients })
+    }
+
+    pub(super) fn cost(&self) -> f64 {
+        self.residual.norm_squared()
+    }
+
+    /// Length of the step to the most likely parameters, in standard errors by the size of the residual.
+    pub(super) fn step_in_errors(&self) -> f64 {
+        let unit = self.cost() / self.residual.len() as f64;
+        (self.coefficients.norm_squared() / unit).sqrt()
+    }
+
+    /// Gauss–Newton step of the parameters.
+    pub(super) fn step(&self) -> DVector<f64> {
+        &self.root * &self.coefficients
+    }
+
+    /// Removes what the parameters still explain of the residual.
+    pub(super) fn finish_step(&mut self) {
+        self.residual -= &self.basis * &self.coefficients;
+        self.coefficients.fill(0.0);
+    }
+
+    /// Passes from independent unknowns to the entries that follow from them, with this derivative.
+    pub(super) fn relate(&mut self, tangent: &DMatrix<f64>) {
+        self.root = tangent * &self.root;
+    }
+
+    /// Returns D_p Q of a part without what the parameters and the transients explain of all data together.
+    pub(super) fn unexplained(&self, mut part: DMatrix<f64>) -> DMatrix<f64> {
+        let explained = self.basis.tr_mul(&part);
+        part -= &self.basis * explained;
+        remove(&self.transients, &mut part);
+        part
+    }
+
+    /// Number of residuals that neither the parameters nor the transients take up.
+    pub(super) fn free(&self) -> f64 {
+        let transients: usize = self.transients.iter().map(|(_, columns)| columns.ncols()).sum();
+        self.residual.len() as f64 - (self.basis.ncols() + transients) as f64
+    }
+}
+
+/// Removes what the transients explain from columns over all residuals.
+fn remove(transients: &[(Range<usize>, DMatrix<f64>)], columns: &mut DMatrix<f64>) {
+    for (rows, transient) in transients {
+        let mut part = columns.rows_mut(rows.start, rows.len());
+        let explained = transient.tr_mul(&part);
+        part -= transient * explained;
+    }
+}
