@@ -19,6 +19,7 @@
 mod error;
 pub mod exact;
 mod fault;
+mod faulty_oscillator;
 mod hammer_test;
 pub mod machines;
 mod named;
@@ -35,6 +36,7 @@ pub use exact::{
     exact_zoh_periodic,
 };
 pub use fault::Fault;
+pub use faulty_oscillator::FaultyOscillator;
 pub use hammer_test::{HammerRecord, HammerTest, MadeFault};
 pub use named::{dissertation_bearing, dissertation_sdof, steffen_rade};
 pub use random::random_stable;
