@@ -89,6 +89,15 @@ pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
+/// Returns the note on standard errors that are `factor` times those of the noise, for the reasons that `checks` name.
+pub(crate) fn scaled_errors(factor: f64, checks: &str) -> String {
+    format!(
+        "standard errors and intervals are {} times those of the noise alone, for model and data disagree beyond the \
+         noise (see {checks}); they do not cover a wrong model",
+        significant(factor, 3)
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

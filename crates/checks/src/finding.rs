@@ -121,6 +121,8 @@ findings! {
     Gain in gain,
     /// Residual power against the power of the noise.
     Misfit in misfit,
+    /// Parts of the data against one another.
+    PartsAgreement in parts,
     /// Prior of a parameter against what the data say of it.
     PriorAgreement in prior,
     /// Number of searches that ended at the highest likelihood.

@@ -47,6 +47,7 @@ mod mass;
 mod misfit;
 mod no_logarithm;
 mod p_value;
+mod parts;
 mod period;
 mod period_scatter;
 mod persistent_excitation;
@@ -104,6 +105,7 @@ pub use mass::negative_mass;
 pub use misfit::{Concentration, Misfit, NoiseSource};
 pub use no_logarithm::NoLogarithm;
 pub use p_value::{CorrelationTest, PValue};
+pub use parts::{DataPart, PartsAgreement, RowParts, agreement_of_parts};
 pub use period::claimed_period;
 pub use period::{PeriodFault, WrongPeriod};
 pub use period_scatter::PeriodScatter;
@@ -200,6 +202,8 @@ pub enum Subject {
     Symmetry,
     /// Residual power against the noise.
     Misfit,
+    /// Parts of the data against one another.
+    Parts,
     /// Priors against the data.
     Prior,
     /// Searches from several first values.
@@ -231,6 +235,7 @@ impl fmt::Display for Subject {
             Subject::Mass => "mass",
             Subject::Symmetry => "symmetry",
             Subject::Misfit => "misfit",
+            Subject::Parts => "parts",
             Subject::Prior => "prior",
             Subject::Search => "search",
             Subject::Linearity => "linearity",

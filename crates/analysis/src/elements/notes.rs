@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::text::{compact, significant};
+use crate::text::{compact, scaled_errors, significant};
 
 /// A note on the result, with its numbers; [`Display`](fmt::Display) gives one sentence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,12 +61,7 @@ impl fmt::Display for ElementNote {
                 "{parameter} lies at its bound {}: the data would have it beyond; its interval is one-sided",
                 compact(*bound, 6)
             ),
-            Self::ScaledErrors { factor } => write!(
-                f,
-                "standard errors and intervals are {} times those of the noise alone, for model and data \
-                 disagree beyond the noise (see misfit); they do not cover a wrong model",
-                significant(*factor, 3)
-            ),
+            Self::ScaledErrors { factor } => f.write_str(&scaled_errors(*factor, "misfit")),
             Self::FromPrior { parameter, share } => write!(
                 f,
                 "{} % of the information on {parameter} comes from its prior",

@@ -10,6 +10,7 @@ use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_signal::{Record, message};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 
+use super::checks::CheckRow;
 use super::coherence::ResponseCoherence;
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
@@ -19,7 +20,7 @@ use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
 use crate::limits::UNCERTAIN_ERROR;
 use crate::machine::NonlinearPart;
-use crate::text::significant;
+use crate::text::{scaled_errors, significant};
 
 /// An estimate and how it came about.
 #[derive(Debug)]
@@ -35,6 +36,8 @@ pub struct Fitted {
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,
+    /// Factor by which the standard errors of `estimate` are larger than those of the noise.
+    pub error_scale: f64,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
@@ -143,6 +146,7 @@ impl Fitted {
             least_squares: false,
             estimate,
             nonlinear: None,
+            error_scale: 1.0,
             equations: 0,
             frequency: None,
             scattered: None,
@@ -178,6 +182,37 @@ impl Fitted {
                 significant(100.0 * error, 2)
             )
         })
+    }
+
+    /// Makes the standard errors larger where the checks show that the data disagree beyond their noise: by the scatter
+    /// of their parts, or the size of the residual. With nonlinear terms they stay as they are.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle Physics*, introduction.
+    pub(super) fn scale_errors(&mut self, checks: &[CheckRow]) {
+        let spare = self.estimate.degrees_of_freedom();
+        let of_check = |check: &CheckRow| match &check.finding {
+            Finding::PartsAgreement(parts) => Some((parts.scatter, parts.degrees_of_freedom)),
+            Finding::Misfit(misfit) => Some((misfit.ratio.sqrt(), spare)),
+            _ => None,
+        };
+        let told = checks.iter().filter(|check| check.is_conspicuous()).filter_map(of_check);
+        let Some((scale, degrees)) = told.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        if scale > 1.0 && self.nonlinear.is_none() {
+            self.estimate = self.estimate.clone().with_error_scale(scale, degrees);
+            self.error_scale = scale;
+        }
+    }
+
+    /// Returns a remark on standard errors that are larger than those of the noise.
+    pub(super) fn scaled_errors(&self, checks: &[CheckRow]) -> Option<String> {
+        let scales = |check: &&CheckRow| {
+            matches!(check.finding, Finding::Misfit(_) | Finding::PartsAgreement(_))
+        };
+        let scaling = checks.iter().filter(|check| check.is_conspicuous()).filter(scales);
+        let mut names: Vec<String> = scaling.map(|check| check.subject.to_string()).collect();
+        names.dedup();
+        (self.error_scale > 1.0).then(|| scaled_errors(self.error_scale, &names.join(", ")))
     }
 
     /// Returns the system that was fitted, which has the responses to the forces that acted.

@@ -134,11 +134,11 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         false => fit(&unknowns).map(|fitted| (fitted, None)),
     };
     let is_linear = !matches!(how.source, Source::Terms(_));
-    let (fitted, unscaled) = fitted.map_err(|error| {
+    let (mut fitted, unscaled) = fitted.map_err(|error| {
         let surplus = if is_linear { resonances::surplus(measurements) } else { None };
         with_surplus(explained(error, &records), surplus)
     })?;
-    let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
+    let mut summary = IdentificationSummary::new(&records, &mut fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
     let causes = [Subject::Delay, Subject::Linearity];
     let is_named = |check: &CheckRow| check.is_conspicuous() && causes.contains(&check.subject);

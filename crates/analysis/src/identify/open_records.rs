@@ -1,10 +1,14 @@
 //! Fits of the spectral lines of records that are no periods, such as those of random tests.
 
+use std::ops::Range;
+
 use mechid_checks::{
-    AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
-    delay_of_open_records, fitted_band, linearity_of_open_record,
+    AfterSpectralFit, Finding, RowParts, Subject, Verdict, after_spectral_fit, agreement_of_parts,
+    before_spectral_fit, delay_of_open_records, fitted_band, linearity_of_open_record,
 };
-use mechid_estimate::frequency_domain::{EndLoads, OutputErrorFit, output_error_pooling};
+use mechid_estimate::frequency_domain::{
+    EndLoads, OutputErrorFit, PartsOfFit, Split, output_error_pooling,
+};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
@@ -137,6 +141,7 @@ pub(super) fn fit(
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
     let dt = records[0].held.force.sampling().dt();
     let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
+    let parts = agreement(&data, &fit, excitation)?;
     let each = records.iter().zip(&fit.sinusoids).enumerate();
     let sinusoids: Vec<SinusoidRow> =
         each.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect();
@@ -151,7 +156,7 @@ pub(super) fn fit(
         before: vec![Vec::new(); records.len()],
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
-        after_all: bias.into_iter().chain(late).collect(),
+        after_all: bias.into_iter().chain(late).chain(parts).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
@@ -166,6 +171,35 @@ pub(super) fn fit(
         )
     };
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
+}
+
+/// Compares the records or, of one alone, its stretches of time, and the bands of lines.
+fn agreement(
+    data: &[FrequencyData],
+    fit: &OutputErrorFit,
+    excitation: Excitation<'_>,
+) -> Result<Option<Finding>, AnalysisError> {
+    let all = joined(data)?;
+    let parts = PartsOfFit::new(&all, &fit.estimate, fit.ends.as_ref(), Some(&fit.spectrum));
+    let first = match (data, excitation) {
+        ([_], Excitation::Lasting) => Some(Split::Time),
+        ([_], Excitation::Hits(_)) => None,
+        _ => Some(Split::Rows(rows_of(data))),
+    };
+    let splits: Vec<(Split, RowParts)> =
+        first.into_iter().chain([Split::Bands]).map(|split| (split, RowParts::Records)).collect();
+    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
+}
+
+/// Rows of each record among those of all.
+pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
+    let mut first = 0;
+    let rows = records.iter().map(|data| {
+        let rows = first..first + data.len();
+        first = rows.end;
+        vec![rows]
+    });
+    rows.collect()
 }
 
 /// Returns the findings on the band and the linearity of each record.

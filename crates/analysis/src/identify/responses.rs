@@ -1,20 +1,22 @@
 //! Fits frequency responses.
 
 use mechid_checks::{
-    Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
-    delay_of_lines, leakage, linearity,
+    Finding, RowParts, Subject, after_response_fit, agreement_of_parts, before_spectral_fit,
+    claimed_period, coherence, delay_of_lines, leakage, linearity,
 };
-use mechid_estimate::frequency_domain::equation_error;
+use mechid_estimate::frequency_domain::{PartsOfFit, Split, equation_error};
 use mechid_estimate::{
     Estimate, EstimateError, ResponseEstimate, Unknowns, output_error_of_responses,
 };
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
+use mechid_spectra::frf::Frf;
 use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
 use super::fitted::{Fitted, Misfit};
 use super::keywords::Domain;
+use super::open_records::rows_of;
 use super::options::{Method, SegmentFit};
 use super::prediction::Prediction;
 use super::remarks::one_motion_of;
@@ -71,6 +73,10 @@ pub fn fit(
         before.push(checks);
         after.push(looked);
     }
+    let parts = match *method {
+        Some(Method::LeastSquares) => None,
+        _ => agreement(&responses, &data, &estimate)?,
+    };
     let of_motion = one_motion_of(&records[0].held).into_iter();
     let remarks = of_motion.chain(of_averages(records, &responses)).chain(remark);
     let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
@@ -89,11 +95,30 @@ pub fn fit(
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,
+        after_all: parts.into_iter().collect(),
         misfit,
         drawn: Some(measured),
         remarks,
         ..Fitted::new(Domain::Frequency, name, prediction, estimate)
     })
+}
+
+/// Compares the bands of lines and, of several, the records.
+fn agreement(
+    responses: &[Responses],
+    data: &FrequencyData,
+    estimate: &Estimate,
+) -> Result<Option<Finding>, AnalysisError> {
+    let records: Vec<(Frf, Vec<usize>)> =
+        responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
+    let mut splits = vec![(Split::Bands, RowParts::Records)];
+    if records.len() > 1 {
+        let each = records.iter().map(|(frf, driven)| frf.data(driven));
+        let each: Vec<FrequencyData> = each.collect::<Result<_, _>>()?;
+        splits.push((Split::Rows(rows_of(&each)), RowParts::Records));
+    }
+    let parts = PartsOfFit::of_responses(data, &records, estimate);
+    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
 }
 
 /// Returns remarks on the averages of several records, and on their channels.

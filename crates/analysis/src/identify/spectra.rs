@@ -1,21 +1,25 @@
 //! Fits of the spectral lines of whole periods.
 
+use std::ops::Range;
+
 use mechid_checks::{
-    AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
-    delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
+    AfterSpectralFit, Finding, RowParts, Subject, Verdict, after_spectral_fit, agreement_of_parts,
+    before_spectral_fit, delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
-    equation_error, instrumental_variables, output_error_pooling,
+    PartsOfFit, Split, equation_error, instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
-use mechid_spectra::{FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, SpectraError};
+use mechid_spectra::{
+    FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, SpectraError,
+};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
-use super::open_records::joined;
+use super::open_records::{joined, rows_of};
 use super::options::PeriodEstimator;
 use super::prediction::Prediction;
 use super::remarks::{of_noise, one_motion_of};
@@ -65,12 +69,13 @@ pub(super) fn fit(
     let noise = pooling_of(estimator);
     let mut spectra = read(records, lines, noise)?;
     let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
+    let Found { estimator, estimate, mut misfit, noise: models, spectrum, noise_through, remark } =
         found(&spectra, &data, unknowns, estimator)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let Looked { before, after, weighted, repeats } =
         Looked::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
+    let parts = agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?;
     misfit = misfit.filter(|_| repeats);
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
@@ -88,7 +93,7 @@ pub(super) fn fit(
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        after_all: bias.into_iter().chain(nonlinear).collect(),
+        after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         misfit,
         noise: models,
@@ -139,6 +144,45 @@ impl Looked {
         }
         Ok(looked)
     }
+}
+
+/// Compares the records, the halves of their periods and the bands of lines; where a record shows no noise, there are no
+/// halves, and the noise has the form of `spectrum`.
+fn agreement(
+    spectra: &[Spectra],
+    weighted: &[FrequencyData],
+    estimate: &Estimate,
+    spectrum: Option<&NoiseSpectrum>,
+) -> Result<Option<Finding>, AnalysisError> {
+    let mut records = Vec::new();
+    let mut halves: Vec<Vec<Range<usize>>> = vec![Vec::new(); 2];
+    let is_stated = weighted.iter().all(|data| data.noise().is_some());
+    let mut row = 0;
+    for ((periods, _), data) in spectra.iter().zip(weighted) {
+        let Some(noise) = data.noise().filter(|_| is_stated) else {
+            records.push(data.clone());
+            continue;
+        };
+        let (first, second) = periods.halves()?;
+        let count = periods.count();
+        let noise = noise.clone().scaled(count as f64 / (count / 2) as f64);
+        let record = first.with_noise(noise.clone())?.and(&second.with_noise(noise)?)?;
+        for half in &mut halves {
+            half.push(row..row + data.len());
+            row += data.len();
+        }
+        records.push(record);
+    }
+    let all = joined(&records)?;
+    let mut splits = vec![(Split::Bands, RowParts::Records)];
+    if records.len() > 1 {
+        splits.push((Split::Rows(rows_of(&records)), RowParts::Records));
+    }
+    if is_stated {
+        splits.push((Split::Rows(halves), RowParts::Halves));
+    }
+    let parts = PartsOfFit::new(&all, estimate, None, spectrum);
+    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
 }
 
 /// Returns the periods of each record, on the lines found in its force.
@@ -233,6 +277,8 @@ struct Found {
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
+    /// Noise by which the fit was weighted, if it was.
+    spectrum: Option<NoiseSpectrum>,
     /// Machine to whose response to unmeasured forces the noise may be alike.
     noise_through: Option<SecondOrderSystem>,
     remark: Option<String>,
@@ -257,6 +303,7 @@ fn found(
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
                 noise: Vec::new(),
+                spectrum: None,
                 noise_through: None,
                 remark: None,
             })
@@ -313,7 +360,15 @@ fn least_squares(
 ) -> Result<Found, AnalysisError> {
     let estimator = "least squares on the equation of motion, in the frequency domain";
     let estimate = equation_error(data, unknowns)?;
-    Ok(Found { estimator, estimate, misfit: None, noise: Vec::new(), noise_through: None, remark })
+    Ok(Found {
+        estimator,
+        estimate,
+        misfit: None,
+        noise: Vec::new(),
+        spectrum: None,
+        noise_through: None,
+        remark,
+    })
 }
 
 /// Returns the estimate of maximum likelihood from data with noise; where the noise may be the response to unmeasured
@@ -348,6 +403,7 @@ fn likelihood(
         misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
         remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
         noise: fit.noise,
+        spectrum: Some(fit.spectrum),
         noise_through,
     })
 }

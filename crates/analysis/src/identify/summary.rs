@@ -122,6 +122,9 @@ pub struct FitRow {
     /// Sinusoids of open records beside the response to the forces, which were taken off.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sinusoids: Vec<SinusoidRow>,
+    /// Factor by which standard errors are larger than those of the noise, where parts of the data disagree or the
+    /// residual exceeds the noise; otherwise 1.
+    pub error_scale: f64,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of real equations per degree of freedom.
@@ -134,22 +137,25 @@ impl IdentificationSummary {
     /// Gathers the numbers, checks and remarks of a fit.
     pub(super) fn new(
         records: &[Windowed],
-        fitted: &Fitted,
+        fitted: &mut Fitted,
         unscaled: Option<Unscaled>,
         hits: Vec<HitRow>,
         how: &Identify,
     ) -> Result<Self, AnalysisError> {
         let records: Vec<&Block> = records.iter().map(|r| &r.held).collect();
-        let estimate = &fitted.estimate;
-        let (system, modes) = (estimate.system()?, estimate.modes()?);
+        let system = fitted.estimate.system()?;
         let unexplained_motion = fitted.unexplained_motion(&system)?;
-        let carried = rows::carries_covariance(estimate);
         let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
         let scope = checks::Scope {
             scaled: unscaled.is_none(),
             hits: matches!(how.source, Source::Hits(_)),
             unexplained: unexplained_motion,
         };
+        let modes = fitted.estimate.modes()?;
+        let checks = checks::rows(fitted, &modes, &records, scope)?;
+        fitted.scale_errors(&checks);
+        let (fitted, estimate) = (&*fitted, &fitted.estimate);
+        let (modes, carried) = (estimate.modes()?, rows::carries_covariance(estimate));
         let mut summary = Self {
             file: hits.first().map_or(&records[0].file, |hit| &hit.record).clone(),
             domain: fitted.domain,
@@ -166,7 +172,7 @@ impl IdentificationSummary {
             channels: Channels::together(&records.iter().map(|r| &*r.names).collect::<Vec<_>>()),
             records: records.iter().map(row).collect(),
             hits,
-            checks: checks::rows(fitted, &modes, &records, scope)?,
+            checks,
             fitted_lines: None,
             validation: None,
             remarks: Vec::new(),
@@ -196,6 +202,7 @@ impl IdentificationSummary {
             .chain(fitted.remarks.iter().cloned())
             .chain(looked_at)
             .chain(fitted.few_equations())
+            .chain(fitted.scaled_errors(&self.checks))
             .chain(self.doubts())
             .chain(of_least_squares(fitted, &self.checks))
             .chain(rows::of_covariance(&fitted.estimate))
@@ -360,6 +367,7 @@ impl FitRow {
             noise: fitted.noise.clone(),
             force_noise: fitted.force_noise.clone(),
             sinusoids: fitted.sinusoids.clone(),
+            error_scale: fitted.error_scale,
             condition_number: fitted.estimate.condition(),
             equations: fitted.equations,
             unknowns: match &fitted.nonlinear {

@@ -384,6 +384,7 @@ impl Fit {
             noise: self.noise.clone(),
             force_noise: Vec::new(),
             sinusoids: Vec::new(),
+            error_scale: 1.0,
             condition_number: of_machine.condition(),
             equations: 2 * rows,
             unknowns: of_machine.unknowns().independent(),

@@ -1,0 +1,118 @@
+//! Parts of the data that disagree.
+
+use mechid_analysis::identify::{OpenFit, Source};
+use mechid_analysis::{
+    Identified, Identify, Measurement, ResponseQuantity, identify,
+};
+use mechid_checks::{DataPart, Finding, PartsAgreement, Subject};
+use mechid_model::Matrix;
+use mechid_problems::FaultyOscillator;
+use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+
+const KIND: ResponseQuantity = ResponseQuantity::Displacement;
+const SAMPLES: usize = 2048;
+const PERIOD: usize = 512;
+
+fn sampling(samples: usize) -> Sampling {
+    Sampling::new(0.002, samples).unwrap()
+}
+
+fn measured([force, response]: [Record; 2], seed: u64) -> Measurement {
+    let noisy = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), seed + 1000).unwrap();
+    Measurement::from_records(&force, &[(KIND, &noisy)]).unwrap()
+}
+
+fn random(machine: &FaultyOscillator, seed: u64) -> Measurement {
+    let both = machine.measure(sampling(SAMPLES), 4 * SAMPLES, SAMPLES, 0.35, seed);
+    measured(both.unwrap(), seed)
+}
+
+fn periods(machine: &FaultyOscillator, seed: u64) -> Measurement {
+    let both = machine.measure(sampling(8 * PERIOD), PERIOD, 4 * PERIOD, 0.35, seed);
+    measured(both.unwrap(), seed).period(PERIOD).unwrap()
+}
+
+fn open(records: &[Measurement]) -> Identified {
+    identify(records, &Identify::from(Source::Open(OpenFit::default()))).unwrap()
+}
+
+fn agreement(found: &Identified) -> &PartsAgreement {
+    let all = found.checks().iter().find(|check| check.subject == Subject::Parts);
+    match &all.expect("parts are compared").finding {
+        Finding::PartsAgreement(parts) => parts,
+        other => panic!("{other}"),
+    }
+}
+
+fn holds(found: &Identified, name: &str, value: f64) -> bool {
+    let [low, high] = found.estimate().parameter(name).unwrap().interval(0.95).unwrap();
+    (low..=high).contains(&value)
+}
+
+#[test]
+fn parts_of_a_linear_machine_agree_and_nothing_is_scaled() {
+    let machine = FaultyOscillator::linear();
+    let both = [open(&[random(&machine, 1)]), open(&[random(&machine, 2), random(&machine, 3)])];
+    let spectra = identify(&[periods(&machine, 4)], &Identify::default()).unwrap();
+    for found in both.iter().chain([&spectra]) {
+        assert!(!agreement(found).p_value.is_significant(), "{found}");
+        assert_eq!(found.summary().fit.error_scale, 1.0);
+    }
+}
+
+/// One of two records has 2 % more mass: both k and c are alike, and m is off by a percent on either side.
+#[test]
+fn a_weight_added_for_one_record_is_named_and_in_the_interval() {
+    let linear = FaultyOscillator::linear();
+    let heavier = FaultyOscillator { mass: 1.01 * linear.mass, ..linear };
+    let lighter = FaultyOscillator { mass: 0.99 * linear.mass, ..linear };
+    let found = open(&[random(&heavier, 5), random(&lighter, 6)]);
+    let parts = agreement(&found);
+    assert!(parts.p_value.adjusted < 1e-6, "{found}");
+    assert!(matches!(parts.part, DataPart::Records { .. }), "{found}");
+    assert_eq!(parts.parameter.matrix(), Matrix::Mass);
+    let difference = (parts.by_part - parts.by_others).abs();
+    assert!((difference / (0.02 * linear.mass) - 1.0).abs() < 0.2, "{found}");
+    let scale = found.summary().fit.error_scale;
+    assert!(scale > 3.0 && holds(&found, "m", linear.mass), "{found}");
+    // The result has the same errors as the estimate.
+    let mass = found.estimate().parameter("m").unwrap();
+    let row = &found.summary().parameters[0];
+    assert_eq!(row.estimate.standard_error, Some(mass.standard_error));
+    let text = found.to_string();
+    assert!(
+        text.contains("times those of the noise alone") && text.contains("(see parts)"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_stiffness_that_drifts_is_seen_in_time() {
+    let linear = FaultyOscillator::linear();
+    let drifting = FaultyOscillator { drift: 0.02, ..linear };
+    let found = open(&[random(&drifting, 7)]);
+    let parts = agreement(&found);
+    assert!(parts.p_value.is_significant(), "{found}");
+    assert!(matches!(parts.part, DataPart::Time { .. }), "{found}");
+    assert!(found.summary().fit.error_scale > 1.5, "{found}");
+    assert!(holds(&found, "k", linear.stiffness), "{found}");
+    let found = identify(&[periods(&drifting, 8)], &Identify::default()).unwrap();
+    assert!(agreement(&found).p_value.is_significant(), "{found}");
+    assert!(
+        found.summary().fit.error_scale > 1.5 && holds(&found, "k", linear.stiffness),
+        "{found}"
+    );
+}
+
+/// A residual that exceeds the noise widens the intervals, whatever the parts say.
+#[test]
+fn a_residual_beyond_the_noise_widens_the_intervals() {
+    let hiding = FaultyOscillator { hidden_mass: 1.0, ..FaultyOscillator::linear() };
+    let found = identify(&[periods(&hiding, 9)], &Identify::default()).unwrap();
+    let misfit = found.checks().iter().find_map(|check| match &check.finding {
+        Finding::Misfit(misfit) => Some(misfit.ratio),
+        _ => None,
+    });
+    let scale = found.summary().fit.error_scale;
+    assert!(scale >= misfit.unwrap().sqrt() && scale > 3.0, "{found}");
+}
