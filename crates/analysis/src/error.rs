@@ -332,6 +332,12 @@ pub enum AnalysisError {
         /// Findings of the checks before the fit.
         reasons: String,
     },
+    /// The data determine neither a parameter nor a mode of the machine.
+    #[error("the data do not determine the machine: {why}")]
+    NothingDetermined {
+        /// What shows it, with the numbers.
+        why: String,
+    },
     /// The force is zero.
     #[error(
         "{file}: the force (column {columns}) is zero throughout the window: nothing drives the machine"

@@ -27,6 +27,7 @@ pub mod checks;
 mod coherence;
 mod counts;
 mod derivatives;
+mod determined;
 pub(crate) mod fitted;
 mod fitted_lines;
 mod force_noise;

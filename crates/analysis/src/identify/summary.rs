@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_checks::{Finding, Subject};
+use mechid_estimate::IdentifiedMode;
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 use super::CONSPICUOUS;
 use super::checks::{self, CheckRow, When};
+use super::determined;
 use super::fitted::Fitted;
 use super::fitted_lines::FittedLine;
 use super::force_noise::ForceNoise;
@@ -153,6 +155,7 @@ impl IdentificationSummary {
         };
         let modes = fitted.estimate.modes()?;
         let checks = checks::rows(fitted, &modes, &records, scope)?;
+        determined::check(fitted, &modes, &checks)?;
         fitted.scale_errors(&checks);
         let (fitted, estimate) = (&*fitted, &fitted.estimate);
         let (modes, carried) = (estimate.modes()?, rows::carries_covariance(estimate));
@@ -181,12 +184,17 @@ impl IdentificationSummary {
             unscaled,
             analysis: how.clone(),
         };
-        summary.remarks = summary.all_remarks(fitted, &records);
+        summary.remarks = summary.all_remarks(fitted, &modes, &records);
         Ok(summary)
     }
 
     /// Returns the remarks of a fit, of its records and of what the checks leave.
-    fn all_remarks(&self, fitted: &Fitted, records: &[&Block]) -> Vec<String> {
+    fn all_remarks(
+        &self,
+        fitted: &Fitted,
+        modes: &[IdentifiedMode],
+        records: &[&Block],
+    ) -> Vec<String> {
         let looked_at = records.iter().filter_map(|record| {
             let (first, last) = (record.first_sample, record.held_to()?);
             let file = &record.file;
@@ -203,6 +211,7 @@ impl IdentificationSummary {
             .chain(looked_at)
             .chain(fitted.few_equations())
             .chain(fitted.scaled_errors(&self.checks))
+            .chain(determined::modes_alone(fitted, modes))
             .chain(self.doubts())
             .chain(of_least_squares(fitted, &self.checks))
             .chain(rows::of_covariance(&fitted.estimate))

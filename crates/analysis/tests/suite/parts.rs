@@ -1,8 +1,8 @@
-//! Parts of the data that disagree.
+//! Parts of the data that disagree, and fits that determine nothing.
 
 use mechid_analysis::identify::{OpenFit, Source};
 use mechid_analysis::{
-    Identified, Identify, Measurement, ResponseQuantity, identify,
+    AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
 use mechid_checks::{DataPart, Finding, PartsAgreement, Subject};
 use mechid_model::Matrix;
@@ -115,4 +115,20 @@ fn a_residual_beyond_the_noise_widens_the_intervals() {
     });
     let scale = found.summary().fit.error_scale;
     assert!(scale >= misfit.unwrap().sqrt() && scale > 3.0, "{found}");
+}
+
+/// Noise that has nothing to do with the force.
+#[test]
+fn a_response_that_is_noise_is_no_result() {
+    let [force, _] =
+        FaultyOscillator::linear().measure(sampling(SAMPLES), SAMPLES, SAMPLES, 0.35, 10).unwrap();
+    let alone = noise::white(sampling(SAMPLES), 1, 1e-4, 11).unwrap();
+    let record = Measurement::from_records(&force, &[(KIND, &alone)]).unwrap();
+    let open = Identify::from(Source::Open(OpenFit::default()));
+    let refused = match identify(&[record], &open) {
+        Err(refused) => refused,
+        Ok(found) => panic!("{found}"),
+    };
+    assert!(matches!(refused, AnalysisError::NothingDetermined { .. }), "{refused}");
+    assert!(refused.to_string().starts_with("the data do not determine the machine: "));
 }

@@ -1,0 +1,98 @@
+//! Refusal of fits by which the data determine nothing.
+
+use mechid_checks::Finding;
+use mechid_estimate::{Estimate, IdentifiedMode};
+use mechid_signal::message;
+
+use super::checks::CheckRow;
+use super::fitted::Fitted;
+use super::rows::CONFIDENCE;
+use crate::AnalysisError;
+use crate::text::significant;
+
+/// Maximum number of parameters and modes that a message names.
+const NAMED: usize = 6;
+
+/// Refuses a fit of a linear system that is singular to rounding, that explains no more of the response than chance
+/// does, or in which the interval of every parameter holds zero. Several degrees of freedom may have modes all the same;
+/// with one, the response to the force is then no more than noise, and its mode is a peak of that.
+///
+/// # Errors
+/// [`AnalysisError::NothingDetermined`].
+pub(super) fn check(
+    fitted: &Fitted,
+    modes: &[IdentifiedMode],
+    checks: &[CheckRow],
+) -> Result<(), AnalysisError> {
+    let estimate = &fitted.estimate;
+    let refused = |why: String| {
+        let reasons = checks
+            .iter()
+            .filter(|check| check.is_bad() && !matches!(check.finding, Finding::Unrelated(_)));
+        let all: Vec<String> = [why].into_iter().chain(reasons.map(CheckRow::sentence)).collect();
+        Err(AnalysisError::NothingDetermined { why: all.join("; ") })
+    };
+    if fitted.nonlinear.is_some() {
+        return Ok(());
+    }
+    if let Some(check) = checks.iter().find(|check| matches!(check.finding, Finding::Unrelated(_)))
+    {
+        return refused(check.sentence());
+    }
+    let condition = estimate.condition();
+    if condition * f64::EPSILON >= 1.0 {
+        let number = significant(condition, 2);
+        return refused(format!("the condition number of the fit is {number}, beyond rounding"));
+    }
+    let found = determined(modes);
+    if is_open(estimate) && (estimate.dof() == 1 || found.is_empty()) {
+        let modes = match found.is_empty() {
+            true => "and so do those of all natural frequencies".to_owned(),
+            false => format!("which leaves {} a peak of the noise", found.join(", ")),
+        };
+        return refused(format!("{} hold zero, {modes}", intervals(estimate)));
+    }
+    Ok(())
+}
+
+/// Returns a remark on a fit that determines modes, but no parameter.
+pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<String> {
+    let determined = determined(modes);
+    let is_alone = fitted.nonlinear.is_none() && is_open(&fitted.estimate);
+    (is_alone && !determined.is_empty()).then(|| {
+        let [found, open] = [message::list(&determined, ", ", NAMED), intervals(&fitted.estimate)];
+        format!("the data determine modes ({found}), but no parameter: {open} hold zero")
+    })
+}
+
+/// Returns whether the interval of every parameter holds zero.
+fn is_open(estimate: &Estimate) -> bool {
+    estimate.parameters().len() > 0
+        && estimate.parameters().all(|p| {
+            let interval = p.interval(CONFIDENCE);
+            interval.is_ok_and(|[low, high]| !(low > 0.0 || high < 0.0) && low < high)
+        })
+}
+
+/// Returns natural frequencies whose intervals do not hold zero.
+fn determined(modes: &[IdentifiedMode]) -> Vec<String> {
+    let is_determined = |mode: &&IdentifiedMode| {
+        let interval = mode.natural_frequency_interval_hz(CONFIDENCE);
+        interval.is_ok_and(|[low, high]| low > 0.0 && high.is_finite())
+    };
+    let named = |mode: &IdentifiedMode| {
+        let frequency = &mode.natural_frequency_hz;
+        let [value, error] = [frequency.value, frequency.standard_error];
+        format!("{} ± {} Hz", significant(value, 6), significant(error, 2))
+    };
+    modes.iter().filter(is_determined).map(named).collect()
+}
+
+fn intervals(estimate: &Estimate) -> String {
+    let of = |p: mechid_estimate::Estimated| {
+        let (value, error) = (significant(p.value, 3), significant(p.standard_error, 2));
+        format!("{} = {value} ± {error} {}", p.parameter, p.parameter.matrix().unit())
+    };
+    let all: Vec<String> = estimate.parameters().map(of).collect();
+    format!("the intervals of all parameters ({})", message::list(&all, ", ", NAMED))
+}
