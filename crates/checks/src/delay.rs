@@ -1,5 +1,6 @@
 //! Delay between force and response.
 
+use std::f64::consts::PI;
 use std::fmt::{self, Formatter};
 
 use mechid_estimate::frequency_domain::{
@@ -142,15 +143,41 @@ fn delay_under_window(
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    let (system, windowed) = (estimate.system().ok()?, data.under_hann_window());
+    delay_weighted(&data.under_hann_window(), dt, unknowns, estimate)
+}
+
+/// The delay, in samples, of the equations of motion, each line weighted by the dynamic stiffness of the machine
+/// without a delay.
+fn delay_weighted(
+    data: &FrequencyData,
+    dt: f64,
+    unknowns: &Unknowns,
+    estimate: &Estimate,
+) -> Option<f64> {
+    let system = estimate.system().ok()?;
     let weight = |omega: &f64| {
         let unit = data.measured().per_displacement(*omega).norm();
         unit / system.dynamic_stiffness(*omega).norm()
     };
     let driven = driven(&data.force().map(|f| f.norm()));
     let weights = data.omega().iter().map(weight).collect();
-    let equations = DelayedForce::weighted(&windowed, weights, unknowns, &driven)?;
+    let equations = DelayedForce::weighted(data, weights, unknowns, &driven)?;
     delay_of_equations(&equations, dt, &driven)
+}
+
+/// Returns the delay, in s, with which the equations of motion of frequency responses fit best, each line weighted by the
+/// dynamic stiffness of an estimate; `None` where the data leave a parameter open.
+///
+/// # Source
+/// As [`delay_of_lines`].
+pub fn delay_of_responses(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    estimate: &Estimate,
+) -> Option<f64> {
+    // Half a period of the highest line: the sampling interval that has just these lines.
+    let dt = PI / data.omega().iter().copied().fold(0.0, f64::max);
+    Some(dt * delay_weighted(data, dt, unknowns, estimate)?)
 }
 
 /// Returns whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.

@@ -95,6 +95,8 @@ findings! {
     Clipping in clipping,
     /// A channel has the same value in all samples.
     ConstantChannel in constant_channel,
+    /// Every value of a frequency response is real and positive.
+    ConstantPhase in constant_phase,
     /// A channel has a few equally spaced values only.
     Quantisation in quantisation,
     /// One sample of a channel stands far outside its neighbours.
@@ -107,6 +109,8 @@ findings! {
     PowerFlow in power,
     /// Force and response are shifted in time.
     Delay in delay,
+    /// Another model that explains what the fit leaves.
+    Alternative in alternative,
     /// Difference of an estimate from another that noise on the response does not bias.
     Bias in bias,
     /// A free response of the identified system grows.

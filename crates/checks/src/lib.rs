@@ -17,7 +17,9 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 
+mod acquisition;
 mod after;
+mod alternative;
 mod before;
 mod bias;
 mod clipping;
@@ -25,6 +27,7 @@ mod coherence;
 mod concentration;
 mod conditioning;
 mod constant_channel;
+mod constant_phase;
 mod cross_correlation;
 mod delay;
 mod digits;
@@ -72,16 +75,22 @@ mod whiteness;
 
 use std::fmt;
 
+pub use acquisition::fault_of_acquisition;
 pub use after::after_fit;
+pub use alternative::{Alternative, Cause, ModelledResponses, better_model};
 pub use before::{before_equation_of_motion, before_fit};
 pub use bias::{Bias, Reference};
 pub use clipping::{Clipping, clipped_channels};
 pub use coherence::{Coherence, coherence};
 pub use conditioning::Conditioning;
 pub use constant_channel::{ConstantChannel, constant_channels};
+pub use constant_phase::{ConstantPhase, constant_phase};
 pub use cross_correlation::CrossCorrelation;
 pub use delay::Delay;
-pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines, delay_of_open_records};
+pub use delay::{
+    delay_at_samples, delay_between_samples, delay_of_lines, delay_of_open_records,
+    delay_of_responses,
+};
 pub use distortion::Distortion;
 pub use distortion::distortion_of_periods;
 pub use drop_out::{DropOut, dropped_channels};
@@ -115,7 +124,7 @@ pub use power::power;
 pub use prior::PriorAgreement;
 pub use quantisation::{Quantisation, quantised_channels};
 pub use regressors::noise_on_response;
-pub use response_residual::after_response_fit;
+pub use response_residual::{after_response_fit, after_table_fit};
 pub use seam::{Seam, periodicity, periodicity_across};
 pub use search::SearchAgreement;
 pub use spectral::{before_spectral_fit, steady_periods};
@@ -192,6 +201,8 @@ pub enum Subject {
     Leakage,
     /// Delay between force and response.
     Delay,
+    /// Another model that explains what the fit leaves.
+    Alternative,
     /// Bias of the estimate by noise on the response.
     Bias,
     /// Free responses of the identified system that grow.
@@ -230,6 +241,7 @@ impl fmt::Display for Subject {
             Subject::Coherence => "coherence",
             Subject::Leakage => "leakage",
             Subject::Delay => "delay",
+            Subject::Alternative => "alternative",
             Subject::Bias => "bias",
             Subject::Instability => "instability",
             Subject::Mass => "mass",

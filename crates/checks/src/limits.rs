@@ -161,7 +161,8 @@ pub(crate) const DELAY_PROMISING: f64 = 0.5;
 /// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
 pub(crate) const DELAY_PREFERRED: f64 = 0.99;
 
-/// Distance of a gain from 1, in its standard errors, that noise does not reach.
+/// Distance of a gain from 1, or of a fault of the acquisition from none, in its standard errors, that noise does not
+/// reach.
 pub(crate) const STANDARD_ERRORS: f64 = 4.0;
 
 /// Maximum number of sensitivities, residuals times parameters; of larger fits the errors of the estimate are left in
@@ -204,8 +205,11 @@ pub(crate) const FORCE_FLOOR: f64 = 1e-3;
 /// Minimum number of samples per unknown.
 pub(crate) const SAMPLES_PER_UNKNOWN: usize = 4;
 
-/// 1 − coherence, below which it is rounding.
+/// 1 − coherence (median over the lines), below which it is rounding.
 pub(crate) const RESPONSE_ROUNDING: f64 = 1e-10;
+
+/// Distance of the lines, in lines, that Hann's window correlates, the custom of analysers.
+pub(crate) const WINDOW_REACH: usize = 2;
 
 /// Maximum number of distances between lines at which residuals are correlated.
 pub(crate) const MAX_DISTANCES: usize = 12;
@@ -260,3 +264,9 @@ pub const DROP_OUT_MOTION: f64 = 10.0;
 
 /// Probability at which a run of equal samples is a drop-out: those that are have far smaller ones.
 pub const DROP_OUT_LEVEL: f64 = 1e-4;
+
+/// Maximum number of rounds in which the corner frequency of a coupled channel is refined.
+pub(crate) const ACQUISITION_ROUNDS: usize = 4;
+
+/// Difference of corner frequencies over the lowest line by which the effect of a high-pass is differentiated.
+pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;

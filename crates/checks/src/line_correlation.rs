@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
 
 /// Correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l + d), less
-/// their expectation, at the distances d = 1, 2 … in lines; `explained` are orthonormal columns of
+/// their expectation, at the distances d = `first`, `first` + 1 … in lines; `explained` are orthonormal columns of
 /// what the parameters explain. `None` if there are too few lines or the residual is zero.
 ///
 /// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
@@ -18,9 +18,10 @@ use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
 pub(crate) fn correlation_of_lines(
     residual: &[Complex<f64>],
     explained: &[Vec<Complex<f64>>],
+    first: usize,
 ) -> Option<Correlation> {
-    let last = MAX_DISTANCES.min(residual.len() / LINES_PER_CORRELATION);
-    if last == 0 {
+    let last = (first + MAX_DISTANCES - 1).min(residual.len() / LINES_PER_CORRELATION);
+    if last < first {
         return None;
     }
     let product = |r: &[Complex<f64>], distance: usize| -> Complex<f64> {
@@ -38,15 +39,15 @@ pub(crate) fn correlation_of_lines(
         powers.iter().zip(&powers[distance..]).map(|(a, b)| a * b).sum()
     };
     let (mut coefficients, mut statistic) = (Vec::new(), 0.0);
-    for distance in 1..=last {
+    for distance in first..=last {
         let expected: Complex<f64> = explained.iter().map(|q| product(q, distance)).sum();
         let deviation = product(residual, distance) + expected * unit;
         coefficients.extend([deviation.re / power, deviation.im / power]);
         statistic += deviation.norm_sqr() / variance(distance);
     }
     let mut square = 0.0;
-    for a in 1..=last {
-        for b in 1..=last {
+    for a in first..=last {
+        for b in first..=last {
             square += covariance_of_squares(&powers, a, b) / (variance(a) * variance(b));
         }
     }
@@ -55,7 +56,7 @@ pub(crate) fn correlation_of_lines(
         bound: 1.96 * (0.5 / residual.len() as f64).sqrt(),
         statistic,
         // A square of a complex number is half a sum of two.
-        p_value: share_above_of(statistic, last as f64, 0.5 * square),
+        p_value: share_above_of(statistic, (last + 1 - first) as f64, 0.5 * square),
     })
 }
 

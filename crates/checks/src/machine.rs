@@ -73,7 +73,8 @@ pub fn whiteness_of_lines(
         };
         let explained: Vec<Vec<Complex<f64>>> =
             estimate.explained.column_iter().map(|q| complex(q.as_slice())).collect();
-        let correlation = correlation_of_lines(&complex(estimate.residual.as_slice()), &explained)?;
+        let correlation =
+            correlation_of_lines(&complex(estimate.residual.as_slice()), &explained, 1)?;
         Some(Finding::Whiteness(Whiteness {
             residual: Residual::Lines { residual },
             test: CorrelationTest::new(&correlation, false),

@@ -2,14 +2,20 @@
 
 use mechid_estimate::frequency_domain::in_units_of_noise;
 use mechid_estimate::{Estimate, EstimateError};
+use mechid_signal::Extent;
 use mechid_signal::correlation::{Correlation, correlated, share_above_of};
+use mechid_spectra::FrequencyData;
 use mechid_spectra::frf::Frf;
 use nalgebra::{Complex, DMatrix};
 
 use super::finding::Finding;
-use super::limits::{LINES_PER_DISTANCE, MAX_DISTANCES, RESPONSE_PAIRS, RESPONSE_ROUNDING};
+use super::limits::{
+    LINES_PER_DISTANCE, MAX_DISTANCES, RESPONSE_PAIRS, RESPONSE_ROUNDING, WINDOW_REACH,
+};
 use super::misfit::{Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
+use super::spectral_residual::SpectralResidual;
+use super::weighted_fit::{AfterSpectralFit, after_spectral_fit};
 use super::whiteness::{Residual, Whiteness};
 
 /// Tests whether the residual of an estimate on frequency responses has the power that follows from
@@ -54,6 +60,38 @@ pub fn after_response_fit(
         }
     }
     Ok(findings)
+}
+
+/// Tests the residual of an estimate on tables of frequency responses against the noise of their standard errors, where
+/// all `columns` state it ([`Finding::Misfit`]), and for correlation of lines that no window of an analyser correlates
+/// ([`Finding::Whiteness`]). A column has the responses to a force at one degree of freedom. Returns the findings of
+/// each column.
+///
+/// # Errors
+/// As [`after_spectral_fit`].
+///
+/// # Source
+/// That of [`SpectralResidual::findings`](super::SpectralResidual::findings).
+pub fn after_table_fit(
+    columns: &[(FrequencyData, usize)],
+    estimate: &Estimate,
+) -> Result<Vec<Vec<Finding>>, EstimateError> {
+    let data: Vec<FrequencyData> = columns.iter().map(|(data, _)| data.clone()).collect();
+    let AfterSpectralFit { records, .. } =
+        after_spectral_fit(&data, estimate, Extent::WholePeriod)?;
+    let of_column = |(residual, (_, force)): (&SpectralResidual, &(FrequencyData, usize))| {
+        let mut findings = Vec::from_iter(residual.misfit(NoiseSource::Stated));
+        for response in 0..residual.dof() {
+            let distance = WINDOW_REACH + 1;
+            if let Some(correlation) = residual.line_to_line(response, distance) {
+                let test = CorrelationTest::new(&correlation, residual.is_rounding());
+                let residual = Residual::FrequencyResponse { response, force: *force, distance };
+                findings.push(Finding::Whiteness(Whiteness { residual, test, span: None }));
+            }
+        }
+        findings
+    };
+    Ok(records.iter().zip(columns).map(of_column).collect())
 }
 
 /// Mean and variance of a weighted residual power if only noise is left.

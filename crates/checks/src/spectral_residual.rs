@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use mechid_signal::correlation::{Correlation, share_above_of};
-use mechid_spectra::{FrequencyData, NoiseSpectrum};
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
@@ -111,9 +111,7 @@ impl SpectralResidual {
         if free < FREE_RESIDUALS {
             return findings;
         }
-        if self.noise_stated && !self.rounding {
-            findings.extend(self.data.noise().and_then(|noise| self.misfit(noise)));
-        }
+        findings.extend(self.misfit(NoiseSource::Periods));
         if let Some((ratio, p_value)) = self.force_decides {
             let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
             findings.push(Finding::Misfit(Misfit { ratio, p_value, source, concentration: None }));
@@ -122,7 +120,7 @@ impl SpectralResidual {
         let of_forces: Vec<Vec<Option<Correlation>>> =
             (0..dof).into_par_iter().map(|force| self.with_force(force)).collect();
         let whiteness = |residual: usize| {
-            self.line_to_line(residual).map(|correlation| {
+            self.line_to_line(residual, 1).map(|correlation| {
                 Finding::Whiteness(Whiteness {
                     residual: Residual::Lines { residual },
                     test: CorrelationTest::new(&correlation, self.rounding),
@@ -162,13 +160,35 @@ impl SpectralResidual {
         }
     }
 
+    /// Returns whether the residual is no more than rounding.
+    pub(super) fn is_rounding(&self) -> bool {
+        self.rounding
+    }
+
+    /// Returns the weighted residual less the part that the parameters explain.
+    pub(super) fn values(&self) -> &DVector<f64> {
+        &self.values
+    }
+
+    /// Returns orthonormal columns that the parameters and the ends of the record explain.
+    pub(super) fn explained(&self) -> &DMatrix<f64> {
+        &self.explained
+    }
+
+    /// Returns the standard deviation of each residual, from its own size.
+    pub(super) fn deviations(&self) -> &DVector<f64> {
+        &self.deviations
+    }
+
     /// Number of degrees of freedom, each with a channel of the residual and one of the force.
     pub fn dof(&self) -> usize {
         self.data.dof()
     }
 
-    /// Residual power against its expectation for noise of covariances sampled from few periods.
-    fn misfit(&self, noise: &NoiseSpectrum) -> Option<Finding> {
+    /// Residual power against its expectation for the noise of a source, such as covariances sampled from few
+    /// periods.
+    pub(super) fn misfit(&self, source: NoiseSource) -> Option<Finding> {
+        let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
         let (n, rows) = (self.data.dof() as f64, self.data.len() as f64);
         let nu = noise.degrees_of_freedom();
         // Rows with a common covariance make one statistic.
@@ -205,10 +225,12 @@ impl SpectralResidual {
             Some(_) => power_of(&self.values, &self.explained).2,
             None => above,
         };
-        let p_value = PValue::of((2.0 * above.min(below)).min(1.0));
+        let p_value = PValue::of(match source {
+            NoiseSource::Periods => (2.0 * above.min(below)).min(1.0),
+            _ => above,
+        });
         let is_excess = p_value.is_significant() && power > mean;
         let concentration = self.concentration.clone().filter(|_| is_excess);
-        let source = NoiseSource::Periods;
         Some(Finding::Misfit(Misfit { ratio: power / mean, p_value, source, concentration }))
     }
 
@@ -224,8 +246,8 @@ impl SpectralResidual {
         2 * (self.data.dof() * line + channel)
     }
 
-    /// Correlation of the residual of a channel from line to line. `None` if there are too few lines or the
-    /// residual is zero.
+    /// Correlation of the residual of a channel from line to line, at a distance of `first` lines (at least 1) or
+    /// more. `None` if there are too few lines or the residual is zero.
     ///
     /// # Panics
     /// If there is no such channel.
@@ -233,7 +255,7 @@ impl SpectralResidual {
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
     /// validation; White (1980), Econometrica 48, 817–838, for the variance.
-    pub fn line_to_line(&self, channel: usize) -> Option<Correlation> {
+    pub fn line_to_line(&self, channel: usize, first: usize) -> Option<Correlation> {
         let rows: Vec<usize> =
             self.ascending().into_iter().map(|line| self.row(line, channel)).collect();
         let complex = |values: &[f64]| -> Vec<Complex<f64>> {
@@ -242,7 +264,7 @@ impl SpectralResidual {
         let residual = complex(self.values.as_slice());
         let explained: Vec<Vec<Complex<f64>>> =
             self.explained.column_iter().map(|q| complex(q.as_slice())).collect();
-        correlation_of_lines(&residual, &explained)
+        correlation_of_lines(&residual, &explained, first)
     }
 
     /// Correlation of the residual of each channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of

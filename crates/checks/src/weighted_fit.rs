@@ -124,7 +124,7 @@ impl Linearised {
 }
 
 /// Records of a fit with what weighs their residuals.
-struct Weighing<'a> {
+pub(super) struct Weighing<'a> {
     records: &'a [FrequencyData],
     estimate: &'a Estimate,
     relations: Option<Relations>,
@@ -138,7 +138,11 @@ struct Weighing<'a> {
 }
 
 impl<'a> Weighing<'a> {
-    fn new(records: &'a [FrequencyData], estimate: &'a Estimate, extent: Extent) -> Option<Self> {
+    pub(super) fn new(
+        records: &'a [FrequencyData],
+        estimate: &'a Estimate,
+        extent: Extent,
+    ) -> Option<Self> {
         let noise = records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
         let relations = Relations::of(estimate.unknowns());
@@ -196,6 +200,28 @@ impl<'a> Weighing<'a> {
             true => Linearised::of(weighted),
             false => Some(Linearised::without_sensitivity(weighted, values.len())),
         }
+    }
+
+    /// Returns the weighted residual of other data of a record, of the estimate.
+    pub(super) fn residual_of(&self, at: usize, data: &FrequencyData) -> Option<DVector<f64>> {
+        let (entries, unknowns) = (DVector::from_vec(self.entries()), self.estimate.unknowns());
+        let covariance = |row: usize| self.covariance(at, row);
+        Some(Whitened::residual_of(data, unknowns, &entries, covariance)?.residual)
+    }
+
+    /// Returns the least power of the residual of other data of the same records, in the weights of these.
+    pub(super) fn least_power(&self, records: &[FrequencyData]) -> Option<f64> {
+        let other = Weighing {
+            records,
+            estimate: self.estimate,
+            relations: Relations::of(self.estimate.unknowns()),
+            noise: self.noise.clone(),
+            levels: self.levels.clone(),
+            small: self.small,
+            extent: self.extent,
+        };
+        let (_, linear) = other.settled()?;
+        Some(linear.power() - linear.coefficients.norm_squared())
     }
 
     /// Returns the parameters after some Gauss–Newton steps, and the residuals there.

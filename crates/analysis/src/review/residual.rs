@@ -99,7 +99,7 @@ fn of_samples(residual: &fitted::SampleResidual) -> Result<Vec<Correlations>, An
 
 fn of_lines(residual: &SpectralResidual) -> Vec<Correlations> {
     let empty = |channel: usize| Correlations {
-        own: residual.line_to_line(channel).map(OwnCorrelation::Lines),
+        own: residual.line_to_line(channel, 1).map(OwnCorrelation::Lines),
         lag: residual.lag(),
         forces: Vec::new(),
     };

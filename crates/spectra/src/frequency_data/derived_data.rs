@@ -19,6 +19,35 @@ impl FrequencyData {
         closed
     }
 
+    /// Returns the same data with other forces (N), rows × n.
+    #[must_use]
+    pub fn with_force(&self, force: DMatrix<Complex<f64>>) -> Self {
+        Self { force, ..self.clone() }
+    }
+
+    /// Returns the same data as if all channels passed the first-order high-pass of a corner frequency (rad/s) that those of
+    /// some `responses` and `forces`, counted from 0, have passed already: alike in all channels it leaves the
+    /// system as it is, and amplifies no noise.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 2 (first-order systems).
+    #[must_use]
+    pub fn with_high_pass_alike(&self, responses: &[usize], forces: &[usize], corner: f64) -> Self {
+        let mut data = self.clone();
+        for (row, omega) in self.omega.iter().enumerate() {
+            let gain = Complex::new(1.0, -corner / omega).inv();
+            for channel in 0..self.dof() {
+                if !responses.contains(&channel) {
+                    data.displacement[(row, channel)] *= gain;
+                }
+                if !forces.contains(&channel) {
+                    data.force[(row, channel)] *= gain;
+                }
+            }
+        }
+        data
+    }
+
     /// Returns the same data with other displacements (m), rows × n.
     #[must_use]
     pub fn with_displacement(&self, displacement: DMatrix<Complex<f64>>) -> Self {

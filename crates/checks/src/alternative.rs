@@ -1,0 +1,211 @@
+//! Another model that explains what a fit leaves.
+
+use std::fmt::{self, Formatter};
+
+use mechid_model::{Discretisation, ResponseQuantity};
+use nalgebra::{Complex, DMatrix};
+
+use super::digits::three_digits;
+use super::finding::{Channel, Check, Names};
+use super::limits::{DELAY_REMAINING, SIGNIFICANCE, WINDOW_REACH};
+use super::line_correlation::correlation_of_lines;
+use super::{Subject, Verdict};
+
+/// Another model explains what the fit leaves.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Alternative {
+    /// What differs from the model that was fitted.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub cause: Cause,
+    /// Fraction of the residual's power that is left with the other model.
+    pub remaining: f64,
+}
+
+/// Difference of another model from the one that was fitted.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "cause", rename_all = "snake_case")
+)]
+#[non_exhaustive]
+pub enum Cause {
+    /// The response is late.
+    Delay {
+        /// Delay, in s; negative if the response is early.
+        seconds: f64,
+    },
+    /// Damping forces in phase with the velocity that do not grow with the frequency.
+    StructuralDamping {
+        /// Loss factor, a ratio.
+        loss_factor: f64,
+    },
+    /// The responses are those of another quantity than stated.
+    Quantity {
+        /// Quantity of the responses that fits.
+        quantity: ResponseQuantity,
+        /// Quantity that was stated.
+        stated: ResponseQuantity,
+    },
+    /// The magnitudes are levels in dB.
+    Decibels,
+    /// The force is held or linear between its samples.
+    BetweenSamples {
+        /// Course of the force.
+        between_samples: Discretisation,
+    },
+    /// Channels pass a first-order high-pass.
+    AcCoupling {
+        /// The channels.
+        channels: Vec<Channel>,
+        /// Corner frequency, in Hz.
+        corner_hz: f64,
+    },
+}
+
+impl Check for Alternative {
+    fn subject(&self) -> Subject {
+        match self.cause {
+            Cause::Delay { .. } => Subject::Delay,
+            _ => Subject::Alternative,
+        }
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::Bad
+    }
+
+    fn value(&self) -> f64 {
+        self.remaining
+    }
+
+    fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        match &self.cause {
+            Cause::Delay { seconds } => {
+                let direction = if *seconds > 0.0 { "late" } else { "early" };
+                write!(f, "the response is {:.3e} s {direction}", seconds.abs())?;
+            }
+            Cause::StructuralDamping { loss_factor } => write!(
+                f,
+                "structural damping with a loss factor of {} explains the responses: the damping force does not grow \
+                 with the frequency",
+                three_digits(*loss_factor)
+            )?,
+            Cause::Quantity { quantity, stated } => {
+                write!(f, "the responses are those of {quantity} per force, not of {stated}")?;
+            }
+            Cause::Decibels => f.write_str("the magnitudes are levels in dB")?,
+            Cause::BetweenSamples { between_samples: Discretisation::ZeroOrderHold } => {
+                f.write_str("the force is held between its samples")?;
+            }
+            Cause::BetweenSamples { .. } => {
+                f.write_str("the force is linear between its samples")?
+            }
+            Cause::AcCoupling { channels, corner_hz } => {
+                let names = channels.iter().map(|channel| names.channel(*channel));
+                let corner_hz = three_digits(*corner_hz);
+                let names = names.collect::<Vec<_>>().join(", ");
+                write!(f, "AC coupling: a first-order high-pass at {corner_hz} Hz in {names}")?;
+            }
+        }
+        let percent = match 100.0 * self.remaining {
+            percent if percent < 0.01 => "less than 0.01".into(),
+            percent => format!("{percent:.2}"),
+        };
+        write!(f, "; with that {percent} % of the residual power remains. ")?;
+        f.write_str(match &self.cause {
+            Cause::Delay { .. } => {
+                "Possible causes: a filter, a scanning converter, a trigger; correct the phase of the responses"
+            }
+            Cause::StructuralDamping { .. } => {
+                "Viscous damping has the same effect near one resonance: choose a narrow band (`band_hz`)"
+            }
+            Cause::Quantity { .. } => "State what was measured (`quantity`)",
+            Cause::Decibels => "State the unit in the header, as in magnitude [dB]",
+            Cause::BetweenSamples { .. } => {
+                "Records from a simulation are like that: state it with `between_samples`"
+            }
+            Cause::AcCoupling { .. } => {
+                "State it with `ac_coupling`, or couple all channels alike"
+            }
+        })
+    }
+}
+
+/// Responses that were measured and those of a model, rows × channels in the unit of the former.
+#[derive(Debug, Clone)]
+pub struct ModelledResponses {
+    /// Measured responses.
+    pub measured: DMatrix<Complex<f64>>,
+    /// Modelled responses.
+    pub modelled: DMatrix<Complex<f64>>,
+    /// Logarithm of the area of the measured responses per area of the original ones (pure number); 0 unless the numbers
+    /// were converted.
+    pub log_area: f64,
+}
+
+impl ModelledResponses {
+    /// Returns the residual power, weighted by the `deviation` of the noise.
+    fn power(&self, deviation: Option<&DMatrix<f64>>) -> f64 {
+        weighted(&(&self.measured - &self.modelled), deviation).norm_squared()
+    }
+
+    /// Returns the residual power over that of the measured responses.
+    fn unexplained(&self, deviation: Option<&DMatrix<f64>>) -> f64 {
+        self.power(deviation) / weighted(&self.measured, deviation).norm_squared()
+    }
+
+    /// Returns whether the residual of no channel is correlated from line to line within rising `omega` (rad/s).
+    fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
+        let residual = weighted(&(&self.measured - &self.modelled), deviation);
+        let first = |row: &usize| *row == 0 || omega[*row] < omega[row - 1];
+        let starts: Vec<usize> = (0..omega.len()).filter(first).collect();
+        let ends = starts.iter().skip(1).copied().chain([omega.len()]);
+        let sweeps: Vec<(usize, usize)> = starts.iter().copied().zip(ends).collect();
+        let count = (sweeps.len() * residual.ncols()) as f64;
+        residual.column_iter().all(|channel| {
+            sweeps.iter().all(|(start, end)| {
+                let lines = &channel.as_slice()[*start..*end];
+                let correlation = correlation_of_lines(lines, &[], WINDOW_REACH + 1);
+                correlation.is_none_or(|c| c.p_value * count > SIGNIFICANCE)
+            })
+        })
+    }
+}
+
+fn weighted(z: &DMatrix<Complex<f64>>, deviation: Option<&DMatrix<f64>>) -> DMatrix<Complex<f64>> {
+    match deviation {
+        Some(deviation) => z.zip_map(deviation, |z, deviation| z / deviation),
+        None => z.clone(),
+    }
+}
+
+/// Returns which of `others` explains the responses best, and the fraction of the residual power of `fitted` that it
+/// leaves. `None` unless it is more likely than the model fitted, and leaves noise or less than a quarter of
+/// the residual power. `omega` (rad/s) belongs to the rows, `deviation` is that of the noise where it is known, in
+/// the unit of the original responses.
+///
+/// # Source
+/// The likelihood of complex normal noise of unknown level; the limits are ours.
+pub fn better_model(
+    omega: &[f64],
+    deviation: Option<&DMatrix<f64>>,
+    fitted: &ModelledResponses,
+    others: &[ModelledResponses],
+) -> Option<(usize, f64)> {
+    // A converted response has another noise than that of its original.
+    let deviation_of =
+        |model: &ModelledResponses| deviation.filter(|_| model.measured == fitted.measured);
+    let evidence = |model: &ModelledResponses| {
+        let power = |responses: &ModelledResponses| responses.power(deviation_of(model));
+        model.log_area + model.measured.len() as f64 * (power(fitted) / power(model)).ln()
+    };
+    let each = others.iter().enumerate().map(|(at, model)| (at, model, evidence(model)));
+    let (at, model, evidence) =
+        each.filter(|each| !each.2.is_nan()).max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let own = deviation_of(model);
+    let remaining = model.unexplained(own) / fitted.unexplained(own);
+    let explains = remaining <= DELAY_REMAINING || model.is_white(omega, own);
+    (evidence > -SIGNIFICANCE.ln() && remaining < 1.0 && explains).then_some((at, remaining))
+}
