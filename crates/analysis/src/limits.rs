@@ -111,3 +111,7 @@ pub(crate) const PRIOR_SHARE: f64 = 0.5;
 
 /// Relative difference up to which two frequencies of tables are one: tables are printed with some digits.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
+
+/// 1 − coherence (median over the lines) below which a table states no noise: the digits of a file, or a coherence that
+/// was never computed.
+pub const COHERENCE_OF_ONE: f64 = 1e-6;

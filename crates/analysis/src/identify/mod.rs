@@ -7,6 +7,7 @@
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `tables`, `tabulated` | frequency responses that were measured elsewhere, and such tables as data |
+//! | `other_models` | delay, structural damping, another quantity: models that may explain such tables better |
 //! | `nonlinear`, `open_terms` | whole periods and open records with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
@@ -39,6 +40,7 @@ pub mod nonlinear;
 mod open_records;
 mod open_terms;
 pub mod options;
+mod other_models;
 pub mod prediction;
 mod remarks;
 mod response_settings;

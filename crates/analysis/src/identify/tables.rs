@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_checks::{
-    Finding, adjust_p_values, before_spectral_fit, gain_symmetry, instability, mass_symmetry,
-    negative_mass,
+    Finding, Subject, Verdict, adjust_p_values, before_spectral_fit, constant_phase, gain_symmetry,
+    instability, mass_symmetry, negative_mass, unrelated_response,
 };
 use mechid_estimate::frequency_domain::{equation_error, output_error_pooling};
 use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
@@ -17,6 +17,7 @@ use serde::Serialize;
 use super::added_decay;
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
+use super::other_models::better_model_of;
 use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
 use super::rows::{
@@ -31,6 +32,7 @@ use crate::machine::Machine;
 use crate::measurement::Channels;
 use crate::measurement::units::doubt;
 use crate::modal::{ShapedMode, shape_table};
+use crate::modes::resonances;
 use crate::text::{compact, paragraph, significant};
 
 /// Identifies the machine behind one or several tables of frequency responses, which are fitted
@@ -76,11 +78,19 @@ pub fn identify_responses(
         data = joined(&measured)?;
     }
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
-    let checks =
-        checks(tables, &measured, before, &fit, &of_machine, unscaled.is_some(), data.len())?;
+    let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
+    let fitted = OfFit { fit: &fit, of_machine: &of_machine, data: &data, unexplained };
+    let checks = fitted.checks(tables, &measured, how, before, unscaled.is_some())?;
     let estimate = &of_machine;
     let system = estimate.system()?;
-    let unexplained = unexplained_motion(&data, &fit.estimate.system()?)?;
+    let mut remarks = remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref());
+    if !checks.iter().any(|check| matches!(check.finding, Finding::Misfit(_))) {
+        remarks.extend(fit.misfit.map(|misfit| misfit.to_string()));
+    }
+    let is_left = |check: &CheckRow| check.is_conspicuous() && is_of_residual(&check.finding);
+    if checks.iter().any(is_left) && !checks.iter().any(CheckRow::is_bad) {
+        remarks.extend(resonances::surplus_of_tables(tables, how));
+    }
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
@@ -95,7 +105,7 @@ pub fn identify_responses(
         fit: fit.row(estimate, unexplained, how.method, data.len()),
         fitted_lines: None,
         checks,
-        remarks: remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref()),
+        remarks,
         system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
         covariance: carries_covariance(estimate).then(|| covariance(estimate, unscaled.as_ref())),
         unscaled,
@@ -104,42 +114,73 @@ pub fn identify_responses(
     Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
 }
 
-/// Returns the checks of the tables before and after the fit; `rows` are those of all tables together.
-fn checks(
-    tables: &[FrequencyResponses],
-    measured: &[Tabulated],
-    before: Vec<Finding>,
-    fit: &Fit,
-    of_machine: &Estimate,
-    is_unscaled: bool,
-    rows: usize,
-) -> Result<Vec<CheckRow>, AnalysisError> {
-    let mut findings: Vec<(When, Option<String>, Finding)> =
-        before.into_iter().map(|finding| (When::Before, None, finding)).collect();
-    let named = |table: &FrequencyResponses| (tables.len() > 1).then(|| table.file.clone());
-    for table in tables {
-        let doubts = table.doubts.iter();
-        let doubts = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
-        findings.extend(doubts.map(|finding| (When::Before, named(table), finding)));
-    }
-    let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
-    for (table, measured) in tables.iter().zip(measured) {
-        for (when, finding) in measured.findings(&fit.estimate, rows, settled)? {
-            findings.push((when, named(table), finding));
+/// A fit with the data that it was made of.
+struct OfFit<'a> {
+    fit: &'a Fit,
+    of_machine: &'a Estimate,
+    data: &'a FrequencyData,
+    /// Part of the response that the fit leaves, a ratio.
+    unexplained: Option<f64>,
+}
+
+impl OfFit<'_> {
+    /// Returns the checks of the tables before and after the fit.
+    fn checks(
+        &self,
+        tables: &[FrequencyResponses],
+        measured: &[Tabulated],
+        how: &IdentifyResponses,
+        before: Vec<Finding>,
+        is_unscaled: bool,
+    ) -> Result<Vec<CheckRow>, AnalysisError> {
+        let mut findings: Vec<(When, Option<String>, Finding)> =
+            before.into_iter().map(|finding| (When::Before, None, finding)).collect();
+        let named = |table: &FrequencyResponses| (tables.len() > 1).then(|| table.file.clone());
+        for table in tables {
+            let doubts = table.doubts.iter();
+            let doubts =
+                doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
+            let phases = table.functions.iter().filter_map(|f| {
+                constant_phase(&f.response, &f.reference, f.values.iter().copied())
+            });
+            let before = doubts.chain(phases);
+            findings.extend(before.map(|finding| (When::Before, named(table), finding)));
         }
+        let (fit, rows) = (self.fit, self.data.len());
+        let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
+        for (table, measured) in tables.iter().zip(measured) {
+            for (when, finding) in measured.findings(&fit.estimate, rows, settled)? {
+                findings.push((when, named(table), finding));
+            }
+        }
+        let is_left =
+            |finding: &Finding| finding.verdict() > Verdict::Good && is_of_residual(finding);
+        let mut after = Vec::new();
+        if findings.iter().any(|(_, _, finding)| is_left(finding)) {
+            after.extend(better_model_of(tables, how, self.data, &fit.estimate));
+        }
+        let unknowns = fit.estimate.unknowns();
+        let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));
+        let unrelated = |part| unrelated_response(part, 2 * rows, of_one);
+        after.extend(self.unexplained.and_then(unrelated));
+        after.extend(instability(&self.of_machine.modes()?));
+        if !is_unscaled {
+            after.extend(negative_mass(self.of_machine));
+            after.extend(mass_symmetry(self.of_machine));
+            after.extend(gain_symmetry(self.of_machine));
+        }
+        findings.extend(after.into_iter().map(|finding| (When::After, None, finding)));
+        adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
+        let row = |(when, name, finding): (When, Option<String>, Finding)| {
+            CheckRow::new(when, name, &finding, &Channels::default())
+        };
+        Ok(findings.into_iter().map(row).collect())
     }
-    let mut of_matrices = Vec::from_iter(instability(&of_machine.modes()?));
-    if !is_unscaled {
-        of_matrices.extend(negative_mass(of_machine));
-        of_matrices.extend(mass_symmetry(of_machine));
-        of_matrices.extend(gain_symmetry(of_machine));
-    }
-    findings.extend(of_matrices.into_iter().map(|finding| (When::After, None, finding)));
-    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
-    let row = |(when, name, finding): (When, Option<String>, Finding)| {
-        CheckRow::new(when, name, &finding, &Channels::default())
-    };
-    Ok(findings.into_iter().map(row).collect())
+}
+
+/// Returns whether a finding is about the residual of a fit.
+fn is_of_residual(finding: &Finding) -> bool {
+    matches!(finding.subject(), Subject::Misfit | Subject::Whiteness)
 }
 
 fn remarks(
@@ -162,7 +203,6 @@ fn remarks(
                     significant(rate, 4)
                 )
             }))
-            .chain(fit.misfit.map(|misfit| misfit.to_string()))
             .chain(fit.averaged.as_ref().and_then(blunted))
             .chain(of_covariance(of_machine))
             .collect()
@@ -359,7 +399,7 @@ struct Fit {
 }
 
 /// Returns the data of all tables, one after the other.
-fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
+pub(super) fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
     measured[1..].iter().try_fold(first.data.clone(), |data, next| Ok(data.and(&next.data)?))
 }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use mechid_checks::{Finding, after_response_fit, coherence, leakage};
+use mechid_checks::{Finding, after_response_fit, after_table_fit, coherence, leakage};
 use mechid_estimate::Estimate;
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
@@ -16,6 +16,7 @@ use super::checks::When;
 use super::response_settings::IdentifyResponses;
 use super::{Band, added_decay};
 use crate::AnalysisError;
+use crate::limits::COHERENCE_OF_ONE;
 
 /// Noise as a table states it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,6 +93,8 @@ pub(super) struct Tabulated {
     pub(super) data: FrequencyData,
     /// Responses with their coherence, to be checked, and the degrees of freedom of their forces.
     coherent: Coherent,
+    /// Responses to each force by itself with its degree of freedom, where no coherence states their noise.
+    columns: Vec<(FrequencyData, usize)>,
     /// Whether these are averages over segments of which window and number are known.
     is_averaged: bool,
     /// Remarks on what the table states and was not used.
@@ -117,7 +120,6 @@ impl Tabulated {
         };
         let response: Vec<_> =
             rows.iter().map(|row| matrix(&|function| function.values[*row])).collect();
-        let from_responses = FrequencyData::from_responses;
         let stated = functions.iter().flatten().all(|f| f.standard_error.is_some());
         let error = |f: &ResponseFunction, row: usize| match &f.standard_error {
             Some(errors) => Complex::from(errors[row]),
@@ -141,13 +143,30 @@ impl Tabulated {
             ));
         }
         let (errors, is_averaged) = (stated.then(errors), averaged.is_some());
-        if is_averaged || !stated {
+        let is_certain = !is_averaged && !stated && is_without_noise(table, &rows);
+        if is_certain {
+            remarks.push(format!(
+                "{}: a coherence of 1 states no noise; that of the residual was taken",
+                table.file
+            ));
+        }
+        if (is_averaged || !stated) && !is_certain {
             let tables = Columns { points: &points, forces: &forces, rows: &rows, measured };
             let coherent = tables.coherent(table, how, &response, averaged, errors.as_deref())?;
             if let Some(coherent) = coherent {
                 let data = joined(&coherent)?;
                 let noise = if stated { Noise::Stated } else { Noise::Coherence };
-                return Ok(Self { points, driven, noise, data, coherent, is_averaged, remarks });
+                let columns = Vec::new();
+                return Ok(Self {
+                    points,
+                    driven,
+                    noise,
+                    data,
+                    coherent,
+                    columns,
+                    is_averaged,
+                    remarks,
+                });
             }
         }
         if is_averaged {
@@ -156,9 +175,22 @@ impl Tabulated {
         let noise = if stated { Noise::Stated } else { Noise::Unknown };
         let variance: Option<Vec<_>> =
             errors.map(|errors| errors.iter().map(|e| e.map(|e| 2.0 * e * e)).collect());
-        let data = from_responses(&omega, &response, variance.as_deref(), measured, &driven)?;
-        let coherent = Vec::new();
-        Ok(Self { points, driven, noise, data, coherent, is_averaged: false, remarks })
+        let column = |(input, dof): (usize, &usize)| {
+            let of_input = |h: &DMatrix<Complex<f64>>| h.columns(input, 1).into_owned();
+            let response: Vec<_> = response.iter().map(of_input).collect();
+            let variance = variance.as_ref().map(|variance| {
+                variance.iter().map(|v| v.columns(input, 1).into_owned()).collect::<Vec<_>>()
+            });
+            let variance = variance.as_deref();
+            let data =
+                FrequencyData::from_responses(&omega, &response, variance, measured, &[*dof])?;
+            Ok((data, *dof))
+        };
+        let columns = driven.iter().enumerate().map(column);
+        let columns: Vec<_> = columns.collect::<Result<_, AnalysisError>>()?;
+        let data = together(columns.iter().map(|(data, _)| Ok(data.clone())))?;
+        let (coherent, is_averaged) = (Vec::new(), false);
+        Ok(Self { points, driven, noise, data, coherent, columns, is_averaged, remarks })
     }
 
     /// Returns the responses as averages over segments of which window and number are known, with the degrees of
@@ -188,6 +220,10 @@ impl Tabulated {
         settled: bool,
     ) -> Result<Vec<(When, Finding)>, AnalysisError> {
         let (mut findings, modes) = (Vec::new(), estimate.modes()?);
+        if !self.columns.is_empty() {
+            let after = after_table_fit(&self.columns, estimate)?.into_iter().flatten();
+            findings.extend(after.map(|finding| (When::After, finding)));
+        }
         for (frf, driven) in &self.coherent {
             let share = (driven.len() * frf.omega().len()) as f64 / all as f64;
             let fitted = share * estimate.parameters().len() as f64;
@@ -297,15 +333,23 @@ pub(super) type Coherent = Vec<(Frf, Vec<usize>)>;
 
 /// Returns responses, one after the other, as data of one fit.
 fn joined(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
-    let mut data: Option<FrequencyData> = None;
-    for (frf, dofs) in coherent {
-        let one = frf.data(dofs)?;
-        data = Some(match data {
-            None => one,
-            Some(before) => before.and(&one)?,
-        });
-    }
-    data.ok_or(AnalysisError::NoRecord)
+    together(coherent.iter().map(|(frf, dofs)| Ok(frf.data(dofs)?)))
+}
+
+/// Returns data, one after the other, as those of one fit.
+fn together(
+    mut each: impl Iterator<Item = Result<FrequencyData, AnalysisError>>,
+) -> Result<FrequencyData, AnalysisError> {
+    let first = each.next().ok_or(AnalysisError::NoRecord)??;
+    each.try_fold(first, |data, next| Ok(data.and(&next?)?))
+}
+
+/// Returns whether the coherences of a table are 1 but for rounding (their median on some rows).
+fn is_without_noise(table: &FrequencyResponses, rows: &[usize]) -> bool {
+    let values = table.coherence.iter().flat_map(|c| rows.iter().map(|row| c.values[*row]));
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).is_some_and(|median| 1.0 - median < COHERENCE_OF_ONE)
 }
 
 /// Segments that the responses of a table are averages over.

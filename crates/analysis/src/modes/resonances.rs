@@ -1,10 +1,14 @@
 //! Resonances beyond those that a machine with one degree of freedom for each response can have.
 
+use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_modal::{ModalSettings, identify_modes, initial_mode_count};
 use mechid_signal::message;
+use mechid_spectra::LineData;
 
 use super::settings::Places;
 use super::sources::Recorded;
+use super::tables::Tables;
+use crate::identify::IdentifyResponses;
 use crate::measurement::Measurement;
 use crate::text::compact;
 
@@ -16,12 +20,33 @@ const LISTED: usize = 8;
 pub(crate) fn surplus(measurements: &[Measurement]) -> Option<String> {
     let recorded = Recorded::from_forced(measurements, None, &Places::default()).ok()?;
     let responses = recorded.outputs.len();
-    let data = recorded.lines(recorded.driven_band()).ok()?;
+    surplus_of(&recorded.lines(recorded.driven_band()).ok()?, responses)
+}
+
+/// Returns the sentence of [`surplus`] for tables of frequency responses.
+pub(crate) fn surplus_of_tables(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+) -> Option<String> {
+    let mut tables = tables.to_vec();
+    if !how.points.is_empty() {
+        let is_chosen = |f: &ResponseFunction| {
+            [&f.response, &f.reference].iter().all(|p| how.points.contains(p))
+        };
+        tables.iter_mut().for_each(|table| table.functions.retain(is_chosen));
+    }
+    let tables = Tables::new(&tables, how.quantity).ok()?;
+    let band = how.band.map_or(tables.range_hz(), |band| [band.low_hz, band.high_hz]);
+    surplus_of(&tables.lines(band, None).ok()?, tables.responses.len())
+}
+
+/// Returns the sentence if some lines show more modes than there are `responses`.
+fn surplus_of(data: &LineData, responses: usize) -> Option<String> {
     // Most records have none, which the start of the search shows in a fraction of its time.
-    if initial_mode_count(&data).ok()? <= responses {
+    if initial_mode_count(data).ok()? <= responses {
         return None;
     }
-    let estimate = identify_modes(&data, &ModalSettings::default()).ok()?;
+    let estimate = identify_modes(data, &ModalSettings::default()).ok()?;
     let modes = estimate.modes();
     if modes.len() <= responses {
         return None;

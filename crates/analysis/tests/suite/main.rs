@@ -17,6 +17,7 @@ mod headlines;
 mod modal;
 mod modes;
 mod nonlinear;
+mod other_models;
 mod parts;
 mod random;
 mod reading;

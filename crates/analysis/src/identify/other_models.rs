@@ -1,0 +1,168 @@
+//! Models that may explain tables of frequency responses better than viscous damping, no delay and the stated quantity.
+
+use mechid_checks::{
+    Alternative, Cause, Finding, ModelledResponses, better_model, delay_of_responses,
+};
+use mechid_estimate::Estimate;
+use mechid_estimate::frequency_domain::{output_error_pooling, structural_damping};
+use mechid_io::FrequencyResponses;
+use mechid_model::ResponseQuantity;
+use mechid_spectra::{FrequencyData, Pooling};
+use nalgebra::{Complex, DMatrix};
+
+use super::response_settings::IdentifyResponses;
+use super::tables::joined;
+use super::tabulated::Tabulated;
+
+/// Rounds of a delay and a fit with it.
+const DELAY_ROUNDS: usize = 2;
+
+/// Decibels per unit of the natural logarithm of a magnitude.
+const DECIBELS: f64 = 20.0 / std::f64::consts::LN_10;
+
+/// Largest level, in dB, that a magnitude read from a file may stand for.
+const MAX_LEVEL: f64 = 400.0;
+
+/// Returns the model that explains the responses of tables far better than an `estimate` on their `data`, if there is one:
+/// with a delay, with structural damping, of another quantity, or of magnitudes that are levels.
+pub(super) fn better_model_of(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    data: &FrequencyData,
+    estimate: &Estimate,
+) -> Option<Finding> {
+    let likely = output_error_pooling(data, estimate.unknowns(), Pooling::AllLines).ok();
+    let estimate = likely.as_ref().map_or(estimate, |likely| &likely.estimate);
+    let fitted = modelled(data, data, estimate)?;
+    let (mut causes, mut models) = (Vec::new(), Vec::new());
+    let mut add = |cause, model| {
+        causes.push(cause);
+        models.push(model);
+    };
+    if let Some((seconds, model)) = delayed(data, estimate) {
+        add(Cause::Delay { seconds }, model);
+    }
+    if let Some(fit) = structural_damping(data, estimate.unknowns()) {
+        let model = in_measured_quantity(data, &fit.displacement);
+        let model = ModelledResponses { modelled: model, ..fitted.clone() };
+        add(Cause::StructuralDamping { loss_factor: fit.loss_factor }, model);
+    }
+    if tables.iter().all(|table| table.added_decay.is_none()) {
+        let stated = data.measured();
+        for quantity in ResponseQuantity::ALL.into_iter().filter(|other| *other != stated) {
+            let model = refitted(tables, how, quantity, estimate, &|z| z);
+            model.into_iter().for_each(|model| add(Cause::Quantity { quantity, stated }, model));
+        }
+        for sign in [1.0, -1.0] {
+            let model = of_levels(tables, how, stated, estimate, sign);
+            model.into_iter().for_each(|model| add(Cause::Decibels, model));
+        }
+    }
+    let deviation = deviation(data);
+    let (best, remaining) = better_model(data.omega(), deviation.as_ref(), &fitted, &models)?;
+    Some(Finding::Alternative(Alternative { cause: causes.swap_remove(best), remaining }))
+}
+
+/// Displacements in the quantity measured.
+fn in_measured_quantity(
+    data: &FrequencyData,
+    displacement: &DMatrix<Complex<f64>>,
+) -> DMatrix<Complex<f64>> {
+    let unit = |row: usize| data.measured().per_displacement(data.omega()[row]);
+    DMatrix::from_fn(data.len(), data.dof(), |row, channel| {
+        displacement[(row, channel)] * unit(row)
+    })
+}
+
+/// Returns the responses of some data and those of an estimate to the forces of others.
+fn modelled(
+    data: &FrequencyData,
+    forces: &FrequencyData,
+    estimate: &Estimate,
+) -> Option<ModelledResponses> {
+    let system = estimate.system().ok()?;
+    let mut displacement = DMatrix::zeros(data.len(), data.dof());
+    for (row, omega) in data.omega().iter().enumerate() {
+        let force = forces.force().row(row).transpose();
+        let response = system.receptance(*omega).ok()? * force;
+        displacement.row_mut(row).copy_from(&response.transpose());
+    }
+    Some(ModelledResponses {
+        measured: in_measured_quantity(data, data.displacement()),
+        modelled: in_measured_quantity(data, &displacement),
+        log_area: 0.0,
+    })
+}
+
+/// Standard deviation of the noise of each response in the quantity measured; `None` where it is not known, or zero.
+fn deviation(data: &FrequencyData) -> Option<DMatrix<f64>> {
+    let noise = data.noise()?;
+    let deviation = DMatrix::from_fn(data.len(), data.dof(), |row, channel| {
+        let unit = data.measured().per_displacement(data.omega()[row]).norm();
+        noise.covariance(row)[(channel, channel)].re.sqrt() * unit
+    });
+    deviation.iter().all(|deviation| *deviation > 0.0).then_some(deviation)
+}
+
+/// Returns the delay that fits best, in s, and the responses with it.
+fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, ModelledResponses)> {
+    let (mut fit, mut seconds) = (estimate.clone(), 0.0);
+    for _ in 0..DELAY_ROUNDS {
+        seconds = delay_of_responses(data, estimate.unknowns(), &fit)?;
+        let late = data.with_later_force(seconds);
+        fit = output_error_pooling(&late, estimate.unknowns(), Pooling::AllLines).ok()?.estimate;
+    }
+    Some((seconds, modelled(data, &data.with_later_force(seconds), &fit)?))
+}
+
+/// Returns the responses of a fit to tables whose numbers are others of a quantity.
+fn refitted(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    quantity: ResponseQuantity,
+    estimate: &Estimate,
+    number: &dyn Fn(Complex<f64>) -> Complex<f64>,
+) -> Option<ModelledResponses> {
+    let how = IdentifyResponses { quantity: Some(quantity), ..how.clone() };
+    let one = |table: &FrequencyResponses| {
+        let mut other = table.clone();
+        for function in &mut other.functions {
+            function.quantity = Some(quantity);
+            function.values.iter_mut().for_each(|z| *z = number(*z));
+        }
+        Tabulated::of(&other, &how).ok()
+    };
+    let measured = tables.iter().map(one).collect::<Option<Vec<_>>>()?;
+    let data = joined(&measured).ok()?;
+    let fit = output_error_pooling(&data, estimate.unknowns(), Pooling::AllLines).ok()?;
+    modelled(&data, &data, &fit.estimate)
+}
+
+/// Returns the responses of a fit to tables whose magnitudes are levels of one sign in dB.
+fn of_levels(
+    tables: &[FrequencyResponses],
+    how: &IdentifyResponses,
+    quantity: ResponseQuantity,
+    estimate: &Estimate,
+    sign: f64,
+) -> Option<ModelledResponses> {
+    let values = || tables.iter().flat_map(|table| &table.functions).flat_map(|f| &f.values);
+    if values().any(|z| z.norm() > MAX_LEVEL) {
+        return None;
+    }
+    let without_noise = |table: &FrequencyResponses| {
+        let mut table = FrequencyResponses { coherence: Vec::new(), ..table.clone() };
+        table.functions.iter_mut().for_each(|function| function.standard_error = None);
+        table
+    };
+    let tables: Vec<FrequencyResponses> = tables.iter().map(without_noise).collect();
+    // The phase of a negative level that was read as a magnitude is turned by half a circle.
+    let magnitude = |z: Complex<f64>| z * (sign * (sign * z.norm() / DECIBELS).exp() / z.norm());
+    let model = refitted(&tables, how, quantity, estimate, &magnitude)?;
+    let log_area = |z: &Complex<f64>| {
+        let level = sign * DECIBELS * z.norm().ln();
+        (z.norm_sqr() / (DECIBELS * level)).ln()
+    };
+    let log_area = model.measured.iter().map(log_area).sum();
+    Some(ModelledResponses { log_area, ..model })
+}

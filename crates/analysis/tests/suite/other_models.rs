@@ -1,0 +1,209 @@
+//! Tables of frequency responses that another model explains, judged by closed-form receptances and seeded noise.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::{IdentifyResponses, ResponseQuantity, identify_responses};
+use mechid_checks::{Alternative, Cause, Finding, Subject};
+use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid_signal::{Sampling, noise};
+use nalgebra::Complex;
+
+type Receptance<'a> = dyn Fn(f64) -> Complex<f64> + 'a;
+
+const LINES: usize = 160;
+
+/// 5 kg at 18 Hz with a damping ratio of 0.03.
+fn viscous(omega: f64) -> Complex<f64> {
+    let resonance = TAU * 18.0;
+    let damping = 2.0 * 0.03 * resonance * omega;
+    (5.0 * Complex::new(resonance * resonance - omega * omega, damping)).inv()
+}
+
+/// A table of accelerances from 0.25 to 40 Hz with 0.5 % noise, which it states if asked to.
+fn table(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> FrequencyResponses {
+    let frequency_hz: Vec<f64> = (1..=LINES).map(|line| 0.25 * line as f64).collect();
+    let size = 0.005 / 2_f64.sqrt();
+    let noise = noise::white(Sampling::new(1.0, LINES).unwrap(), 2, size, seed).unwrap();
+    let exact = |hz: &f64| -(TAU * hz).powi(2) * receptance(TAU * hz);
+    let values = frequency_hz
+        .iter()
+        .map(exact)
+        .enumerate()
+        .map(|(row, h)| h * (1.0 + Complex::new(noise.channel(0)[row], noise.channel(1)[row])));
+    let values: Vec<Complex<f64>> = values.collect();
+    let standard_error = is_stated.then(|| values.iter().map(|h| h.norm() * size).collect());
+    let function = ResponseFunction {
+        response: "1".into(),
+        reference: "1".into(),
+        quantity: None,
+        values,
+        standard_error,
+    };
+    let functions = vec![function];
+    FrequencyResponses { file: "table".into(), frequency_hz, functions, ..Default::default() }
+}
+
+/// What an identification says of a table: warnings, notes, and the parameters m, c, k.
+struct Told {
+    warnings: Vec<(Subject, Finding)>,
+    remarks: Vec<String>,
+    parameters: Vec<[f64; 2]>,
+}
+
+impl Told {
+    fn of(table: FrequencyResponses, how: IdentifyResponses) -> Self {
+        let quantity = Some(ResponseQuantity::Acceleration);
+        let how = IdentifyResponses { quantity, ..how };
+        let found = identify_responses(&[table], &how).unwrap();
+        let checks = found.summary().checks.iter().filter(|check| check.is_conspicuous());
+        let parameters = found.estimate().parameters().map(|p| [p.value, p.standard_error]);
+        Self {
+            warnings: checks.map(|check| (check.subject, check.finding.clone())).collect(),
+            remarks: found.summary().remarks.clone(),
+            parameters: parameters.collect(),
+        }
+    }
+
+    fn warns(&self, subject: Subject) -> bool {
+        self.warnings.iter().any(|(of, _)| *of == subject)
+    }
+
+    fn cause(&self) -> Option<Cause> {
+        self.warnings.iter().find_map(|(_, finding)| match finding {
+            Finding::Alternative(Alternative { cause, .. }) => Some(cause.clone()),
+            _ => None,
+        })
+    }
+}
+
+fn told(receptance: &Receptance<'_>, seed: u64, is_stated: bool) -> Told {
+    Told::of(table(receptance, seed, is_stated), IdentifyResponses::default())
+}
+
+/// More than 5 of 120 right tables warn with a probability of 0.004 if 1 in 100 does.
+#[test]
+fn right_tables_pass() {
+    let warned = (0..60).flat_map(|seed| [false, true].map(|stated| told(&viscous, seed, stated)));
+    let warned: Vec<_> = warned.flat_map(|told| told.warnings).collect();
+    assert!(warned.len() <= 5, "{warned:?}");
+}
+
+#[test]
+fn modes_beyond_the_degrees_of_freedom_are_told() {
+    let modes = [(7.0, 0.01, 1.0), (15.0, 0.02, 0.8), (22.0, 0.015, 1.2), (31.0, 0.01, 0.7)];
+    let four = |omega: f64| -> Complex<f64> {
+        let mode = |(hz, ratio, size): (f64, f64, f64)| {
+            let own = TAU * hz;
+            size / Complex::new(own * own - omega * omega, 2.0 * ratio * own * omega)
+        };
+        modes.into_iter().map(mode).sum()
+    };
+    for seed in 0..3 {
+        for is_stated in [false, true] {
+            let told = told(&four, seed, is_stated);
+            assert!(told.warns(Subject::Whiteness), "{:?}", told.warnings);
+            assert_eq!(told.warns(Subject::Misfit), is_stated);
+            assert!(told.remarks.iter().any(|remark| remark.contains("mechid modes")));
+            assert_eq!(told.cause(), None);
+        }
+    }
+}
+
+/// A driving point with two modes far apart, of which one degree of freedom takes the lower: nothing else explains it.
+#[test]
+fn a_second_mode_is_not_taken_for_damping_or_a_delay() {
+    for (hz, size) in [(26.0, 0.2), (33.0, 0.5), (60.0, 0.3)] {
+        let both = |omega: f64| {
+            let own = TAU * hz;
+            let second = size / Complex::new(own * own - omega * omega, 0.02 * own * omega);
+            viscous(omega) + second
+        };
+        let told = told(&both, 3, false);
+        assert!(told.warns(Subject::Whiteness), "{hz}: {:?}", told.warnings);
+        assert_eq!(told.cause(), None, "{hz}");
+    }
+}
+
+#[test]
+fn a_late_response_is_told_by_its_delay() {
+    for (delay, is_stated) in [(2e-3, false), (2e-3, true), (-5e-4, false)] {
+        let late = |omega: f64| viscous(omega) * Complex::cis(-omega * delay);
+        for seed in 0..3 {
+            let told = told(&late, seed, is_stated);
+            let Some(Cause::Delay { seconds }) = told.cause() else {
+                panic!("{:?}", told.warnings)
+            };
+            assert!((seconds / delay - 1.0).abs() < 0.1, "{seconds}");
+            assert!(told.warns(Subject::Delay));
+        }
+    }
+}
+
+#[test]
+fn structural_damping_is_told_by_its_loss_factor() {
+    let structural = |omega: f64| {
+        let square = (TAU * 18.0_f64).powi(2);
+        (5.0 * Complex::new(square - omega * omega, 0.3 * square)).inv()
+    };
+    for (seed, is_stated) in [(0, false), (1, true), (2, false)] {
+        let told = told(&structural, seed, is_stated);
+        let Some(Cause::StructuralDamping { loss_factor }) = told.cause() else {
+            panic!("{:?}", told.warnings)
+        };
+        assert!((loss_factor - 0.3).abs() < 0.01, "{loss_factor}");
+    }
+}
+
+#[test]
+fn another_quantity_is_told() {
+    let powers = [(ResponseQuantity::Velocity, 1), (ResponseQuantity::Displacement, 2)];
+    for (quantity, power) in powers {
+        let other = |omega: f64| viscous(omega) / Complex::new(0.0, omega).powi(power);
+        for (seed, is_stated) in [(0, false), (1, true)] {
+            let told = told(&other, seed, is_stated);
+            let stated = ResponseQuantity::Acceleration;
+            assert_eq!(told.cause(), Some(Cause::Quantity { quantity, stated }));
+        }
+    }
+}
+
+/// Levels of responses whose magnitudes are all below or all above one.
+#[test]
+fn decibels_read_as_magnitudes_are_told() {
+    for gain in [1e-3, 1e6] {
+        let mut levels = table(&viscous, 4, false);
+        for value in &mut levels.functions[0].values {
+            let level = 20.0 * (gain * value.norm()).log10();
+            *value = Complex::from_polar(1.0, value.arg()) * level;
+        }
+        let told = Told::of(levels, IdentifyResponses::default());
+        assert_eq!(told.cause(), Some(Cause::Decibels), "{gain}: {:?}", told.warnings);
+    }
+}
+
+#[test]
+fn a_table_without_phase_is_told() {
+    let mut magnitudes = table(&viscous, 5, false);
+    magnitudes.functions[0].values.iter_mut().for_each(|value| *value = value.norm().into());
+    let told = Told::of(magnitudes, IdentifyResponses::default());
+    let is_named = |(_, finding): &(Subject, Finding)| matches!(finding, Finding::ConstantPhase(_));
+    assert!(told.warnings.iter().any(is_named), "{:?}", told.warnings);
+}
+
+/// Parameters and their errors are those of the same table without a coherence, which says nothing.
+#[test]
+fn a_coherence_of_one_states_no_noise() {
+    let silent = told(&viscous, 6, false);
+    for coherence in [1.0, 1.0 - 1e-8] {
+        for averages in [Some(10.0), None] {
+            let mut coherent = table(&viscous, 6, false);
+            let (response, reference) = ("1".to_owned(), Some("1".to_owned()));
+            let values = vec![coherence; LINES];
+            coherent.coherence.push(CoherenceFunction { response, reference, values });
+            let told = Told::of(coherent, IdentifyResponses { averages, ..Default::default() });
+            assert_eq!(told.parameters, silent.parameters);
+            assert!(told.remarks.iter().any(|remark| remark.contains("a coherence of 1")));
+            assert!(told.warnings.is_empty(), "{:?}", told.warnings);
+        }
+    }
+}
