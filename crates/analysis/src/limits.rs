@@ -115,3 +115,9 @@ pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
 /// 1 − coherence (median over the lines) below which a table states no noise: the digits of a file, or a coherence that
 /// was never computed.
 pub const COHERENCE_OF_ONE: f64 = 1e-6;
+
+/// Maximum number of fits with a force that is held or linear between its samples.
+pub const ACQUISITION_ROUNDS: usize = 8;
+
+/// Change of a parameter, in standard errors, that ends these fits.
+pub const ACQUISITION_SETTLED: f64 = 0.02;

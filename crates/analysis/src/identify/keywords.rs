@@ -7,6 +7,7 @@ use mechid_signal::{Extent, HitRule};
 use mechid_spectra::Pooling;
 use serde::{Deserialize, Serialize};
 
+use super::acquisition::{AcCoupling, Acquisition};
 use super::left_out::{Disturbance, LeftOut};
 use super::lines::{Band, LineChoice};
 use super::mass::KnownMass;
@@ -94,6 +95,9 @@ pub struct Keywords {
     /// Assumption on the force between samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub between_samples: Option<Discretisation>,
+    /// Channels behind a first-order high-pass.
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "written::list")]
+    pub ac_coupling: Vec<AcCoupling>,
     /// Derivation of what was not measured.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub derivatives: Option<Derivatives>,
@@ -152,7 +156,8 @@ impl Kind {
     /// Returns whether it uses a keyword that not every fit has.
     fn uses(self, keyword: &str) -> bool {
         const LINES: [&str; 4] = ["lines", "band_hz", "without_lines", "without_hz"];
-        const SPECTRA: [&str; 4] = ["method", "noise", "force_noise", "extent"];
+        const SPECTRA: [&str; 6] =
+            ["method", "noise", "force_noise", "extent", "between_samples", "ac_coupling"];
         let of_lines = LINES.contains(&keyword);
         match self {
             Self::Samples => {
@@ -209,6 +214,7 @@ impl Keywords {
             ("search", !self.search.is_empty()),
             ("weighting", self.weighting.is_some()),
             ("between_samples", self.between_samples.is_some()),
+            ("ac_coupling", !self.ac_coupling.is_empty()),
             ("derivatives", self.derivatives.is_some()),
             ("refine", self.refine.is_some()),
         ]
@@ -250,7 +256,10 @@ impl Keywords {
             _ => likelihood.map(PeriodEstimator::MaximumLikelihood),
         };
         let is_likelihood = matches!(estimator, None | Some(PeriodEstimator::MaximumLikelihood(_)));
-        let is_open = self.force_noise.is_some() || self.hits.is_some();
+        let acquisition =
+            Acquisition { between_samples: self.between_samples, ac_coupling: self.ac_coupling };
+        let is_open =
+            self.force_noise.is_some() || self.hits.is_some() || !acquisition.is_default();
         match self.extent.or(is_open.then_some(Extent::Open)) {
             Some(Extent::Open) if !is_likelihood => {
                 Err(refused("method", "open records and hits take maximum-likelihood"))
@@ -262,12 +271,19 @@ impl Keywords {
             Some(Extent::WholePeriod) if self.hits.is_some() => {
                 Err(refused("extent", "a hit is no period"))
             }
+            Some(Extent::WholePeriod) if !acquisition.is_default() => {
+                let setting = match acquisition.between_samples {
+                    Some(_) => "between_samples",
+                    None => "ac_coupling",
+                };
+                Err(refused(setting, "it is for open records, hits and `domain` time"))
+            }
             Some(Extent::Open) => {
                 let response = likelihood.unwrap_or_default();
                 let noise = OpenNoise { response, force: self.force_noise };
                 Ok(match self.hits {
-                    Some(rule) => Source::Hits(HitFit { rule, noise, lines }),
-                    None => Source::Open(OpenFit { noise, lines }),
+                    Some(rule) => Source::Hits(HitFit { rule, noise, lines, acquisition }),
+                    None => Source::Open(OpenFit { noise, lines, acquisition }),
                 })
             }
             None if is_likelihood => Ok(Source::Spectra(SpectralFit { likelihood, lines })),
@@ -381,14 +397,15 @@ impl From<Source> for Keywords {
                 };
                 Self { method, noise, extent, ..none }.with_lines(lines)
             }
-            Source::Open(OpenFit { noise: OpenNoise { response, force }, lines }) => {
+            Source::Open(OpenFit { noise: OpenNoise { response, force }, lines, acquisition }) => {
                 let extent = Some(Extent::Open);
-                Self { extent, noise: noise(response), force_noise: force, ..none }
+                Self { extent, noise: noise(response), force_noise: force, ..acquisition.into() }
                     .with_lines(lines)
             }
-            Source::Hits(HitFit { rule, noise: OpenNoise { response, force }, lines }) => {
-                let hits = Some(rule);
-                Self { hits, noise: noise(response), force_noise: force, ..none }.with_lines(lines)
+            Source::Hits(fit) => {
+                let HitFit { rule, noise: OpenNoise { response, force }, lines, acquisition } = fit;
+                let (hits, noise) = (Some(rule), noise(response));
+                Self { hits, noise, force_noise: force, ..acquisition.into() }.with_lines(lines)
             }
             Source::Terms(TermFit { terms, estimator, extent, lines }) => {
                 let method = match (estimator, extent) {
@@ -406,6 +423,13 @@ impl From<Source> for Keywords {
                 Self { domain: Domain::Time, between_samples, extent, derivatives, refine, ..none }
             }
         }
+    }
+}
+
+impl From<Acquisition> for Keywords {
+    fn from(how: Acquisition) -> Self {
+        let Acquisition { between_samples, ac_coupling } = how;
+        Self { between_samples, ac_coupling, ..Self::default() }
     }
 }
 

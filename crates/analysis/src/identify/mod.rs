@@ -17,12 +17,14 @@
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `coherence` | coherence of the records that were fitted |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `acquisition` | force between samples and AC coupled channels of open records |
 //! | `force_noise` | noise of the forces, stated or as the record shows it |
 //! | `sinusoids` | sinusoids beside the response to the forces, in open records |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
+pub mod acquisition;
 pub(crate) mod added_decay;
 pub mod checks;
 mod coherence;
@@ -67,6 +69,7 @@ use mechid_nonlinear::NonlinearEstimate;
 use mechid_spectra::Pooling;
 use serde::{Serialize, Serializer};
 
+pub use self::acquisition::{AcCoupling, Acquisition};
 use self::checks::CheckRow;
 pub use self::coherence::ResponseCoherence;
 pub use self::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
@@ -238,14 +241,16 @@ impl Identify {
         period_given: bool,
         hit_noise: &[HitNoise],
     ) -> Result<Fitted, AnalysisError> {
-        let open = |noise: &OpenNoise, lines: &SpectralLines, excitation| {
-            open_records::fit(records, unknowns, lines.rule(), noise, excitation)
+        let as_usual = Acquisition::default();
+        let open = |noise: &OpenNoise, lines: &SpectralLines, acquisition, excitation| {
+            let how = open_records::How { rule: lines.rule(), noise, acquisition, excitation };
+            open_records::fit(records, unknowns, how)
         };
         match &self.source {
             Source::Spectra(SpectralFit { likelihood, lines }) => {
                 if !period_given && open_records::suit(records, unknowns) {
                     let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
-                    match open(&noise, lines, Excitation::Lasting) {
+                    match open(&noise, lines, &as_usual, Excitation::Lasting) {
                         Ok(open) if open.ends_show => return Ok(open.fitted),
                         _ => {}
                     }
@@ -256,11 +261,11 @@ impl Identify {
             Source::Periods(PeriodFit { estimator, lines }) => {
                 spectra::fit(records, unknowns, lines.rule(), *estimator)
             }
-            Source::Open(OpenFit { noise, lines }) => {
-                Ok(open(noise, lines, Excitation::Lasting)?.fitted)
+            Source::Open(OpenFit { noise, lines, acquisition }) => {
+                Ok(open(noise, lines, acquisition, Excitation::Lasting)?.fitted)
             }
-            Source::Hits(HitFit { noise, lines, .. }) => {
-                Ok(open(noise, lines, Excitation::Hits(hit_noise))?.fitted)
+            Source::Hits(HitFit { noise, lines, acquisition, .. }) => {
+                Ok(open(noise, lines, acquisition, Excitation::Hits(hit_noise))?.fitted)
             }
             Source::Terms(how) => nonlinear::fit(records, unknowns, how, period_given),
             Source::Segments(how) => responses::fit(records, unknowns, how, period_given),

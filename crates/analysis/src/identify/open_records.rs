@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use mechid_checks::{
     AfterSpectralFit, Finding, RowParts, Subject, Verdict, after_spectral_fit, agreement_of_parts,
-    before_spectral_fit, delay_of_open_records, fitted_band, linearity_of_open_record,
+    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
+    linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Split, output_error_pooling,
@@ -14,6 +15,7 @@ use mechid_model::Discretisation;
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines};
 
+use super::acquisition::Acquisition;
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
@@ -54,6 +56,16 @@ pub(super) enum Excitation<'a> {
     Hits(&'a [HitNoise]),
 }
 
+/// Settings of a fit of open records.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct How<'a> {
+    /// Lines to fit.
+    pub(super) rule: LineRule<'a>,
+    pub(super) noise: &'a OpenNoise,
+    pub(super) acquisition: &'a Acquisition,
+    pub(super) excitation: Excitation<'a>,
+}
+
 /// A fit of open records, and whether their ends show at all.
 pub(super) struct OpenFit {
     pub(super) fitted: Fitted,
@@ -79,10 +91,9 @@ struct OpenSpectra {
 impl OpenSpectra {
     fn read(
         records: &[Windowed],
-        rule: LineRule<'_>,
-        force: Option<&[f64]>,
-        excitation: Excitation<'_>,
+        How { rule, noise, acquisition, excitation }: How<'_>,
     ) -> Result<Self, AnalysisError> {
+        let force = noise.force.as_deref();
         let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
         for (at, Windowed { held, .. }) in records.iter().enumerate() {
             let lines = Lines::new(held.force.sampling(), band(held, rule)?)?;
@@ -94,7 +105,7 @@ impl OpenSpectra {
             let force_noise = ForceNoise::of(held, force, hit)?;
             let data = FrequencyData::read(&lines, &held.force, motion, kind)?
                 .of_open_record(held.force.sampling());
-            let data = force_noise.known_to(data, held)?;
+            let data = acquisition.uncoupled(force_noise.known_to(data, held)?, held)?;
             of_force.push(force_noise);
             spectra.push((data, lines));
         }
@@ -115,16 +126,20 @@ impl OpenSpectra {
 }
 
 /// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
-/// record, beside the noise that `noise` says; `excitation` says what the forces are like.
+/// record.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    rule: LineRule<'_>,
-    noise: &OpenNoise,
-    excitation: Excitation<'_>,
+    how: How<'_>,
 ) -> Result<OpenFit, AnalysisError> {
-    let mut spectra = OpenSpectra::read(records, rule, noise.force.as_deref(), excitation)?;
-    let fit = output_error_pooling(&joined(&spectra.data)?, unknowns, noise.response)?;
+    let How { noise, acquisition, excitation, .. } = how;
+    let mut spectra = OpenSpectra::read(records, how)?;
+    let dt = records[0].held.force.sampling().dt();
+    let all = joined(&spectra.data)?;
+    let fit = output_error_pooling(&all, unknowns, noise.response)
+        .map_err(|error| with_delay(error, &all, dt, unknowns))?;
+    let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
+    spectra.data = data;
     spectra.without_sinusoids(&fit);
     let OpenSpectra { data, lines, force_noise } = spectra;
     let (closed, alone) = match &fit.ends {
@@ -139,15 +154,21 @@ pub(super) fn fit(
         finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
     };
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
-    let dt = records[0].held.force.sampling().dt();
     let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
     let parts = agreement(&data, &fit, excitation)?;
+    let fault = match excitation {
+        Excitation::Lasting => {
+            fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?
+        }
+        // The noise of a pulse makes its lines err together, which the score does not know.
+        Excitation::Hits(_) => None,
+    };
     let each = records.iter().zip(&fit.sinusoids).enumerate();
     let sinusoids: Vec<SinusoidRow> =
         each.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect();
     let all = joined(&closed)?;
     let prediction = Prediction::Sampled {
-        discretisation: Discretisation::FirstOrderHold,
+        discretisation: acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold),
         extent: Extent::Open,
     };
     let fitted = Fitted {
@@ -156,7 +177,7 @@ pub(super) fn fit(
         before: vec![Vec::new(); records.len()],
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
-        after_all: bias.into_iter().chain(late).chain(parts).collect(),
+        after_all: bias.into_iter().chain(likelier(late, fault)).chain(parts).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
@@ -200,6 +221,30 @@ pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
         vec![rows]
     });
     rows.collect()
+}
+
+/// Returns that of two explanations of a residual which leaves less of its power.
+fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
+    let remaining = |finding: &Finding| match finding {
+        Finding::Delay(delay) => delay.remaining,
+        Finding::Alternative(alternative) => alternative.remaining,
+        _ => 1.0,
+    };
+    one.into_iter().chain(other).min_by(|a, b| remaining(a).total_cmp(&remaining(b)))
+}
+
+/// Returns the failure of a search, with a delay of the responses as its reason if there is one.
+fn with_delay(
+    error: EstimateError,
+    data: &FrequencyData,
+    dt: f64,
+    unknowns: &Unknowns,
+) -> AnalysisError {
+    let is_search = matches!(error, EstimateError::NotConverged { .. });
+    match delay_of_lines(data, dt, unknowns).filter(|_| is_search) {
+        Some(delay) => AnalysisError::Unfit { error, reasons: delay.to_string() },
+        None => error.into(),
+    }
 }
 
 /// Returns the findings on the band and the linearity of each record.

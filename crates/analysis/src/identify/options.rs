@@ -10,6 +10,7 @@ use mechid_signal::{Extent, HitRule, Interpolation};
 use mechid_spectra::Pooling;
 use serde::{Deserialize, Serialize};
 
+use super::acquisition::Acquisition;
 use super::keywords::Keywords;
 use super::left_out::{LeftOut, LineRule};
 use super::lines::LineChoice;
@@ -108,6 +109,8 @@ pub struct OpenFit {
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
+    /// What the acquisition did to the records.
+    pub acquisition: Acquisition,
 }
 
 /// Noise of open records.
@@ -130,6 +133,8 @@ pub struct HitFit {
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
+    /// What the acquisition did to the records.
+    pub acquisition: Acquisition,
 }
 
 /// Fit of nonlinear terms.
@@ -529,7 +534,14 @@ mod tests {
             Identify::spectra(Method::MaximumLikelihood),
             Identify::from(periods(None)),
             Identify::from(periods(Some(PeriodEstimator::MaximumLikelihood(Pooling::PerLine)))),
-            Identify::from(Source::Open(OpenFit { noise: noise.clone(), ..OpenFit::default() })),
+            Identify::from(Source::Open(OpenFit {
+                noise: noise.clone(),
+                acquisition: Acquisition {
+                    between_samples: Some(Discretisation::FirstOrderHold),
+                    ac_coupling: vec!["a1=0.5".parse().unwrap()],
+                },
+                ..OpenFit::default()
+            })),
             Identify::from(Source::Hits(HitFit { noise, ..HitFit::default() })),
             Identify::responses(Estimator::Hv, Segmentation::default()),
             Identify::from(Source::Samples(samples)).mass("2.5,unknown".parse().unwrap()),

@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each test program of its own would compile and link all crates below anew.
 
+mod acquisition;
 mod bearing;
 mod bearing_checks;
 mod crosstalk;

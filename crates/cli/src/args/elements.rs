@@ -21,7 +21,7 @@ pub struct ElementArgs {
     /// --period is taken as whole periods, otherwise as an open record
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
-          "between_samples", "mass", "structure", "hits", "struck", "nonlinear", "candidates",
+          "between_samples", "ac_coupling", "mass", "structure", "hits", "struck", "nonlinear", "candidates",
           "derivatives", "refine", "from_frf", "segment", "validate", "fitted_lines", "more_starts", "quantity", "averages", "points"])]
     machine: Option<PathBuf>,
     /// The files are tables of synchronous responses, a row for each speed of a run: speed_rpm (or

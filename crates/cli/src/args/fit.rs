@@ -6,9 +6,9 @@ use std::str::FromStr;
 
 use clap::Args;
 use mechid::analysis::identify::{
-    Band, Constant, Derivatives, Disturbance, Domain, Form, Identified, IdentifiedResponses,
-    Identify, IdentifyResponses, Keywords, KnownMass, LeftOut, LineChoice, Method, Refinement,
-    Structure, ValidationWindow,
+    AcCoupling, Band, Constant, Derivatives, Disturbance, Domain, Form, Identified,
+    IdentifiedResponses, Identify, IdentifyResponses, Keywords, KnownMass, LeftOut, LineChoice,
+    Method, Refinement, Structure, ValidationWindow,
 };
 use mechid::analysis::{ResponseQuantity, Segmentation, Window, frf};
 use mechid::io::{FrequencyResponses, LineSpec};
@@ -65,11 +65,16 @@ pub struct FitArgs {
     /// derivatives]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
-    /// Assumption on the force between samples, in the time domain: held (as a converter drives a shaker) or
-    /// linear, exact if it is true; euler, the dissertation's rule, biased in proportion to the step
-    /// [default: the equation of motion at the samples if there is an acceleration, else linear]
+    /// Assumption on the force between samples: held (as a converter drives a shaker) or linear, exact if it is
+    /// true, of open records, hits and in the time domain; euler, the dissertation's rule, in the time domain, biased in
+    /// proportion to the step [default: band-limited; in the time domain the equation of motion at the samples
+    /// if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
     between_samples: Option<Discretisation>,
+    /// Channels behind a first-order high-pass, such as an AC coupled input, each with its corner frequency in
+    /// Hz; of open records and hits
+    #[arg(long, value_name = "COLUMN=HZ,…", value_delimiter = ',')]
+    ac_coupling: Vec<AcCoupling>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
     /// unknown
     #[arg(
@@ -195,7 +200,7 @@ pub struct TableArgs {
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["ChannelArgs", "HitArgs", "HitRuleArgs", "NonlinearArgs", "TimeArgs",
           "SegmentArgs", "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz",
-          "from_frf", "more_starts", "between_samples", "extent", "force_noise", "validate",
+          "from_frf", "more_starts", "between_samples", "ac_coupling", "extent", "force_noise", "validate",
           "skip_lines", "record_column"])]
     pub(super) frf_table: bool,
     /// Measured quantity of the responses per force, where the table does not state it
@@ -376,6 +381,7 @@ impl FitArgs {
             search: self.nonlinear.search.clone(),
             weighting: self.nonlinear.weighting,
             between_samples: self.between_samples,
+            ac_coupling: self.ac_coupling.clone(),
             derivatives: self.time.derivatives,
             refine: self.time.refine,
         };

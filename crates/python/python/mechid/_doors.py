@@ -95,6 +95,7 @@ def identify(
     from_frf: Estimator | None = None,
     segment: int | str | Mapping[str, Any] | None = None,
     between_samples: Literal["euler", "held", "linear"] | None = None,
+    ac_coupling: Sequence[str | Mapping[str, Any]] = (),
     extent: Literal["open", "period"] | None = None,
     hits: bool | str | Mapping[str, Any] = False,
     derivatives: str | None = None,
@@ -157,7 +158,11 @@ def identify(
         and the window (hann, hamming, blackman, rectangular), as a dict of ``segment``,
         ``overlap_percent`` and ``window`` does.
     between_samples : {"euler", "held", "linear"}, optional
-        Assumption on the force between samples, in the time domain.
+        Assumption on the force between samples: held or linear of open records, hits and in the time
+        domain, euler in the time domain alone. Without, the force is band-limited.
+    ac_coupling : sequence of str or dict
+        Channels of open records and hits behind a first-order high-pass, such as ``"a1=0.5"`` with the
+        corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
     extent : {"open", "period"}, optional
         Extent of the window. Of open records the unknown loads of their ends are fitted with the
         machine; without, the window is a period where `period` is given, and otherwise unless the ends
@@ -223,7 +228,7 @@ def identify(
             method=method, noise=noise, force_noise=_levels(force_noise), lines=lines, band_hz=band_hz,
             without_lines=without_lines, without_hz=without_hz, mass=mass, structure=structure,
             domain=domain, from_frf=from_frf, segment=segment, between_samples=between_samples,
-            extent=extent, hits=hits, derivatives=derivatives, refine=refine, nonlinear=nonlinear,
+            ac_coupling=ac_coupling, extent=extent, hits=hits, derivatives=derivatives, refine=refine, nonlinear=nonlinear,
             candidates=candidates, criterion=criterion, search=search, weighting=weighting,
         )
     told = json.dumps(settings, default=_plain)

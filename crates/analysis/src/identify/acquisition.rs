@@ -1,0 +1,146 @@
+//! What the acquisition did to open records: the force between samples, and AC coupled channels.
+
+use std::f64::consts::TAU;
+use std::str::FromStr;
+
+use mechid_estimate::frequency_domain::{OutputErrorFit, equivalent_force, output_error_pooling};
+use mechid_estimate::{Estimate, Unknowns};
+use mechid_model::Discretisation;
+use mechid_spectra::{FrequencyData, Pooling};
+use serde::{Deserialize, Serialize};
+
+use super::open_records::joined;
+use crate::AnalysisError;
+use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED};
+use crate::measurement::Block;
+
+/// What the acquisition did to open records, which the fit allows for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Acquisition {
+    /// Course of the force between its samples, held or linear; `None`: that of a band-limited force.
+    pub between_samples: Option<Discretisation>,
+    /// Channels behind a first-order high-pass.
+    pub ac_coupling: Vec<AcCoupling>,
+}
+
+/// A channel behind a first-order high-pass, written `a1=0.5` with its name and the corner frequency in Hz.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AcCoupling {
+    /// Name of the channel.
+    pub channel: String,
+    /// Corner frequency, in Hz.
+    pub corner_hz: f64,
+}
+
+impl FromStr for AcCoupling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.rsplit_once('=').and_then(|(channel, hz)| {
+            let corner_hz =
+                hz.trim().parse().ok().filter(|hz: &f64| *hz > 0.0 && hz.is_finite())?;
+            let channel = channel.trim();
+            (!channel.is_empty()).then(|| Self { channel: channel.to_owned(), corner_hz })
+        });
+        parsed.ok_or_else(|| {
+            format!(
+                "a coupled channel is written as its name and the corner frequency in Hz, such as a1=0.5, not `{text}`"
+            )
+        })
+    }
+}
+
+impl Acquisition {
+    /// Returns whether there is anything to allow for.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns the lines of a record as if all channels were coupled alike.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] if a channel does not exist, or for Euler's rule.
+    pub(super) fn uncoupled(
+        &self,
+        mut data: FrequencyData,
+        held: &Block,
+    ) -> Result<FrequencyData, AnalysisError> {
+        if self.between_samples == Some(Discretisation::Euler) {
+            let why = "euler belongs to `domain` time; spectra take held or linear".to_owned();
+            return Err(AnalysisError::Setting { setting: "between_samples", why });
+        }
+        let (names, kind) = (&held.names, held.response().1);
+        for AcCoupling { channel, corner_hz } in &self.ac_coupling {
+            let place = |names: &[String]| names.iter().position(|name| name == channel);
+            let (response, force) = (place(names.response(kind)), place(&names.force));
+            if response.is_none() && force.is_none() {
+                let all: Vec<&str> =
+                    names.force.iter().chain(names.response(kind)).map(String::as_str).collect();
+                let why = format!(
+                    "{} has no channel {channel} among those that are fitted: {}",
+                    held.file,
+                    all.join(", ")
+                );
+                return Err(AnalysisError::Setting { setting: "ac_coupling", why });
+            }
+            let (responses, forces) = (Vec::from_iter(response), Vec::from_iter(force));
+            data = data.with_high_pass_alike(&responses, &forces, TAU * corner_hz);
+        }
+        Ok(data)
+    }
+
+    /// Returns a fit that allows for the force between samples `dt` (s) apart, and the records with the band-limited force
+    /// that has the same response.
+    ///
+    /// # Source
+    /// Successive substitution: the equivalent force depends on the system only by what lies above half the sampling
+    /// rate.
+    pub(super) fn refitted(
+        &self,
+        fit: OutputErrorFit,
+        records: &[FrequencyData],
+        dt: f64,
+        unknowns: &Unknowns,
+        pooling: Pooling,
+    ) -> Result<(OutputErrorFit, Vec<FrequencyData>), AnalysisError> {
+        let mut last = (fit, records.to_vec());
+        let Some(between) = self.between_samples else { return Ok(last) };
+        for _ in 0..ACQUISITION_ROUNDS {
+            let system = last.0.estimate.system()?;
+            let equivalent =
+                records.iter().map(|record| equivalent_force(record, &system, dt, between));
+            let Some(equivalent) = equivalent.collect::<Option<Vec<_>>>() else {
+                let why = "the identified system has no response to such a force".to_owned();
+                return Err(AnalysisError::Setting { setting: "between_samples", why });
+            };
+            let fit = output_error_pooling(&joined(&equivalent)?, unknowns, pooling)?;
+            let change = largest_change(&last.0.estimate, &fit.estimate);
+            last = (fit, equivalent);
+            if change < ACQUISITION_SETTLED {
+                break;
+            }
+        }
+        Ok(last)
+    }
+}
+
+/// Largest change of a parameter, in standard errors.
+fn largest_change(before: &Estimate, after: &Estimate) -> f64 {
+    let pairs = before.parameters().zip(after.parameters());
+    pairs.map(|(a, b)| (a.value - b.value).abs() / b.standard_error).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coupled_channel_is_written_out() {
+        let coupled = AcCoupling { channel: "a=1".into(), corner_hz: 0.5 };
+        assert_eq!("a=1=0.5".parse(), Ok(coupled));
+        for text in ["", "a", "a=", "=0.5", "a=0", "a=-1", "a=NaN", "a=inf", "a=1 Hz"] {
+            assert!(text.parse::<AcCoupling>().is_err(), "{text}");
+        }
+    }
+}
