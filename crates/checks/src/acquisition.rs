@@ -243,12 +243,18 @@ pub fn fault_of_acquisition(
             continue;
         }
         let left = after_spectral_fit(&without, estimate, extent)?.records;
-        if remaining <= DELAY_REMAINING || is_unexplained(&left) {
+        if remaining <= DELAY_REMAINING || is_noise(after) || is_unexplained(&left) {
             let cause = fault.cause(first, &driven, corner);
             best = Some((remaining, Finding::Alternative(Alternative { cause, remaining })));
         }
     }
     Ok(best.map(|(_, finding)| finding))
+}
+
+/// Returns whether no test of the residuals warns.
+fn is_noise(after: &[SpectralResidual]) -> bool {
+    let mut findings = after.iter().flat_map(SpectralResidual::findings);
+    findings.all(|finding| finding.verdict() == Verdict::Good)
 }
 
 /// Returns whether no force explains anything of the residuals. Lines at the ends of a resonance may go together: their
