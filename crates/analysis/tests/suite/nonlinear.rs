@@ -515,7 +515,7 @@ fn terms_are_found_in_open_records() {
         (sweep(friction, 5), "fc: tanh(v1/0.15)", "fc", 8.0),
     ] {
         let how = open(terms.parse().unwrap());
-        let mut found = identify(&[test.clone()], &how)
+        let mut found = identify(std::slice::from_ref(&test), &how)
             .unwrap_or_else(|error| panic!("{name} = {truth}: {error}"));
         for (name, truth) in [("m", 10.0), ("k", 5000.0), (name, truth)] {
             let got = found.nonlinear().unwrap().parameter(name).unwrap().estimate;
