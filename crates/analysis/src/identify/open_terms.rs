@@ -6,6 +6,7 @@ use mechid_model::Discretisation;
 use mechid_nonlinear::{NonlinearEstimate, SteppedRecord, output_error_of_open_records};
 use mechid_signal::{Extent, Record};
 
+use super::acquisition::Acquisition;
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
 use super::keywords::Domain;
 use super::open_records::{self, Excitation};
@@ -33,8 +34,13 @@ pub(super) fn fit(
     if search.delay || search.phase {
         return refuse("search", "delay and phase of the channels are found from whole periods");
     }
-    let (noise, excitation) = (OpenNoise::default(), Excitation::Lasting);
-    let linear = open_records::fit(records, unknowns, lines.rule(), &noise, excitation)?.fitted;
+    let how = open_records::How {
+        rule: lines.rule(),
+        noise: &OpenNoise::default(),
+        acquisition: &Acquisition::default(),
+        excitation: Excitation::Lasting,
+    };
+    let linear = open_records::fit(records, unknowns, how)?.fitted;
     let stepped: Vec<SteppedRecord> = records
         .iter()
         .map(|Windowed { held, .. }| SteppedRecord {
