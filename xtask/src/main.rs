@@ -39,11 +39,11 @@ enum Task {
     /// Compute every number that somebody else printed or that has a closed form, and write the page of the book about it.
     Conformance {
         /// Compare the page with what is computed now, without writing it.
-        #[arg(long, conflicts_with = "json")]
+        #[arg(long)]
         check: bool,
-        /// Also write the rows as JSON.
-        #[arg(long, value_name = "FILE")]
-        json: Option<PathBuf>,
+        /// Folder of the page and of the rows as JSON [default: the book, without JSON].
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
     },
     /// Measure how time grows with degrees of freedom and samples, and write the page of the book
     /// about it (with --release, on an idle machine).
@@ -58,8 +58,8 @@ fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     let outcome = match Tasks::parse().task {
         Task::Conformance { check: true, .. } => conformance_compared(root),
-        Task::Conformance { json, .. } => {
-            conformance::write(root, json.as_deref()).map(|rows| println!("{rows} rows written"))
+        Task::Conformance { out, .. } => {
+            conformance::write(root, out.as_deref()).map(|rows| println!("{rows} rows written"))
         }
         Task::MeasureCost { seconds } => cost::write(root, seconds),
         Task::ReproduceThesis { only, check, bless, out } => {

@@ -102,18 +102,21 @@ pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
     ])
 }
 
-/// Writes the page, and the rows as JSON where a file is named.
+/// Writes the page into the book; where a folder is named, the page and the rows as JSON there instead.
 ///
 /// # Errors
 /// The message of the computation or of the file that fails.
-pub fn write(root: &Path, json: Option<&Path>) -> Result<usize, String> {
+pub fn write(root: &Path, folder: Option<&Path>) -> Result<usize, String> {
     let judges = judges(root)?;
-    let words = |file: &Path, e: std::io::Error| format!("{}: {e}", file.display());
-    let place = page::place(root);
-    std::fs::write(&place, page::markdown(&judges)).map_err(|e| words(&place, e))?;
-    if let Some(file) = json {
-        let text = serde_json::to_string_pretty(&judges).map_err(|e| e.to_string())?;
-        std::fs::write(file, text).map_err(|e| words(file, e))?;
+    let page = page::markdown(&judges);
+    let mut files = vec![(page::place(root), page.clone())];
+    if let Some(folder) = folder {
+        let json = serde_json::to_string_pretty(&judges).map_err(|e| e.to_string())?;
+        files =
+            vec![(folder.join("conformance.md"), page), (folder.join("conformance.json"), json)];
+    }
+    for (file, text) in files {
+        std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     }
     Ok(judges.iter().map(|judge| judge.rows.len()).sum())
 }

@@ -19,7 +19,7 @@ pub(super) fn markdown(judges: &[Judge]) -> String {
         "# Who else says so\n\n\
          Numbers of this workspace beside numbers that somebody else printed, or that have a closed form; \
          none is judged by a simulator of its own.\n\
-         Made by `cargo xtask conformance`, which with `--check` compares it; do not edit.\n\n\
+         Made by `cargo xtask conformance`, and compared by `cargo xtask conformance --check`; do not edit.\n\n\
          *Met* is a difference of no more than the tolerance. A *misprint* is believed only where the number that \
          should stand there is the one computed. What is *open* has no known reason.\n\n\
          | Judge | Rows | Met | Misprints | Open |\n|---|---|---|---|---|\n",

@@ -14,8 +14,9 @@ use crate::text::significant;
 const NAMED: usize = 6;
 
 /// Refuses a fit of a linear system that is singular to rounding, that explains no more of the response than chance
-/// does, or in which the interval of every parameter holds zero. Several degrees of freedom may have modes all the same;
-/// with one, the response to the force is then no more than noise, and its mode is a peak of that.
+/// does where nothing else says why, or in which the interval of every parameter holds zero. Several degrees of freedom
+/// may have modes all the same; with one, the response to the force is then no more than noise, and its mode is a peak
+/// of that.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -24,31 +25,35 @@ pub(super) fn check(
     modes: &[IdentifiedMode],
     checks: &[CheckRow],
 ) -> Result<(), AnalysisError> {
-    let estimate = &fitted.estimate;
-    let refused = |why: String| {
-        let reasons = checks
-            .iter()
-            .filter(|check| check.is_bad() && !matches!(check.finding, Finding::Unrelated(_)));
-        let all: Vec<String> = [why].into_iter().chain(reasons.map(CheckRow::sentence)).collect();
-        Err(AnalysisError::NothingDetermined { why: all.join("; ") })
-    };
+    let is_unrelated = |check: &&CheckRow| matches!(check.finding, Finding::Unrelated(_));
+    let others = checks.iter().filter(|check| check.is_bad() && !is_unrelated(check));
     if fitted.nonlinear.is_some() {
         return Ok(());
     }
-    if let Some(check) = checks.iter().find(|check| matches!(check.finding, Finding::Unrelated(_)))
+    // Least squares may explain nothing of a response of which noise is a small part.
+    if let Some(check) = checks.iter().find(is_unrelated)
+        && !fitted.least_squares
+        && others.clone().next().is_none()
     {
-        return refused(check.sentence());
+        return Err(AnalysisError::NothingDetermined { why: check.sentence() });
     }
+    let estimate = &fitted.estimate;
+    let refused = |why: String| {
+        let all: Vec<String> =
+            [why].into_iter().chain(others.clone().map(CheckRow::sentence)).collect();
+        Err(AnalysisError::NothingDetermined { why: all.join("; ") })
+    };
     let condition = estimate.condition();
     if condition * f64::EPSILON >= 1.0 {
         let number = significant(condition, 2);
         return refused(format!("the condition number of the fit is {number}, beyond rounding"));
     }
-    let found = determined(modes);
-    if is_open(estimate) && (estimate.dof() == 1 || found.is_empty()) {
-        let modes = match found.is_empty() {
-            true => "and so do those of all natural frequencies".to_owned(),
-            false => format!("which leaves {} a peak of the noise", found.join(", ")),
+    let frequencies = determined(modes);
+    if is_open(estimate) && (estimate.dof() == 1 || frequencies.is_empty()) {
+        let modes = if frequencies.is_empty() {
+            "and so do those of all natural frequencies".to_owned()
+        } else {
+            format!("which leaves {} a peak of the noise", frequencies.join(", "))
         };
         return refused(format!("{} hold zero, {modes}", intervals(estimate)));
     }
@@ -57,20 +62,22 @@ pub(super) fn check(
 
 /// Returns a remark on a fit that determines modes, but no parameter.
 pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<String> {
-    let determined = determined(modes);
+    let frequencies = determined(modes);
     let is_alone = fitted.nonlinear.is_none() && is_open(&fitted.estimate);
-    (is_alone && !determined.is_empty()).then(|| {
-        let [found, open] = [message::list(&determined, ", ", NAMED), intervals(&fitted.estimate)];
-        format!("the data determine modes ({found}), but no parameter: {open} hold zero")
+    (is_alone && !frequencies.is_empty()).then(|| {
+        let [named, open] = [message::list(&frequencies, ", ", NAMED), intervals(&fitted.estimate)];
+        format!("the data determine modes ({named}), but no parameter: {open} hold zero")
     })
 }
 
-/// Returns whether the interval of every parameter holds zero.
+/// Returns whether the interval of every parameter holds zero. As many equations as unknowns leave no interval.
 fn is_open(estimate: &Estimate) -> bool {
     estimate.parameters().len() > 0
         && estimate.parameters().all(|p| {
             let interval = p.interval(CONFIDENCE);
-            interval.is_ok_and(|[low, high]| !(low > 0.0 || high < 0.0) && low < high)
+            interval.is_ok_and(|[low, high]| {
+                low <= 0.0 && high >= 0.0 && low < high && (high - low).is_finite()
+            })
         })
 }
 

@@ -23,7 +23,7 @@ impl<'a> SampledResponse<'a> {
             Discretisation::ZeroOrderHold => step.ramp.fill(0.0),
             Discretisation::FirstOrderHold => {}
         }
-        let inverse_mass = system.mass().clone().try_inverse()?;
+        let inverse_mass = system.mass().clone().lu().try_inverse()?;
         Some(Self { system, step, inverse_mass, dt, dof: system.dof() })
     }
 

@@ -91,7 +91,7 @@ mod tests {
                 .iter()
                 .map(|w| {
                     let part = |m: f64, k: f64| Complex::new(k - w * w * m, 0.3 * k);
-                    let inverse = mass.zip_map(&stiffness, part).try_inverse().unwrap();
+                    let inverse = mass.zip_map(&stiffness, part).lu().try_inverse().unwrap();
                     inverse * measured.per_displacement(*w)
                 })
                 .collect();
