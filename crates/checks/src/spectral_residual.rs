@@ -161,7 +161,8 @@ impl SpectralResidual {
     }
 
     /// Returns whether the residual is no more than rounding.
-    pub(super) fn is_rounding(&self) -> bool {
+    #[must_use]
+    pub fn is_rounding(&self) -> bool {
         self.rounding
     }
 

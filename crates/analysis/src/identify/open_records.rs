@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use mechid_checks::{
-    AfterSpectralFit, Finding, RowParts, Subject, Verdict, after_spectral_fit, agreement_of_parts,
-    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
-    linearity_of_open_record,
+    AfterSpectralFit, Finding, RowParts, SpectralResidual, Subject, Verdict, after_spectral_fit,
+    agreement_of_parts, before_spectral_fit, delay_of_lines, delay_of_open_records,
+    fault_of_acquisition, fitted_band, linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Split, output_error_pooling,
@@ -155,7 +155,11 @@ pub(super) fn fit(
     };
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
     let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
-    let parts = agreement(&data, &fit, excitation)?;
+    let parts = if residuals.iter().any(SpectralResidual::is_rounding) {
+        None
+    } else {
+        agreement(&data, &fit, excitation)?
+    };
     let fault = match excitation {
         Excitation::Lasting => {
             fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?

@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use mechid_checks::{
-    AfterSpectralFit, Finding, RowParts, Subject, Verdict, after_spectral_fit, agreement_of_parts,
-    before_spectral_fit, delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
+    AfterSpectralFit, Finding, RowParts, SpectralResidual, Subject, Verdict, after_spectral_fit,
+    agreement_of_parts, before_spectral_fit, delay_of_lines, distortion_of_periods, fitted_band,
+    steady_periods,
 };
 use mechid_estimate::frequency_domain::{
     PartsOfFit, Split, equation_error, instrumental_variables, output_error_pooling,
@@ -75,10 +76,14 @@ pub(super) fn fit(
     estimate.system()?;
     let Looked { before, after, weighted, repeats } =
         Looked::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
-    let parts = agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?;
     misfit = misfit.filter(|_| repeats);
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
+    let parts = if residuals.iter().any(SpectralResidual::is_rounding) {
+        None
+    } else {
+        agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?
+    };
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
     let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
     let is_left = residuals.iter().any(|left| left.findings().iter().any(is_told));
