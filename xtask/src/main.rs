@@ -36,7 +36,8 @@ enum Task {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
-    /// Compute every number that somebody else printed or that has a closed form, and write the page of the book about it.
+    /// Compute every number that somebody else printed or that has a closed form, and write the
+    /// page of the book about it.
     Conformance {
         /// Compare the page with what is computed now, without writing it.
         #[arg(long)]
@@ -98,7 +99,10 @@ fn reproduce_thesis(
 
 fn conformance_compared(root: &Path) -> Result<(), String> {
     match conformance::differences(root)?.as_slice() {
-        [] => Ok(()),
+        [] => {
+            println!("the page agrees");
+            Ok(())
+        }
         differences => {
             differences.iter().take(20).for_each(|difference| eprintln!("{difference}"));
             Err(format!("{} differences from the page", differences.len()))

@@ -335,7 +335,7 @@ pub enum AnalysisError {
     /// The data determine neither a parameter nor a mode of the machine.
     #[error("the data do not determine the machine: {why}")]
     NothingDetermined {
-        /// What shows it, with the numbers.
+        /// Reason, with the numbers.
         why: String,
     },
     /// The force is zero.

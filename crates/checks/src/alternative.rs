@@ -15,7 +15,7 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Alternative {
-    /// What differs from the model that was fitted.
+    /// Difference from the model that was fitted.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub cause: Cause,
     /// Fraction of the residual's power that is left with the other model.
@@ -136,9 +136,9 @@ impl Check for Alternative {
 /// Responses that were measured and those of a model, rows × channels in the unit of the former.
 #[derive(Debug, Clone)]
 pub struct ModelledResponses {
-    /// Measured responses.
+    /// Measured responses, rows × channels (unit of the channel).
     pub measured: DMatrix<Complex<f64>>,
-    /// Modelled responses.
+    /// Modelled responses, rows × channels (unit of the channel).
     pub modelled: DMatrix<Complex<f64>>,
     /// Logarithm of the area of the measured responses per area of the original ones (pure number); 0 unless the numbers
     /// were converted.

@@ -178,8 +178,8 @@ impl Augmented {
         log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
     }
 
-    /// Returns the log-likelihood of a model, without constants; where displacement and velocity of the first sample are
-    /// unknown, at their most likely values.
+    /// Returns the log-likelihood of a model, without constants. Where displacement and velocity
+    /// of the first sample are unknown, they have their most likely values.
     pub fn likelihood(&self, tuned: &Tuned, process: &LowPass) -> Result<f64, ForceError> {
         let mut space = self.space(&tuned.model, process, tuned.noise, 10.0)?;
         if self.start == Start::InMotion {
@@ -192,14 +192,15 @@ impl Augmented {
         if likelihood.is_finite() { Ok(likelihood) } else { Err(ForceError::NoLikelihood) }
     }
 
-    /// Returns the noise beside a free response if the Bayesian information criterion finds no force in the record.
+    /// Returns the noise beside a free response if the Bayesian information criterion finds no
+    /// force in the record.
     ///
     /// # Source
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
     pub fn noise_without_force(&self) -> Option<f64> {
         let forces = self.units.len();
         let process = LowPass::new(limits::FORCE_ORDERS[0]).ok()?;
-        // As little force as a trial may have, at any corner.
+        // The least force that a trial may have, at any corner.
         let mut least = vec![(limits::RATIO_RANGE.start * (1.0 + 1e-9)).ln(); forces];
         least.push((0.1 * limits::HIGHEST_CORNER).ln());
         let without = self.trial(&process, None, &least)?;
@@ -213,7 +214,8 @@ impl Augmented {
         self.machine.out.nrows()
     }
 
-    /// Returns the squares of the innovations of each sample over their variances, summed over the channels.
+    /// Returns the squares of the innovations of each sample over their variances, summed over the
+    /// channels.
     pub fn energies(&self, tuned: &Tuned) -> Option<Vec<f64>> {
         let process = LowPass::new(tuned.model.order).ok()?;
         let space = self.space(&tuned.model, &process, tuned.noise, 10.0).ok()?;

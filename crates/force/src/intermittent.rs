@@ -1,4 +1,5 @@
-//! Forces that act for a part of a record: noise from the part in which they do not, and the rest before them.
+//! Forces that act for a part of a record: noise from the part in which they do not, and the rest
+//! before them.
 
 use mechid_model::SecondOrderSystem;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -10,15 +11,16 @@ use crate::limits::{INTERMITTENT_BLOCKS, INTERMITTENT_LEVEL, QUIET_BLOCKS, REST_
 use crate::measurement::{Measurement, Start};
 use crate::noise::channel_sizes;
 
-/// Returns the range of samples in which the innovations of a stationary force are smallest, if they are smaller
-/// there than chance makes them; `None` of a force that is stationary.
+/// Returns the range of samples in which the innovations of a stationary force are smallest, if
+/// they are smaller there than chance makes them; `None` of a force that is stationary.
 ///
-/// The likelihood of a stationary force takes the spectrum of a pulse, which falls with the frequency, for that of the
-/// whole record; the noise below it, which the quiet part shows, is then lost.
+/// The likelihood of a stationary force takes the spectrum of a pulse, which falls with the
+/// frequency, for that of the whole record; the noise below it, which the quiet part shows, is then
+/// lost.
 ///
 /// # Source
-/// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio of the variances of
-/// two parts), with Bonferroni's bound for the number of ranges.
+/// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio
+/// of the variances of two parts), with Bonferroni's bound for the number of ranges.
 pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Range<usize>> {
     let energies = augmented.energies(tuned)?;
     let block = energies.len() / INTERMITTENT_BLOCKS;
@@ -44,7 +46,7 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
             .map(|blocks| (blocks * block * channels) as f64);
         let ratio = ((all - inside) / of_outside) / (inside / of_inside);
         let p_value = FisherSnedecor::new(of_outside, of_inside).ok()?.sf(ratio);
-        // Of ranges that are as certain the longest one knows the noise best.
+        // The longest of ranges that are as certain knows the noise best.
         if best.as_ref().is_none_or(|(least, longest)| {
             p_value < *least || (p_value == *least && range.len() > longest.len())
         }) {
@@ -55,8 +57,9 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
     (p_value * count < INTERMITTENT_LEVEL).then(|| range.start * block..range.end * block)
 }
 
-/// Returns whether the system is at rest at the first sample, by the Bayesian information criterion of a displacement and a
-/// velocity of every degree of freedom there; `noise_std` are the standard deviations of the channels if they are known.
+/// Returns whether the system is at rest at the first sample, by the Bayesian information criterion
+/// of a displacement and a velocity of every degree of freedom there; `noise_std` has the standard
+/// deviation of each channel in its unit (m, m/s or m/s²), if they are known.
 ///
 /// The first samples of the record decide, under the force of maximum likelihood from rest.
 ///

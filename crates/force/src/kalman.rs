@@ -62,8 +62,8 @@ pub struct KalmanForce {
 ///
 /// Each force is a stationary process with a band from 0 up to a corner frequency ([`ForceModel`]),
 /// continuous in time, without an assumption between samples. Order and corner of the band, the
-/// sizes of the forces and the noise are those of maximum likelihood; where the force acts for a part of the record only,
-/// the noise is that of the other part. The smoother uses the whole
+/// sizes of the forces and the noise are those of maximum likelihood; where the force acts for a
+/// part of the record only, the noise is that of the other part. The smoother uses the whole
 /// record for every instant. The standard error comes from the model.
 ///
 /// For a structure on springs, accelerations and velocities do not show a constant force, and their
@@ -159,8 +159,8 @@ pub fn kalman(
     Ok(KalmanForce { force, ..smoothed })
 }
 
-/// Returns the noise of the part of the record in which no force acts, in the scales of the channels; `None` of a stationary
-/// force, and where one acts everywhere.
+/// Returns the noise of the part of the record in which no force acts, in the scales of the
+/// channels; `None` of a stationary force, and where one acts everywhere.
 fn of_quiet_part(
     augmented: &Augmented,
     tuned: &Tuned,

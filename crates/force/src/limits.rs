@@ -154,7 +154,7 @@ pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
 // Forces that act for a part of a record
 
-/// Number of parts of a record of which the quiet ones are looked for.
+/// Number of parts of a record, each of which is quiet or not.
 pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
 
 /// Minimum number of consecutive parts that show the noise: a quarter of the record.
@@ -163,6 +163,6 @@ pub(crate) const QUIET_BLOCKS: usize = 4;
 /// Probability of parts as different by chance, below which a force is not stationary.
 pub(crate) const INTERMITTENT_LEVEL: f64 = 0.01;
 
-/// Number of samples, the first of a record, that decide whether it begins at rest; more do not know the first state
-/// better once its free response has decayed, and take longer.
+/// Number of samples, the first of a record, that decide whether it begins at rest; more do not
+/// know the first state better once its free response has decayed, and take longer.
 pub(crate) const REST_SAMPLES: usize = 1024;

@@ -7,8 +7,8 @@ use nalgebra::Complex;
 
 use crate::error::ProblemError;
 
-/// An oscillator under a force of many lines, whose motion is integrated at eight times the sampling rate by the
-/// classical Runge–Kutta rule. With all faults zero it is linear.
+/// An oscillator under a force of many lines, whose motion is integrated at eight times the sampling
+/// rate by the classical Runge–Kutta rule. With all faults zero it is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultyOscillator {
     /// Mass, in kg.
@@ -17,9 +17,9 @@ pub struct FaultyOscillator {
     pub damping: f64,
     /// Stiffness, in N/m.
     pub stiffness: f64,
-    /// Relative change of the stiffness from the first sample to the last.
+    /// Relative change of the stiffness from the first sample to the last (pure number).
     pub drift: f64,
-    /// Cubic stiffness, in N/m³.
+    /// Cubic stiffness of the spring beside the linear one, in N per cubed displacement in m.
     pub cubic: f64,
     /// Coulomb friction, in N.
     pub friction: f64,
@@ -52,9 +52,10 @@ impl FaultyOscillator {
         }
     }
 
-    /// Returns force (N) and displacement (m) of one window. The force repeats every `period` samples, its lines reach
-    /// up to `band` of the sampling rate and have a standard deviation of some tens of N; the motion starts from rest,
-    /// and the `skipped` first samples are no part of the window.
+    /// Returns force (N) and displacement (m) of one window. The force repeats every `period`
+    /// samples, its lines reach up to `band` of the sampling rate and have a standard deviation of
+    /// some tens of N; the motion starts from rest, and the `skipped` first samples are no part of
+    /// the window.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if the record does not fit in memory.

@@ -1,4 +1,4 @@
-//! Every number of this workspace that somebody else printed or that has a closed form, on one page.
+//! Numbers of this workspace that somebody else printed or that have a closed form, on one page.
 //!
 //! No row is judged by a simulator of this workspace.
 
@@ -29,7 +29,7 @@ pub enum Status {
 /// A number and what judges it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// What it is a number of.
+    /// Quantity.
     pub quantity: String,
     /// The number as printed, or by the closed form.
     pub expected: String,
@@ -58,7 +58,7 @@ impl Row {
 /// Rows of one judge.
 #[derive(Debug, Clone, Serialize)]
 pub struct Judge {
-    /// Who or what judges.
+    /// Name of the judge.
     pub name: &'static str,
     /// Publication with its pages, or the formula.
     pub source: &'static str,
@@ -66,7 +66,7 @@ pub struct Judge {
     pub tolerance: &'static str,
     /// File of the test that holds the rows.
     pub test: &'static str,
-    /// Its rows.
+    /// Rows.
     pub rows: Vec<Row>,
 }
 
@@ -102,7 +102,8 @@ pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
     ])
 }
 
-/// Writes the page into the book; where a folder is named, the page and the rows as JSON there instead.
+/// Writes the page into the book; where a folder is named, the page and the rows as JSON there
+/// instead.
 ///
 /// # Errors
 /// The message of the computation or of the file that fails.

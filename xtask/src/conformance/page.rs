@@ -75,8 +75,8 @@ fn section(text: &mut String, judge: &Judge) {
     }
 }
 
-/// Differences of two pages, line by line: texts must be the same, ratios the same to rounding; the numbers
-/// themselves are judged by their ratios.
+/// Differences of two pages, line by line: texts must be the same, ratios the same to rounding; the
+/// numbers themselves are judged by their ratios.
 pub(super) fn differences(committed: &str, computed: &str) -> Vec<String> {
     let (old, new): (Vec<&str>, Vec<&str>) =
         (committed.lines().collect(), computed.lines().collect());

@@ -88,8 +88,7 @@ impl Film {
             pairs.push((&base.full, reduced));
         }
         let fisher = FisherSnedecor::new(EACH as f64, degrees_of_freedom.max(1) as f64).ok();
-        film.inertia = likelihood_ratio(&pairs, EACH)
-            .map(|test| over_excess(test, before_choice, fisher.as_ref()));
+        film.inertia = likelihood_ratio(&pairs, EACH);
         let eight = match coefficients {
             Coefficients::Eight => true,
             Coefficients::Twelve => false,
@@ -99,7 +98,8 @@ impl Film {
             let chosen = coefficients == Coefficients::Automatic && film.inertia.is_some();
             film.critical = fisher
                 .filter(|_| chosen)
-                .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE));
+                // The covariance grows by the excess, which divides the statistic.
+                .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE) / before_choice);
             film.widen(before_choice);
             return Ok(film);
         }
@@ -174,23 +174,6 @@ impl Film {
 
     pub fn values(&self) -> &[f64] {
         self.values.as_slice()
-    }
-}
-
-/// Divides the statistic of a test by the power of the residual over that of the noise.
-fn over_excess(
-    test: LikelihoodRatio,
-    excess: f64,
-    fisher: Option<&FisherSnedecor>,
-) -> LikelihoodRatio {
-    let statistic = test.statistic / excess;
-    match fisher.filter(|_| excess > 1.0) {
-        Some(fisher) => LikelihoodRatio {
-            statistic,
-            p_value: fisher.sf(statistic / test.restrictions as f64),
-            ..test
-        },
-        None => test,
     }
 }
 

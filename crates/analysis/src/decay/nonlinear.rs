@@ -1,4 +1,4 @@
-//! What a free decay shows beside linear modes: a backbone, harmonics, a second hit.
+//! Signs of more than linear modes in a free decay: a backbone, harmonics, a second hit.
 
 use mechid_estimate::IdentifiedMode;
 use mechid_modal::free_decay::Backbone;

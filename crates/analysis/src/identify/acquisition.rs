@@ -1,4 +1,4 @@
-//! What the acquisition did to open records: the force between samples, and AC coupled channels.
+//! Acquisition of open records: the force between samples, and AC coupled channels.
 
 use std::f64::consts::TAU;
 use std::str::FromStr;
@@ -14,7 +14,7 @@ use crate::AnalysisError;
 use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED};
 use crate::measurement::Block;
 
-/// What the acquisition did to open records, which the fit allows for.
+/// Traces of the acquisition in open records, which the fit allows for.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Acquisition {
     /// Course of the force between its samples, held or linear; `None`: that of a band-limited force.

@@ -13,10 +13,10 @@ use crate::text::significant;
 /// Maximum number of parameters and modes that a message names.
 const NAMED: usize = 6;
 
-/// Refuses a fit of a linear system that is singular to rounding, that explains no more of the response than chance
-/// does where nothing else says why, or in which the interval of every parameter holds zero. Several degrees of freedom
-/// may have modes all the same; with one, the response to the force is then no more than noise, and its mode is a peak
-/// of that.
+/// Refuses a fit of a linear system in which nothing else says why it is bad, and that is singular to rounding, that
+/// explains no more of the response than chance does, or in which the interval of every parameter holds zero. Several
+/// degrees of freedom may have modes all the same; with one, the response to the force is then no more than noise, and
+/// its mode is a peak of that.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -25,24 +25,19 @@ pub(super) fn check(
     modes: &[IdentifiedMode],
     checks: &[CheckRow],
 ) -> Result<(), AnalysisError> {
+    let refused = |why: String| Err(AnalysisError::NothingDetermined { why });
     let is_unrelated = |check: &&CheckRow| matches!(check.finding, Finding::Unrelated(_));
-    let others = checks.iter().filter(|check| check.is_bad() && !is_unrelated(check));
-    if fitted.nonlinear.is_some() {
+    let says_why = checks.iter().any(|check| check.is_bad() && !is_unrelated(&check));
+    if fitted.nonlinear.is_some() || says_why {
         return Ok(());
     }
     // Least squares may explain nothing of a response of which noise is a small part.
     if let Some(check) = checks.iter().find(is_unrelated)
         && !fitted.least_squares
-        && others.clone().next().is_none()
     {
-        return Err(AnalysisError::NothingDetermined { why: check.sentence() });
+        return refused(check.sentence());
     }
     let estimate = &fitted.estimate;
-    let refused = |why: String| {
-        let all: Vec<String> =
-            [why].into_iter().chain(others.clone().map(CheckRow::sentence)).collect();
-        Err(AnalysisError::NothingDetermined { why: all.join("; ") })
-    };
     let condition = estimate.condition();
     if condition * f64::EPSILON >= 1.0 {
         let number = significant(condition, 2);

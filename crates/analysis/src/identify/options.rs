@@ -109,7 +109,7 @@ pub struct OpenFit {
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
-    /// What the acquisition did to the records.
+    /// Traces of the acquisition in the records.
     pub acquisition: Acquisition,
 }
 
@@ -133,7 +133,7 @@ pub struct HitFit {
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
-    /// What the acquisition did to the records.
+    /// Traces of the acquisition in the records.
     pub acquisition: Acquisition,
 }
 

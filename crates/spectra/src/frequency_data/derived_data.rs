@@ -25,9 +25,9 @@ impl FrequencyData {
         Self { force, ..self.clone() }
     }
 
-    /// Returns the same data as if all channels passed the first-order high-pass of a corner frequency (rad/s) that those of
-    /// some `responses` and `forces`, counted from 0, have passed already: alike in all channels it leaves the
-    /// system as it is, and amplifies no noise.
+    /// Returns the same data as if all channels passed the first-order high-pass of a corner
+    /// frequency (rad/s) that those of some `responses` and `forces`, counted from 0, have passed
+    /// already: alike in all channels it leaves the system as it is, and amplifies no noise.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 2 (first-order systems).

@@ -1,4 +1,4 @@
-//! What the parts of the data say about the parameters, compared without fitting them one by one.
+//! Comparison of what the parts of the data say about the parameters, without fitting them one by one.
 
 mod comparison;
 mod linearised;
