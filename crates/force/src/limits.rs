@@ -154,7 +154,7 @@ pub(crate) const PARAMETER_STEP: f64 = 0.1;
 
 // Forces that act for a part of a record
 
-/// Number of parts of a record, each of which is quiet or not.
+/// Number of parts of a record that are quiet or not.
 pub(crate) const INTERMITTENT_BLOCKS: usize = 16;
 
 /// Minimum number of consecutive parts that show the noise: a quarter of the record.

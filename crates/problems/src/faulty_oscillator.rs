@@ -7,8 +7,8 @@ use nalgebra::Complex;
 
 use crate::error::ProblemError;
 
-/// An oscillator under a force of many lines, whose motion is integrated at eight times the sampling
-/// rate by the classical Runge–Kutta rule. With all faults zero it is linear.
+/// An oscillator under a force of many lines, whose motion is integrated at eight times the
+/// sampling rate by the classical Runge–Kutta rule. With all faults zero it is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultyOscillator {
     /// Mass, in kg.
@@ -61,7 +61,8 @@ impl FaultyOscillator {
     /// [`ProblemError::Signal`] if the record does not fit in memory.
     ///
     /// # Source
-    /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, section II.1 (the classical rule).
+    /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, section II.1 (the
+    /// classical rule).
     pub fn measure(
         &self,
         window: Sampling,

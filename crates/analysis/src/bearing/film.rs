@@ -118,7 +118,10 @@ impl Film {
         if let (Some(base), Some((values, _))) = (&reduced_base, &mut film.baseline) {
             *values = in_order(base, &common).0;
         }
-        film.fit = reduced;
+        film.fit = match &base {
+            None => rig.with_mass(tests, &rig.least_mass())?,
+            Some(_) => reduced,
+        };
         film.baseline_fit = reduced_base;
         let excess = film.excess_of(tests, baseline)?;
         film.widen(excess);
@@ -209,13 +212,15 @@ impl Fitted {
         }
     }
 
-    /// M if the film has no inertia: that of the baseline, estimated from both; as good as zero without one.
+    /// M far below rounding: the checks of a fit need one that can be inverted.
+    fn least_mass(&self) -> Matrix2<f64> {
+        let least = self.values.rows(EACH, EACH).amax() * f64::EPSILON * f64::EPSILON;
+        Matrix2::from_diagonal_element(least)
+    }
+
+    /// M if the film has no inertia: that of the baseline, estimated from both; zero without one.
     fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
-        // The checks of a fit need masses that can be inverted: far below rounding.
-        let Some(base) = base else {
-            let least = self.values.rows(EACH, EACH).amax() * f64::EPSILON * f64::EPSILON;
-            return Ok(Matrix2::from_diagonal_element(least));
-        };
+        let Some(base) = base else { return Ok(Matrix2::zeros()) };
         let of = |fitted: &Self| {
             let at = 2 * EACH;
             let covariance = fitted.covariance.view((at, at), (EACH, EACH)).into_owned();

@@ -6,7 +6,9 @@ use mechid_signal::message;
 
 use super::checks::CheckRow;
 use super::fitted::Fitted;
+use super::options::{PeriodEstimator, PeriodFit};
 use super::rows::CONFIDENCE;
+use super::{Identify, Source};
 use crate::AnalysisError;
 use crate::text::significant;
 
@@ -21,6 +23,7 @@ const NAMED: usize = 6;
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
 pub(super) fn check(
+    how: &Identify,
     fitted: &Fitted,
     modes: &[IdentifiedMode],
     checks: &[CheckRow],
@@ -31,9 +34,14 @@ pub(super) fn check(
     if fitted.nonlinear.is_some() || says_why {
         return Ok(());
     }
-    // Least squares may explain nothing of a response of which noise is a small part.
+    // Least squares, which noise biases, may explain nothing of a response that is hardly noise.
+    let is_biased = fitted.least_squares
+        || matches!(
+            &how.source,
+            Source::Periods(PeriodFit { estimator: Some(PeriodEstimator::LeastSquares), .. })
+        );
     if let Some(check) = checks.iter().find(is_unrelated)
-        && !fitted.least_squares
+        && !is_biased
     {
         return refused(check.sentence());
     }

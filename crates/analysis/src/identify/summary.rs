@@ -155,7 +155,7 @@ impl IdentificationSummary {
         };
         let modes = fitted.estimate.modes()?;
         let checks = checks::rows(fitted, &modes, &records, scope)?;
-        determined::check(fitted, &modes, &checks)?;
+        determined::check(how, fitted, &modes, &checks)?;
         fitted.scale_errors(&checks);
         let (fitted, estimate) = (&*fitted, &fitted.estimate);
         let (modes, carried) = (estimate.modes()?, rows::carries_covariance(estimate));
