@@ -118,44 +118,39 @@ pub fn kalman(
     };
     check_seen(system, measured, forced, &scale)?;
     let mut augmented = Augmented::new(system, measured, forced, start, &scale)?;
-    let mut is_quiet = false;
-    let tuned = match tuning {
-        Tuning::Likelihood => {
-            let tuned = augmented.most_likely(None)?;
-            match of_quiet_part(&augmented, &tuned, (system, measured, forced), &scale) {
-                Some(noise) => {
-                    scale.iter_mut().for_each(|level| *level *= noise);
-                    is_quiet = true;
-                    augmented = Augmented::new(system, measured, forced, start, &scale)?;
-                    augmented.most_likely(Some(1.0))?
-                }
-                None => tuned,
-            }
-        }
+    let mut tuned = match tuning {
+        Tuning::Likelihood => augmented.most_likely(None)?,
         Tuning::NoiseKnown(_) => augmented.most_likely(Some(1.0))?,
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
+    let quiet_noise = if *tuning == Tuning::Likelihood {
+        of_quiet_part(&augmented, &tuned, (system, measured, forced), &scale)
+    } else {
+        None
+    };
+    if let Some(noise) = quiet_noise {
+        scale.iter_mut().for_each(|level| *level *= noise);
+        augmented = Augmented::new(system, measured, forced, start, &scale)?;
+        tuned = augmented.most_likely(Some(1.0))?;
+    }
     let smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
     let known = *tuning != Tuning::Likelihood;
     let residual = measured.exceeds(forced).then(|| {
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
         Residual::from_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
     });
-    let points = augmented.posterior_points(&tuned, (known || is_quiet).then_some(1.0))?;
+    let points =
+        augmented.posterior_points(&tuned, (known || quiet_noise.is_some()).then_some(1.0))?;
     let force = match points.len() {
         0 | 1 => smoothed.force,
         _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &points)?,
     };
-    let force = force.with_residual(residual);
-    let band_hz = measured.band_hz().or_else(|| measured.shown(smoothed.seen_from_hz));
-    let force = match band_hz {
-        None => force,
-        Some(band_hz) => {
-            let process = LowPass::new(tuned.model.order)?;
-            let errors = augmented.information().errors(&tuned.model, &process, tuned.noise);
-            in_band(force, forced, band_hz, &errors)?
-        }
-    };
+    let mut force = force.with_residual(residual);
+    if let Some(band_hz) = measured.band_hz().or_else(|| measured.shown(smoothed.seen_from_hz)) {
+        let process = LowPass::new(tuned.model.order)?;
+        let errors = augmented.information().errors(&tuned.model, &process, tuned.noise);
+        force = in_band(force, forced, band_hz, &errors)?;
+    }
     Ok(KalmanForce { force, ..smoothed })
 }
 

@@ -121,7 +121,6 @@ impl BearingData {
                 displacement.file, acceleration.file
             )));
         }
-        let mass = how.stator_mass;
         let spacing_hz = spacing(d.omega());
         let is_kept = |omega: f64| {
             let (hz, others) = (omega / TAU, &how.without.frequencies);
@@ -133,38 +132,17 @@ impl BearingData {
         if keep.is_empty() {
             return Err(apart("every frequency is a multiple of the rotation, or left out"));
         }
-        let omega: Vec<f64> = keep.iter().map(|row| d.omega()[*row]).collect();
-        let motion = d.displacement().select_rows(&keep);
-        let mut force = d.force().select_rows(&keep);
-        for (to, row) in keep.iter().enumerate() {
-            // The table holds accelerations as displacements.
-            let factor = ResponseQuantity::Acceleration.per_displacement(d.omega()[*row]) * mass;
-            for direction in 0..2 {
-                force[(to, direction)] -= a.displacement()[(*row, direction)] * factor;
-            }
-        }
-        let kind = ResponseQuantity::Displacement;
-        let mut data = FrequencyData::from_amplitudes(omega.clone(), force, motion, kind)?;
         let noise = noise.zip(noise_of_a).map(|(noise, _)| noise);
-        if let (Some(_), Some(of_d), Some(of_a)) = (noise, d.noise(), a.noise()) {
-            let covariance = keep.iter().map(|row| {
-                let factor = (mass * d.omega()[*row].powi(2)).powi(2);
-                let mut both = of_d.covariance(*row).clone();
-                let of_force = of_a.covariance(*row).view((0, 0), (2, 2)) * Complex::from(factor);
-                both.view_mut((2, 2), (2, 2)).copy_from(&of_force);
-                both
-            });
-            data = data.with_noise(NoiseSpectrum::new(omega, covariance.collect())?)?;
-        }
+        let data = film_data(&d, &a, &keep, how.stator_mass, noise.is_some())?;
         let names = vec![displacement.file.clone(), acceleration.file.clone()];
         let mut remarks = [&displacement.remarks[..], &acceleration.remarks[..]].concat();
-        if noise.is_none() {
-            remarks.push(format!(
+        remarks.extend(noise.is_none().then(|| {
+            format!(
                 "{}: neither standard errors nor coherence in both tables; the noise was taken from the \
                  residual, on the displacement alone",
                 names.join(", ")
-            ));
-        }
+            )
+        }));
         let left_out_hz = rotating.into_iter().map(|row| d.omega()[row] / TAU).collect();
         let record = TestRecord {
             name: names.join(", "),
@@ -260,6 +238,43 @@ impl BearingData {
         self.left_out_hz = distinct(self.left_out_hz);
         Ok(self)
     }
+}
+
+/// Returns the film force f − M a and the displacement at the `keep` rows of two tables of frequency
+/// responses, of the displacement `d` and of the acceleration `a`.
+///
+/// `mass` is that of the stator in kg. With `noise` the covariances of both tables give that of the
+/// result, if both have one.
+fn film_data(
+    d: &FrequencyData,
+    a: &FrequencyData,
+    keep: &[usize],
+    mass: f64,
+    noise: bool,
+) -> Result<FrequencyData, AnalysisError> {
+    let omega: Vec<f64> = keep.iter().map(|row| d.omega()[*row]).collect();
+    let displacement = d.displacement().select_rows(keep);
+    let mut force = d.force().select_rows(keep);
+    for (index, row) in keep.iter().enumerate() {
+        // The table holds accelerations as displacements.
+        let factor = ResponseQuantity::Acceleration.per_displacement(d.omega()[*row]) * mass;
+        for direction in 0..2 {
+            force[(index, direction)] -= a.displacement()[(*row, direction)] * factor;
+        }
+    }
+    let kind = ResponseQuantity::Displacement;
+    let data = FrequencyData::from_amplitudes(omega.clone(), force, displacement, kind)?;
+    let (true, Some(d_noise), Some(a_noise)) = (noise, d.noise(), a.noise()) else {
+        return Ok(data);
+    };
+    let covariance = keep.iter().map(|row| {
+        let factor = (mass * d.omega()[*row].powi(2)).powi(2);
+        let mut both = d_noise.covariance(*row).clone();
+        let force_block = a_noise.covariance(*row).view((0, 0), (2, 2)) * Complex::from(factor);
+        both.view_mut((2, 2), (2, 2)).copy_from(&force_block);
+        both
+    });
+    Ok(data.with_noise(NoiseSpectrum::new(omega, covariance.collect())?)?)
 }
 
 fn apart(why: &str) -> AnalysisError {

@@ -56,14 +56,10 @@ impl Film {
     ) -> Result<Self, AnalysisError> {
         let rig = Fitted::of(tests)?;
         let base = baseline.map(Fitted::of).transpose()?;
-        let with_mass = rig.less(base.as_ref());
-        let (values, covariance) = (with_mass.0.clone(), with_mass.1.clone());
-        let degrees_of_freedom = [Some(&rig), base.as_ref()]
-            .into_iter()
-            .flatten()
-            .map(|fitted| fitted.full.estimate.degrees_of_freedom())
-            .min()
-            .unwrap_or(0);
+        let (values, covariance) = rig.less(base.as_ref());
+        let fits = std::iter::once(&rig).chain(&base);
+        let each = fits.map(|fitted| fitted.full.estimate.degrees_of_freedom());
+        let degrees_of_freedom = each.min().unwrap_or(0);
         let mut film = Self {
             values,
             covariance,
@@ -103,29 +99,41 @@ impl Film {
             film.widen(before_choice);
             return Ok(film);
         }
-        let eight = 2 * EACH;
-        let without = |fit: &OutputErrorFit| in_order(fit, &common).0.rows(0, eight).into_owned();
-        film.values = without(&reduced);
-        if let Some(base) = &reduced_base {
-            film.values -= without(base);
+        film.take_eight(reduced, reduced_base, &common)?;
+        if base.is_none() {
+            film.fit = rig.with_mass(tests, &rig.least_mass())?;
         }
-        film.covariance = match &base {
-            None => in_order(&reduced, &common).1.view((0, 0), (eight, eight)).into_owned(),
-            // The mass that both tests have in common is uncertain, too.
-            Some(_) => without_mass(&with_mass.1)?,
-        };
-        film.rig = in_order(&reduced, &common).0;
-        if let (Some(base), Some((values, _))) = (&reduced_base, &mut film.baseline) {
-            *values = in_order(base, &common).0;
-        }
-        film.fit = match &base {
-            None => rig.with_mass(tests, &rig.least_mass())?,
-            Some(_) => reduced,
-        };
-        film.baseline_fit = reduced_base;
         let excess = film.excess_of(tests, baseline)?;
         film.widen(excess);
         Ok(film)
+    }
+
+    /// Takes the eight coefficients of fits in which the mass is `common` to tests and baseline.
+    fn take_eight(
+        &mut self,
+        rig: OutputErrorFit,
+        baseline: Option<OutputErrorFit>,
+        common: &Matrix2<f64>,
+    ) -> Result<(), AnalysisError> {
+        let eight = 2 * EACH;
+        let (rig_values, rig_covariance) = in_order(&rig, common);
+        self.values = rig_values.rows(0, eight).into_owned();
+        self.covariance = match &baseline {
+            None => rig_covariance.view((0, 0), (eight, eight)).into_owned(),
+            // The mass that both tests have in common is uncertain, too.
+            Some(_) => without_mass(&self.covariance)?,
+        };
+        self.rig = rig_values;
+        if let Some(fit) = &baseline {
+            let values = in_order(fit, common).0;
+            self.values -= values.rows(0, eight);
+            if let Some((baseline_values, _)) = &mut self.baseline {
+                *baseline_values = values;
+            }
+        }
+        self.fit = rig;
+        self.baseline_fit = baseline;
+        Ok(())
     }
 
     /// Returns by how much the residuals of tests and baseline exceed their noise, the larger of both.

@@ -82,15 +82,9 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         let mut variance = [[0.0; 4]; 2];
         for row in rows {
             let weight = (two(data.displacement(), *row).adjoint() * inverse).transpose();
-            let covariance = noise.covariance(*row);
-            let block = |i: usize, j: usize| -> Complex2 {
-                covariance.fixed_view::<2, 2>(2 * i, 2 * j).into_owned()
-            };
-            // Of ΔG − H ΔD.
-            let error = block(1, 1) - h * block(0, 1) - block(1, 0) * h.adjoint()
-                + h * block(0, 0) * h.adjoint();
+            let powers = error_powers(noise.covariance(*row), &h);
             for (at, (a, b)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
-                let each = 0.5 * error[(a, a)].re.max(0.0) * weight[b].norm_sqr();
+                let each = 0.5 * powers[a] * weight[b].norm_sqr();
                 variance[0][at] += each;
                 variance[1][at] += each;
             }
@@ -117,6 +111,17 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         standard_error_real: variance.map(|[real, _]| root(real)),
         standard_error_imaginary: variance.map(|[_, imaginary]| root(imaginary)),
     })
+}
+
+/// Returns the powers of both components of ΔG − H ΔD, by the covariance of displacement D and film
+/// force G at a line.
+fn error_powers(covariance: &nalgebra::DMatrix<Complex<f64>>, h: &Complex2) -> [f64; 2] {
+    let block = |i: usize, j: usize| -> Complex2 {
+        covariance.fixed_view::<2, 2>(2 * i, 2 * j).into_owned()
+    };
+    let error =
+        block(1, 1) - h * block(0, 1) - block(1, 0) * h.adjoint() + h * block(0, 0) * h.adjoint();
+    [error[(0, 0)].re.max(0.0), error[(1, 1)].re.max(0.0)]
 }
 
 /// K − ω² M + iω C of twelve coefficients.

@@ -120,6 +120,18 @@ pub struct Amplitude {
     pub over_clearance: Option<f64>,
 }
 
+impl Amplitude {
+    /// Returns a note if the housing moves too far for a linear film.
+    fn remark(self) -> Option<String> {
+        let ratio = self.over_clearance.filter(|ratio| *ratio > LARGEST_AMPLITUDE)?;
+        Some(format!(
+            "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
+             not linear, and the coefficients depend on the amplitude; excite less",
+            significant(ratio, 2)
+        ))
+    }
+}
+
 impl BearingSummary {
     pub(super) fn new(
         tests: &BearingData,
@@ -130,15 +142,13 @@ impl BearingSummary {
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
         let error_scale = (film.excess <= DISTURBED_ALONE).then(|| film.excess.sqrt());
-        let uncertain = |value: f64, variance: f64| {
-            if error_scale.is_none() {
-                return Ok(Uncertain::known(value));
-            }
-            let standard_error = variance.max(0.0).sqrt();
-            let degrees_of_freedom = film.degrees_of_freedom;
-            let uncertain =
-                mechid_numerics::Uncertain { value, standard_error, degrees_of_freedom };
-            Uncertain::of(&uncertain)
+        let uncertain = |value: f64, variance: f64| match error_scale {
+            None => Ok(Uncertain::known(value)),
+            Some(_) => Uncertain::of(&mechid_numerics::Uncertain {
+                value,
+                standard_error: variance.max(0.0).sqrt(),
+                degrees_of_freedom: film.degrees_of_freedom,
+            }),
         };
         let count = film.values().len();
         let rows = (0..count).map(|at| {
@@ -148,6 +158,9 @@ impl BearingSummary {
             }
             Ok(CoefficientRow { name: NAMED[at], unit: UNITS[at / 4], estimate })
         });
+        let names = NAMED[..count].iter().map(|name| (*name).to_owned()).collect();
+        let covariance =
+            ParameterCovariance::new(names, film.covariance(), film.degrees_of_freedom);
         let amplitude = tests.largest_displacement.map(|largest_displacement| Amplitude {
             largest_displacement,
             over_clearance: how.size.clearance.map(|c| largest_displacement / c),
@@ -159,11 +172,7 @@ impl BearingSummary {
             load: how.load,
             confidence: CONFIDENCE,
             coefficients: rows.collect::<Result<_, AnalysisError>>()?,
-            covariance: ParameterCovariance::new(
-                NAMED[..count].iter().map(|name| (*name).to_owned()).collect(),
-                film.covariance(),
-                film.degrees_of_freedom,
-            ),
+            covariance,
             inertia_test: film.inertia,
             dimensionless: None,
             stability: None,
@@ -185,15 +194,7 @@ impl BearingSummary {
             Some(hz) => summary.whirl(film, TAU * hz, &uncertain)?,
             None => None,
         };
-        if let Some(ratio) = amplitude.and_then(|a| a.over_clearance)
-            && ratio > LARGEST_AMPLITUDE
-        {
-            summary.remarks.push(format!(
-                "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
-                 not linear, and the coefficients depend on the amplitude; excite less",
-                significant(ratio, 2)
-            ));
-        }
+        summary.remarks.extend(amplitude.and_then(Amplitude::remark));
         Ok(summary)
     }
 
@@ -338,27 +339,31 @@ impl BearingSummary {
             }
         }
         if let Some(stability) = &self.stability {
-            let mut rows = vec![header("rigid rotor")];
-            for (name, value, unit) in [
-                ("whirl frequency ratio", &stability.whirl_frequency_ratio, "–"),
-                ("critical mass per bearing", &stability.critical_mass, "kg"),
-            ] {
-                let mut row = vec![name.to_owned()];
-                match value {
-                    Some(value) => row.extend(self.cells(value)),
-                    None => row.push("none: stable".into()),
-                }
-                row.resize(4, String::new());
-                row.push(unit.into());
-                rows.push(row);
-            }
             text.push('\n');
-            text += &text_table(&rows);
+            text += &self.stability_table(stability);
         }
         text.push('\n');
         text += &self.fit_lines();
         text += &format!("\n{}", verdict(&self.checks));
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    fn stability_table(&self, stability: &StabilityRow) -> String {
+        let mut rows = vec![header("rigid rotor")];
+        for (name, value, unit) in [
+            ("whirl frequency ratio", &stability.whirl_frequency_ratio, "–"),
+            ("critical mass per bearing", &stability.critical_mass, "kg"),
+        ] {
+            let mut row = vec![name.to_owned()];
+            match value {
+                Some(value) => row.extend(self.cells(value)),
+                None => row.push("none: stable".into()),
+            }
+            row.resize(4, String::new());
+            row.push(unit.into());
+            rows.push(row);
+        }
+        text_table(&rows)
     }
 
     /// Returns value, standard error and interval.

@@ -80,39 +80,6 @@ impl Cells {
             let rows = entries.chunks(parameters.len().max(1)).map(<[f64]>::to_vec);
             ParameterCovariance { matrix: rows.collect(), parameters, degrees_of_freedom }
         });
-        let parameters = {
-            let names = self.texts("parameter").into_iter().zip(self.texts("unit"));
-            let numbers = self.numbers("value").into_iter().zip(self.numbers("standard_error"));
-            let all = names.zip(numbers).map(|((name, unit), (value, standard_error))| {
-                ParameterCell { name, unit, value: value.unwrap_or(f64::NAN), standard_error }
-            });
-            all.collect()
-        };
-        let modes = {
-            let frequency = self.numbers("natural_frequency_hz").into_iter();
-            let frequency = frequency.zip(self.numbers("natural_frequency_standard_error_hz"));
-            let damping = self.numbers("damping_ratio").into_iter();
-            let damping = damping.zip(self.numbers("damping_ratio_standard_error"));
-            let all =
-                frequency.zip(damping).map(|((hz, hz_error), (ratio, ratio_error))| ModeCell {
-                    natural_frequency_hz: hz.unwrap_or(f64::NAN),
-                    natural_frequency_standard_error_hz: hz_error,
-                    damping_ratio: ratio.unwrap_or(f64::NAN),
-                    damping_ratio_standard_error: ratio_error,
-                });
-            all.collect()
-        };
-        let findings = {
-            let codes = self.texts("finding").into_iter().zip(self.texts("finding_verdict"));
-            let verdict = |written: &str| {
-                let mut all = [Verdict::Good, Verdict::Doubtful].into_iter();
-                all.find(|verdict| verdict.to_string() == written).unwrap_or(Verdict::Bad)
-            };
-            let all = codes.zip(self.numbers("finding_value")).map(|((code, written), value)| {
-                FindingRow { code, verdict: verdict(&written), value }
-            });
-            all.collect()
-        };
         ResultRow {
             record: self.text("record").unwrap_or_default(),
             record_id: self.text("record_id"),
@@ -121,19 +88,54 @@ impl Cells {
             sample_rate_hz: self.number("sample_rate_hz"),
             first_sample: self.count("first_sample"),
             last_sample: self.count("last_sample"),
-            parameters,
+            parameters: self.parameters(),
             covariance,
-            modes,
+            modes: self.modes(),
             nrmse: self.number("nrmse"),
             unexplained_motion: self.number("unexplained_motion"),
             misfit_ratio: self.number("misfit_ratio"),
             condition_number: self.number("condition_number"),
-            findings,
+            findings: self.findings(),
             warnings: self.texts("warning"),
             notes: self.texts("note"),
             analysis_hash: self.text("analysis_hash").unwrap_or_default(),
             version: self.text("version").unwrap_or_default(),
         }
+    }
+
+    fn parameters(&mut self) -> Vec<ParameterCell> {
+        let names = self.texts("parameter").into_iter().zip(self.texts("unit"));
+        let numbers = self.numbers("value").into_iter().zip(self.numbers("standard_error"));
+        let cells = names.zip(numbers).map(|((name, unit), (value, standard_error))| {
+            ParameterCell { name, unit, value: value.unwrap_or(f64::NAN), standard_error }
+        });
+        cells.collect()
+    }
+
+    fn modes(&mut self) -> Vec<ModeCell> {
+        let frequency = self.numbers("natural_frequency_hz").into_iter();
+        let frequency = frequency.zip(self.numbers("natural_frequency_standard_error_hz"));
+        let damping = self.numbers("damping_ratio").into_iter();
+        let damping = damping.zip(self.numbers("damping_ratio_standard_error"));
+        let cells = frequency.zip(damping).map(|((hz, hz_error), (ratio, ratio_error))| ModeCell {
+            natural_frequency_hz: hz.unwrap_or(f64::NAN),
+            natural_frequency_standard_error_hz: hz_error,
+            damping_ratio: ratio.unwrap_or(f64::NAN),
+            damping_ratio_standard_error: ratio_error,
+        });
+        cells.collect()
+    }
+
+    fn findings(&mut self) -> Vec<FindingRow> {
+        let codes = self.texts("finding").into_iter().zip(self.texts("finding_verdict"));
+        let verdict = |written: &str| {
+            let mut all = [Verdict::Good, Verdict::Doubtful].into_iter();
+            all.find(|verdict| verdict.to_string() == written).unwrap_or(Verdict::Bad)
+        };
+        let rows = codes
+            .zip(self.numbers("finding_value"))
+            .map(|((code, written), value)| FindingRow { code, verdict: verdict(&written), value });
+        rows.collect()
     }
 
     fn text(&mut self, column: &str) -> Option<String> {

@@ -26,29 +26,17 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ParquetValues::Number(rows.iter().map(value).collect())
     };
     let parameter_texts = |value: &dyn Fn(&ParameterCell) -> String| {
-        let list = |row: &ResultRow| row.parameters.iter().map(value).collect();
-        ParquetValues::Texts(rows.iter().map(list).collect())
+        texts(rows, |row| row.parameters.iter().map(value).collect())
     };
     let parameter_numbers = |value: &dyn Fn(&ParameterCell) -> Option<f64>| {
-        let list = |row: &ResultRow| row.parameters.iter().map(value).collect();
-        ParquetValues::Numbers(rows.iter().map(list).collect())
+        numbers(rows, |row| row.parameters.iter().map(value).collect())
     };
     let modes = |value: &dyn Fn(&ModeCell) -> Option<f64>| {
-        let list = |row: &ResultRow| row.modes.iter().map(value).collect();
-        ParquetValues::Numbers(rows.iter().map(list).collect())
+        numbers(rows, |row| row.modes.iter().map(value).collect())
     };
     let findings = |value: &dyn Fn(&FindingRow) -> String| {
-        let list = |row: &ResultRow| row.findings.iter().map(value).collect();
-        ParquetValues::Texts(rows.iter().map(list).collect())
+        texts(rows, |row| row.findings.iter().map(value).collect())
     };
-    let covariance_parameters =
-        |row: &ResultRow| row.covariance.as_ref().map(|c| c.parameters.clone()).unwrap_or_default();
-    let covariance = |row: &ResultRow| {
-        let entries = row.covariance.iter().flat_map(|c| c.matrix.iter().flatten());
-        entries.map(|entry| Some(*entry)).collect()
-    };
-    let finding_values =
-        |row: &ResultRow| row.findings.iter().map(|finding| finding.value).collect();
     let all = [
         ("record", text(&|row| Some(row.record.clone()))),
         ("record_id", text(&|row| row.record_id.clone())),
@@ -62,11 +50,8 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ("unit", parameter_texts(&|p| p.unit.clone())),
         ("value", parameter_numbers(&|p| Some(p.value))),
         ("standard_error", parameter_numbers(&|p| p.standard_error)),
-        (
-            "covariance_parameter",
-            ParquetValues::Texts(rows.iter().map(covariance_parameters).collect()),
-        ),
-        ("covariance", ParquetValues::Numbers(rows.iter().map(covariance).collect())),
+        ("covariance_parameter", texts(rows, covariance_parameters)),
+        ("covariance", numbers(rows, covariance_entries)),
         ("degrees_of_freedom", count(&|row| row.covariance.as_ref().map(|c| c.degrees_of_freedom))),
         ("natural_frequency_hz", modes(&|mode| Some(mode.natural_frequency_hz))),
         (
@@ -81,11 +66,28 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ("condition_number", number(&|row| row.condition_number)),
         ("finding", findings(&|finding| finding.code.clone())),
         ("finding_verdict", findings(&|finding| finding.verdict.to_string())),
-        ("finding_value", ParquetValues::Numbers(rows.iter().map(finding_values).collect())),
-        ("warning", ParquetValues::Texts(rows.iter().map(|row| row.warnings.clone()).collect())),
-        ("note", ParquetValues::Texts(rows.iter().map(|row| row.notes.clone()).collect())),
+        ("finding_value", numbers(rows, |row| row.findings.iter().map(|one| one.value).collect())),
+        ("warning", texts(rows, |row| row.warnings.clone())),
+        ("note", texts(rows, |row| row.notes.clone())),
         ("analysis_hash", text(&|row| Some(row.analysis_hash.clone()))),
         ("version", text(&|row| Some(row.version.clone()))),
     ];
     all.into_iter().map(|(name, values)| ParquetColumn { name, values }).collect()
+}
+
+fn texts(rows: &[ResultRow], list: impl Fn(&ResultRow) -> Vec<String>) -> ParquetValues {
+    ParquetValues::Texts(rows.iter().map(list).collect())
+}
+
+fn numbers(rows: &[ResultRow], list: impl Fn(&ResultRow) -> Vec<Option<f64>>) -> ParquetValues {
+    ParquetValues::Numbers(rows.iter().map(list).collect())
+}
+
+fn covariance_parameters(row: &ResultRow) -> Vec<String> {
+    row.covariance.as_ref().map(|c| c.parameters.clone()).unwrap_or_default()
+}
+
+fn covariance_entries(row: &ResultRow) -> Vec<Option<f64>> {
+    let entries = row.covariance.iter().flat_map(|c| c.matrix.iter().flatten());
+    entries.map(|entry| Some(*entry)).collect()
 }

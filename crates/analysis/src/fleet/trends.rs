@@ -334,6 +334,26 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
+impl Trends {
+    /// Returns the table of all series as text.
+    fn table(&self) -> String {
+        let head = ["quantity", "median", "spread", "standard error", "outliers", "unit"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        for series in &self.series {
+            let error = series.standard_error.map_or_else(|| "–".into(), |e| significant(e, 2));
+            rows.push(vec![
+                series.name.clone(),
+                significant(series.median, 6),
+                significant(series.spread, 2),
+                error,
+                format!("{} of {}", series.outliers().count(), series.points.len()),
+                series.unit.clone(),
+            ]);
+        }
+        text_table(&rows)
+    }
+}
+
 impl fmt::Display for Trends {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let identified = self.records - self.failed;
@@ -365,20 +385,7 @@ impl fmt::Display for Trends {
                 self.analyses
             )?;
         }
-        let head = ["quantity", "median", "spread", "standard error", "outliers", "unit"];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        for series in &self.series {
-            let error = series.standard_error.map_or_else(|| "–".into(), |e| significant(e, 2));
-            rows.push(vec![
-                series.name.clone(),
-                significant(series.median, 6),
-                significant(series.spread, 2),
-                error,
-                format!("{} of {}", series.outliers().count(), series.points.len()),
-                series.unit.clone(),
-            ]);
-        }
-        write!(f, "\n{}", text_table(&rows))?;
+        write!(f, "\n{}", self.table())?;
         for (series, change) in self.changes() {
             writeln!(f, "{}", series.sentence(change))?;
         }

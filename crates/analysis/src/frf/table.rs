@@ -263,31 +263,28 @@ impl FrfTable {
         format!("{} / {}", self.response_names[motion - 1], self.force_names[force - 1])
     }
 
-    /// Returns the result as a person reads it.
-    fn text(&self) -> String {
+    /// Returns number and length of the windows that were averaged, as text.
+    fn windows_text(&self) -> String {
         let s = &self.segments;
-        let cut = match s.window {
+        let samples = message::count(s.samples, "sample");
+        let windows = match s.window {
             None if !self.hits.is_empty() => {
-                format!(
-                    "{} of {}",
-                    message::count(s.count, "hit"),
-                    message::count(s.samples, "sample")
-                )
+                format!("{} of {samples}", message::count(s.count, "hit"))
             }
-            None => {
-                let samples = message::count(s.samples, "sample");
-                format!("{} of {samples}", message::count(s.count, "period"))
-            }
+            None => format!("{} of {samples}", message::count(s.count, "period")),
             Some(window) => {
-                let samples = message::count(s.samples, "sample");
                 let count = message::count(s.count, "segment");
                 format!("{count} of {samples} every {} under a {window} window", s.hop)
             }
         };
-        let cut = match self.records.len() {
-            1 => cut,
-            several => format!("{several} records, {cut}"),
-        };
+        match self.records.len() {
+            1 => windows,
+            several => format!("{several} records, {windows}"),
+        }
+    }
+
+    /// Returns the result as a person reads it.
+    fn text(&self) -> String {
         let [low, high] = [self.frequency_hz.first(), self.frequency_hz.last()]
             .map(|hz| compact(hz.copied().unwrap_or(0.0), 5));
         let lines = match self.frequency_hz.len() {
@@ -295,20 +292,20 @@ impl FrfTable {
             n => format!("{n} lines, {low} to {high} Hz"),
         };
         let rate_hz = compact(self.sample_rate_hz, 8);
-        let mut text = match self.hits.is_empty() {
-            true => {
-                let row = |r: &AveragedRecord| {
-                    let (file, first, last) = (&r.file, r.first_sample, r.last_sample);
-                    format!("{file}: samples {first} to {last}, {rate_hz} Hz\n")
-                };
-                self.records.iter().map(row).collect()
-            }
-            false => heading(&self.hits, &rate_hz),
+        let mut text = if self.hits.is_empty() {
+            let row = |r: &AveragedRecord| {
+                let (file, first, last) = (&r.file, r.first_sample, r.last_sample);
+                format!("{file}: samples {first} to {last}, {rate_hz} Hz\n")
+            };
+            self.records.iter().map(row).collect()
+        } else {
+            heading(&self.hits, &rate_hz)
         };
         text += &format!(
-            "{} from {cut}, worth {} averages; {lines}\n\n",
+            "{} from {}, worth {} averages; {lines}\n\n",
             self.estimator,
-            compact(s.averages, 4),
+            self.windows_text(),
+            compact(self.segments.averages, 4),
         );
         let mut rows = vec![
             ["response", "largest magnitude", "at", "least coherence", "median"]

@@ -12,7 +12,7 @@ use mechid_spectra::LineData;
 use super::checks;
 use super::diagrams::DiagramData;
 use super::settings::ModesSettings;
-use super::sources::{outputs_of, responses_of};
+use super::sources::{Output, outputs_of, responses_of};
 use super::summary::{
     DroppedRow, HarmonicRow, LEVEL, ModalModeRow, ModesSummary, OutputRow, RecordRow,
 };
@@ -52,13 +52,6 @@ pub(super) fn modes(
             exclude_harmonics: without_harmonics,
         },
     )?;
-    let output = |output: super::sources::Output| OutputRow {
-        unit: output.quantity.map(|quantity| quantity.unit()),
-        column: output.name,
-        variance_explained: None,
-        variance_predicted: None,
-        noise_share: None,
-    };
     let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
     let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
     let harmonic = |h: &mechid_modal::ambient::Harmonic| HarmonicRow {
@@ -69,7 +62,7 @@ pub(super) fn modes(
         records: vec![RecordRow::of_block(&block)],
         hits: Vec::new(),
         inputs: Vec::new(),
-        outputs: outputs.into_iter().map(output).collect(),
+        outputs: outputs.into_iter().map(output_row).collect(),
         band_hz: estimate.band_hz,
         lines: estimate.lines,
         confidence: LEVEL,
@@ -87,6 +80,16 @@ pub(super) fn modes(
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
     let source = DiagramData::Ambient(estimate.stabilisation);
     Ok(Modes { summary, spectrum: spectrum(&data), source })
+}
+
+fn output_row(output: Output) -> OutputRow {
+    OutputRow {
+        unit: output.quantity.map(|quantity| quantity.unit()),
+        column: output.name,
+        variance_explained: None,
+        variance_predicted: None,
+        noise_share: None,
+    }
 }
 
 fn row(mode: &AmbientMode) -> ModalModeRow {

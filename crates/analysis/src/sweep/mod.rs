@@ -24,7 +24,7 @@ pub use self::summary::SweepSummary;
 use self::summary::{Failure, Point};
 use crate::AnalysisError;
 use crate::identify::KnownMass;
-use crate::measurement::{Measurement, Windowed};
+use crate::measurement::{Block, Measurement, Windowed};
 
 /// Settings of a sweep over the sampling step of an identification.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -151,24 +151,27 @@ pub fn sweep_record(
     let mut summary =
         how.summary(file, samples, &swept, reference, (natural_frequency_hz, &rate_hz))?;
     summary.remarks.extend(measured.unit_notes());
-    if how.estimator.is_of_spectra() && measured.held_to().is_none() {
-        let motion = measured.response().0;
-        let seam = periodicity(motion);
-        summary.remarks.extend((seam.verdict() > Verdict::Good).then(|| {
-            format!(
-                "the spectra are those of whole periods, and {} samples of {} are none: {seam}; give `period`, or sweep \
-                 an estimator in time",
-                measured.period, measured.file
-            )
-        }));
-    }
-    if let (true, Some(last)) = (how.estimator.is_of_spectra(), measured.held_to()) {
+    summary.remarks.extend(how.estimator.is_of_spectra().then(|| spectra_note(measured)).flatten());
+    Ok(summary)
+}
+
+/// Returns what a reader of spectra must know of the record: that its samples are no whole periods,
+/// or which of them were searched for the driven lines.
+fn spectra_note(measured: &Block) -> Option<String> {
+    if let Some(last) = measured.held_to() {
         let (first, file) = (measured.first_sample, &measured.file);
-        summary.remarks.push(format!(
+        return Some(format!(
             "the lines that are driven were found in samples {first} to {last} of {file}"
         ));
     }
-    Ok(summary)
+    let seam = periodicity(measured.response().0);
+    (seam.verdict() > Verdict::Good).then(|| {
+        format!(
+            "the spectra are those of whole periods, and {} samples of {} are none: {seam}; give `period`, or sweep \
+             an estimator in time",
+            measured.period, measured.file
+        )
+    })
 }
 
 /// Goes through a record once, for all of these decimations.

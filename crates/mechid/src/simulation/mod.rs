@@ -12,7 +12,7 @@ mod summary;
 
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
-use mechid_integrate::Convention;
+use mechid_integrate::{Convention, Scheme};
 use mechid_io::{Experiment, Level, ResponseKind};
 use mechid_model::{Instability, ModelError, Response};
 use mechid_signal::{Record, SignalError, noise};
@@ -95,24 +95,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
             return Err(SimulateError::ExactFromRest);
         }
         None => machine.exact_periodic(experiment, &period)?.into(),
-        Some(scheme) => {
-            let within = scheme.inner_instant();
-            let middle = within.map(|part| match interpolated(experiment, &period, part)? {
-                Some(middle) => Ok(middle),
-                None => Ok::<_, SimulateError>(experiment.force_within_steps(part)?),
-            });
-            let middle = middle.transpose()?;
-            match experiment.response {
-                ResponseKind::Periodic => {
-                    stepped(experiment, &**scheme, &machine, &period, middle.as_ref())?
-                }
-                ResponseKind::FromRest | ResponseKind::From(_) => {
-                    let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
-                    stepped(experiment, &**scheme, &machine, &force, middle.as_ref())
-                        .map_err(|error| error.with_instability(instability))?
-                }
-            }
-        }
+        Some(scheme) => by_steps(experiment, &**scheme, &machine, [&period, &force], instability)?,
     };
     let response = match experiment.response {
         ResponseKind::Periodic => map(&response, |_, r| repeated(r, experiment.periods))?,
@@ -127,17 +110,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         }
         SimulatedSystem::Dense(_) | SimulatedSystem::Sparse(_) => response,
     };
-    let noise = experiment.noise;
-    let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
-        (Some(level), Some(noise)) => {
-            // The experiment has one seed, and each quantity a separate stream.
-            noise::add_white(record, level.into(), noise.seed.wrapping_mul(4).wrapping_add(stream))
-        }
-        _ => Ok(record.clone()),
-    };
-    let measured_force = add(&force, 0, noise.and_then(|n| n.force))?;
-    let levels = noise.map_or([None; 3], |n| [n.displacement, n.velocity, n.acceleration]);
-    let measured_response = map(&response, |which, r| add(r, which as u64 + 1, levels[which]))?;
+    let (measured_force, measured_response) = with_noise(experiment, &force, &response)?;
     Ok(Simulation {
         scheme: scheme
             .as_ref()
@@ -156,6 +129,50 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         instability,
         multiplier,
     })
+}
+
+/// Steps through one period of the force, until the response is periodic, or through all of them.
+fn by_steps(
+    experiment: &Experiment,
+    scheme: &dyn Scheme,
+    machine: &Described,
+    [period, force]: [&Record; 2],
+    instability: Option<Instability>,
+) -> Result<Stepped, SimulateError> {
+    let within = scheme.inner_instant();
+    let middle = within.map(|part| match interpolated(experiment, period, part)? {
+        Some(middle) => Ok(middle),
+        None => Ok::<_, SimulateError>(experiment.force_within_steps(part)?),
+    });
+    let middle = middle.transpose()?;
+    match experiment.response {
+        ResponseKind::Periodic => stepped(experiment, scheme, machine, period, middle.as_ref()),
+        ResponseKind::FromRest | ResponseKind::From(_) => {
+            let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
+            stepped(experiment, scheme, machine, force, middle.as_ref())
+                .map_err(|error| error.with_instability(instability))
+        }
+    }
+}
+
+/// Returns force and response with the noise of the experiment.
+fn with_noise(
+    experiment: &Experiment,
+    force: &Record,
+    response: &Response,
+) -> Result<(Record, Response), SimulateError> {
+    let noise = experiment.noise;
+    let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
+        (Some(level), Some(noise)) => {
+            // The experiment has one seed, and each quantity a separate stream.
+            noise::add_white(record, level.into(), noise.seed.wrapping_mul(4).wrapping_add(stream))
+        }
+        _ => Ok(record.clone()),
+    };
+    let measured_force = add(force, 0, noise.and_then(|n| n.force))?;
+    let levels = noise.map_or([None; 3], |n| [n.displacement, n.velocity, n.acceleration]);
+    let measured_response = map(response, |which, r| add(r, which as u64 + 1, levels[which]))?;
+    Ok((measured_force, measured_response))
 }
 
 /// Computes the response of a described machine to `force` (samples × the degrees of freedom of

@@ -305,6 +305,42 @@ pub fn residual_spectrum(
     )
 }
 
+/// Returns the panel of a correlation coefficient with the bound that 95 % of noise stays within.
+fn correlation_panel(
+    x: Axis,
+    residual: &str,
+    what: &str,
+    at: &[f64],
+    coefficients: &[f64],
+    bound: f64,
+) -> Panel {
+    Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
+        .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
+        .reference(Reference::horizontal("95 % of noise", bound))
+        .reference(Reference::horizontal("", -bound))
+        .legend(Legend::Above)
+}
+
+/// Returns the panel of the correlation of a residual with itself.
+fn own_panel(residual: &str, own: &OwnCorrelation) -> Panel {
+    match own {
+        OwnCorrelation::Samples { correlation, .. } => {
+            let (r, bound) = (&correlation.coefficients, correlation.bound);
+            let lags: Vec<f64> = (1..).take(r.len()).map(f64::from).collect();
+            let x = Axis::linear("Lag", "samples");
+            correlation_panel(x, residual, "autocorrelation", &lags, r, bound)
+        }
+        OwnCorrelation::Lines(correlation) => {
+            // Real and imaginary part are drawn with a small offset.
+            let distance = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
+            let (r, bound) = (&correlation.coefficients, correlation.bound);
+            let distances: Vec<f64> = (0..r.len()).map(distance).collect();
+            let x = Axis::linear("Distance", "lines");
+            correlation_panel(x, residual, "from line to line", &distances, r, bound)
+        }
+    }
+}
+
 /// Draws the correlation of the residual with itself and with the forces.
 pub fn correlations(
     part: &RecordReview<'_>,
@@ -315,40 +351,23 @@ pub fn correlations(
     let mut members = Vec::new();
     let (mut widest, mut of_lines) = (0, false);
     for (c, channel) in correlations.iter().enumerate() {
-        let mut figure = Figure::new("");
         let residual = block.names.response_name(kind, c);
-        let panel = |x: Axis, what: &str, at: &[f64], coefficients: &[f64], bound: f64| {
-            Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
-                .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
-                .reference(Reference::horizontal("95 % of noise", bound))
-                .reference(Reference::horizontal("", -bound))
-                .legend(Legend::Above)
-        };
         match &channel.own {
-            Some(OwnCorrelation::Samples { correlation, span }) => {
-                widest = widest.max(*span);
-                let (r, bound) = (&correlation.coefficients, correlation.bound);
-                let lags: Vec<f64> = (1..).take(r.len()).map(f64::from).collect();
-                let x = Axis::linear("Lag", "samples");
-                figure = figure.panel(panel(x, "autocorrelation", &lags, r, bound));
-            }
-            Some(OwnCorrelation::Lines(correlation)) => {
-                of_lines = true;
-                // Real and imaginary part are drawn with a small offset.
-                let distance = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
-                let (r, bound) = (&correlation.coefficients, correlation.bound);
-                let distances: Vec<f64> = (0..r.len()).map(distance).collect();
-                let x = Axis::linear("Distance", "lines");
-                figure = figure.panel(panel(x, "from line to line", &distances, r, bound));
-            }
+            Some(OwnCorrelation::Samples { span, .. }) => widest = widest.max(*span),
+            Some(OwnCorrelation::Lines(_)) => of_lines = true,
             None => {}
+        }
+        let mut figure = Figure::new("");
+        if let Some(own) = &channel.own {
+            figure = figure.panel(own_panel(&residual, own));
         }
         for (force, correlation) in &channel.forces {
             let (r, bound) = (&correlation.coefficients, correlation.bound);
             let lag = |at: usize| (at as f64 - (r.len() / 2) as f64) * channel.lag;
             let lags: Vec<f64> = (0..r.len()).map(lag).collect();
             let name = format!("with {}", block.names.force_name(*force));
-            figure = figure.panel(panel(Axis::linear("Lag", "s"), &name, &lags, r, bound));
+            let x = Axis::linear("Lag", "s");
+            figure = figure.panel(correlation_panel(x, &residual, &name, &lags, r, bound));
         }
         if !figure.panels().is_empty() {
             members.push((residual, figure));

@@ -7,7 +7,7 @@ use mechid_plot::Figure;
 
 use super::figures::drawn;
 use super::tables::Table;
-use super::{figure, figure_script, head};
+use super::{Drawn, figure, figure_script, head};
 use crate::ReportError;
 use crate::figures::trends::{DRAWN, panel};
 
@@ -17,19 +17,8 @@ use crate::figures::trends::{DRAWN, panel};
 /// # Errors
 /// [`ReportError::Plot`] if a figure cannot be drawn.
 pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> {
-    let mut figures = Vec::new();
+    let figures = figures(trends)?;
     let categories: Vec<String> = trends.series.iter().map(|one| one.category().into()).collect();
-    for (number, series) in (1..).zip(&trends.series) {
-        let count = series.points.len();
-        let thinned = if count > DRAWN {
-            format!("; some of {count} values are drawn")
-        } else {
-            String::new()
-        };
-        let caption = format!("{} with 95 % intervals{thinned}", series.name);
-        let one = Figure::new(series.name.as_str()).panel(panel(series, trends.over));
-        figures.push(drawn(format!("series-{number}"), one, caption)?);
-    }
     let (quantities, changes) = (quantities(trends), changes(trends));
     let (outliers, failures) = (outliers(trends), failures(trends));
     let page = html! {
@@ -82,6 +71,22 @@ pub fn trends_page(trends: &Trends, title: &str) -> Result<String, ReportError> 
         }
     };
     Ok(page.into_string() + "\n")
+}
+
+/// Draws every quantity over the records.
+fn figures(trends: &Trends) -> Result<Vec<Drawn>, ReportError> {
+    let figures = (1..).zip(&trends.series).map(|(number, series)| {
+        let count = series.points.len();
+        let thinned = if count > DRAWN {
+            format!("; some of {count} values are drawn")
+        } else {
+            String::new()
+        };
+        let caption = format!("{} with 95 % intervals{thinned}", series.name);
+        let one = Figure::new(series.name.as_str()).panel(panel(series, trends.over));
+        drawn(format!("series-{number}"), one, caption)
+    });
+    figures.collect()
 }
 
 /// Returns the table of the quantities.
