@@ -115,19 +115,14 @@ impl Tabulated {
         let Layout { points, forces, driven, functions } = Layout::of(table, &how.points)?;
         let rows = rows(table, how.band)?;
         let omega: Vec<f64> = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
-        let matrix = |of: &dyn Fn(&ResponseFunction) -> Complex<f64>| {
-            DMatrix::from_fn(points.len(), forces.len(), |i, j| of(functions[i][j]))
-        };
-        let response: Vec<_> =
-            rows.iter().map(|row| matrix(&|function| function.values[*row])).collect();
-        let stated = functions.iter().flatten().all(|f| f.standard_error.is_some());
-        let error = |f: &ResponseFunction, row: usize| match &f.standard_error {
-            Some(errors) => Complex::from(errors[row]),
-            None => Complex::default(),
-        };
-        let errors = || -> Vec<DMatrix<f64>> {
-            rows.iter().map(|row| matrix(&|f| error(f, *row)).map(|z| z.re)).collect()
-        };
+        let response: Vec<DMatrix<Complex<f64>>> = rows
+            .iter()
+            .map(|row| {
+                DMatrix::from_fn(points.len(), forces.len(), |i, j| functions[i][j].values[*row])
+            })
+            .collect();
+        let errors = standard_errors(&functions, &rows);
+        let stated = errors.is_some();
         let averaged = Averaged::of(table, &rows)?;
         let unused = |why: &str| {
             format!("{}: {why}: what a window blunts stays in the responses", table.file)
@@ -142,7 +137,7 @@ impl Tabulated {
                 table.file
             ));
         }
-        let (errors, is_averaged) = (stated.then(errors), averaged.is_some());
+        let is_averaged = averaged.is_some();
         let is_certain = !is_averaged && !stated && is_without_noise(table, &rows);
         if is_certain {
             remarks.push(format!(
@@ -173,21 +168,7 @@ impl Tabulated {
             remarks.push(unused("segments are stated, but no coherence"));
         }
         let noise = if stated { Noise::Stated } else { Noise::Unknown };
-        let variance: Option<Vec<_>> =
-            errors.map(|errors| errors.iter().map(|e| e.map(|e| 2.0 * e * e)).collect());
-        let column = |(input, dof): (usize, &usize)| {
-            let of_input = |h: &DMatrix<Complex<f64>>| h.columns(input, 1).into_owned();
-            let response: Vec<_> = response.iter().map(of_input).collect();
-            let variance = variance.as_ref().map(|variance| {
-                variance.iter().map(|v| v.columns(input, 1).into_owned()).collect::<Vec<_>>()
-            });
-            let variance = variance.as_deref();
-            let data =
-                FrequencyData::from_responses(&omega, &response, variance, measured, &[*dof])?;
-            Ok((data, *dof))
-        };
-        let columns = driven.iter().enumerate().map(column);
-        let columns: Vec<_> = columns.collect::<Result<_, AnalysisError>>()?;
+        let columns = columns(&omega, &response, errors.as_deref(), measured, &driven)?;
         let data = together(columns.iter().map(|(data, _)| Ok(data.clone())))?;
         let (coherent, is_averaged) = (Vec::new(), false);
         Ok(Self { points, driven, noise, data, coherent, columns, is_averaged, remarks })
@@ -234,6 +215,42 @@ impl Tabulated {
         }
         Ok(findings)
     }
+}
+
+/// Returns the standard errors (points × forces) at some rows of a table; `None` unless every
+/// response states its own.
+fn standard_errors(
+    functions: &[Vec<&ResponseFunction>],
+    rows: &[usize],
+) -> Option<Vec<DMatrix<f64>>> {
+    let stated: Vec<Vec<&Vec<f64>>> = functions
+        .iter()
+        .map(|of_point| of_point.iter().map(|f| f.standard_error.as_ref()).collect())
+        .collect::<Option<_>>()?;
+    let (points, forces) = (stated.len(), stated.first().map_or(0, Vec::len));
+    let at_row = |row: &usize| DMatrix::from_fn(points, forces, |i, j| stated[i][j][*row]);
+    Some(rows.iter().map(at_row).collect())
+}
+
+/// Returns the responses to each force by itself with its degree of freedom.
+fn columns(
+    omega: &[f64],
+    response: &[DMatrix<Complex<f64>>],
+    errors: Option<&[DMatrix<f64>]>,
+    measured: ResponseQuantity,
+    driven: &[usize],
+) -> Result<Vec<(FrequencyData, usize)>, AnalysisError> {
+    let column = |(input, dof): (usize, &usize)| {
+        let response: Vec<_> = response.iter().map(|h| h.columns(input, 1).into_owned()).collect();
+        // A standard error is that of the real and of the imaginary part.
+        let variance: Option<Vec<_>> = errors.map(|errors| {
+            errors.iter().map(|e| e.columns(input, 1).map(|e| 2.0 * e * e)).collect()
+        });
+        let variance = variance.as_deref();
+        let data = FrequencyData::from_responses(omega, &response, variance, measured, &[*dof])?;
+        Ok((data, *dof))
+    };
+    driven.iter().enumerate().map(column).collect()
 }
 
 /// Returns the responses with points in positive directions: a force or a response in −Z is one in +Z of the other sign.
