@@ -79,18 +79,7 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
     if !lines.next_of_data(&mut source)? {
         return Err(lines.malformed("the line with the size of the matrix is missing"));
     }
-    let sizes: Vec<Option<usize>> = lines.words().map(whole).collect();
-    let (size, stored) = match (header.is_coordinate, sizes.as_slice()) {
-        (true, [Some(rows), Some(columns), Some(stored)]) if rows == columns => (*rows, *stored),
-        (false, [Some(rows), Some(columns)]) if rows == columns => {
-            (*rows, header.symmetry.stored(*rows))
-        }
-        (true, [Some(_), Some(_), Some(_)]) | (false, [Some(_), Some(_)]) => {
-            return Err(lines.malformed("the matrix of a machine has as many rows as columns"));
-        }
-        (true, _) => return Err(lines.malformed("rows, columns and number of entries are needed")),
-        (false, _) => return Err(lines.malformed("number of rows and columns are needed")),
-    };
+    let (size, stored) = header.size(&lines)?;
     if size > limits.numbers / NUMBERS_PER_ROW || stored > limits.numbers {
         return Err(lines.too_large());
     }
@@ -137,6 +126,24 @@ fn matrix(source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError
 }
 
 impl Header {
+    /// Returns the numbers of rows and of stored entries, by the line with the size.
+    fn size(&self, lines: &Lines) -> Result<(usize, usize), IoError> {
+        let sizes: Vec<Option<usize>> = lines.words().map(whole).collect();
+        match (self.is_coordinate, sizes.as_slice()) {
+            (true, [Some(rows), Some(columns), Some(stored)]) if rows == columns => {
+                Ok((*rows, *stored))
+            }
+            (false, [Some(rows), Some(columns)]) if rows == columns => {
+                Ok((*rows, self.symmetry.stored(*rows)))
+            }
+            (true, [Some(_), Some(_), Some(_)]) | (false, [Some(_), Some(_)]) => {
+                Err(lines.malformed("the matrix of a machine has as many rows as columns"))
+            }
+            (true, _) => Err(lines.malformed("rows, columns and number of entries are needed")),
+            (false, _) => Err(lines.malformed("number of rows and columns are needed")),
+        }
+    }
+
     fn parse(lines: &Lines) -> Result<Self, IoError> {
         let words: Vec<String> =
             lines.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();

@@ -296,14 +296,14 @@ fn function<'a>(
         ),
     };
     let values = table.values(first.column)?;
-    let mut values: Vec<Complex<f64>> = match first.part {
+    let mut values = match first.part {
         Part::Real => {
             let second =
                 other(&|part| part == Part::Imaginary).ok_or_else(|| missing("imaginary part"))?;
             let imaginary = table.values(second.column)?;
             let in_si = if second.in_si == 1.0 { first.in_si } else { second.in_si };
             let pairs = values.iter().zip(imaginary);
-            pairs.map(|(re, im)| Complex::new(re * first.in_si, im * in_si)).collect()
+            pairs.map(|(re, im)| Complex::new(re * first.in_si, im * in_si)).collect::<Vec<_>>()
         }
         _ => {
             let second =
@@ -331,25 +331,28 @@ fn function<'a>(
         None => None,
     };
     if first.is_inverse {
-        for (at, value) in values.iter_mut().enumerate() {
-            if let Some(errors) = &mut standard_error {
-                errors[at] /= value.norm_sqr();
-            }
-            *value = value.inv();
-        }
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            return Err(IoError::Description {
-                file: table.file().into(),
-                what: format!(
-                    "value {} of column {} is 0, and has no inverse",
-                    at + 1,
-                    table.label(first.column)
-                ),
-            });
-        }
+        invert(&mut values, standard_error.as_deref_mut()).map_err(|row| IoError::Description {
+            file: table.file().into(),
+            what: format!(
+                "value {row} of column {} is 0, and has no inverse",
+                table.label(first.column)
+            ),
+        })?;
     }
     let [response, reference] = first.points.clone();
     Ok(ResponseFunction { response, reference, quantity: first.quantity, values, standard_error })
+}
+
+/// Replaces values by their inverses and carries their standard errors over; fails with the number
+/// of the first value that has no inverse, counted from 1.
+fn invert(values: &mut [Complex<f64>], mut errors: Option<&mut [f64]>) -> Result<(), usize> {
+    for (at, value) in values.iter_mut().enumerate() {
+        if let Some(errors) = &mut errors {
+            errors[at] /= value.norm_sqr();
+        }
+        *value = value.inv();
+    }
+    values.iter().position(|value| !value.is_finite()).map_or(Ok(()), |at| Err(at + 1))
 }
 
 /// Sorts the frequencies in rising order and removes the mirrored half of a two-sided spectrum,

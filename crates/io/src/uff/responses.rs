@@ -103,21 +103,7 @@ fn add(
             header.kind()
         )));
     }
-    let numbers_per_value = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
-    let rows = values.chunks_exact(numbers_per_value);
-    let frequency_hz: Vec<f64> = if header.is_even {
-        (0..header.count).map(|k| header.start + k as f64 * header.step).collect()
-    } else {
-        rows.clone().map(|row| row[0]).collect()
-    };
-    let numbers = rows.map(|row| {
-        if header.is_complex {
-            Complex::new(row[numbers_per_value - 2], row[numbers_per_value - 1])
-        } else {
-            Complex::from(row[numbers_per_value - 1])
-        }
-    });
-    let numbers: Vec<Complex<f64>> = numbers.collect();
+    let (frequency_hz, numbers) = frequencies_and_values(header, values);
     if let Some(at) = numbers.iter().position(|z| !z.is_finite()) {
         return Err(id.fault(format!("value {} of the function is not finite", at + 1)));
     }
@@ -138,19 +124,13 @@ fn add(
     let Some(reference) = header.reference.clone() else {
         return Err(id.fault("a frequency response function without a reference"));
     };
-    let [ordinate, denominator] = header.ordinate;
+    let denominator = header.ordinate[1];
     if ![0, GENERAL, EXCITATION_FORCE].contains(&denominator) {
         return Err(id.fault(format!(
             "a response per quantity of type {denominator}, not per excitation force (13)"
         )));
     }
-    let quantity = match ordinate {
-        8 => Some(ResponseQuantity::Displacement),
-        11 => Some(ResponseQuantity::Velocity),
-        12 => Some(ResponseQuantity::Acceleration),
-        _ => quantity_of_label(&header.units[0]),
-    };
-    let (values, standard_error) = (numbers, None);
+    let (quantity, values, standard_error) = (quantity(header), numbers, None);
     responses.functions.push(ResponseFunction {
         response,
         reference,
@@ -159,6 +139,34 @@ fn add(
         standard_error,
     });
     Ok(())
+}
+
+/// Returns the frequencies (Hz) and the values of a function from the numbers of its data set.
+fn frequencies_and_values(header: &Header, numbers: &[f64]) -> (Vec<f64>, Vec<Complex<f64>>) {
+    let numbers_per_value = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
+    let rows = numbers.chunks_exact(numbers_per_value);
+    let frequency_hz = if header.is_even {
+        (0..header.count).map(|k| header.start + k as f64 * header.step).collect()
+    } else {
+        rows.clone().map(|row| row[0]).collect()
+    };
+    let values = rows.map(|row| {
+        if header.is_complex {
+            Complex::new(row[numbers_per_value - 2], row[numbers_per_value - 1])
+        } else {
+            Complex::from(row[numbers_per_value - 1])
+        }
+    });
+    (frequency_hz, values.collect())
+}
+
+fn quantity(header: &Header) -> Option<ResponseQuantity> {
+    match header.ordinate[0] {
+        8 => Some(ResponseQuantity::Displacement),
+        11 => Some(ResponseQuantity::Velocity),
+        12 => Some(ResponseQuantity::Acceleration),
+        _ => quantity_of_label(&header.units[0]),
+    }
 }
 
 /// Quantity that the label of a function without a specific type states.
