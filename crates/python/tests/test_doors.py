@@ -515,6 +515,42 @@ def test_plots_go_into_the_axes_given() -> None:
     pyplot.close("all")
 
 
+def test_plots_show_modes_and_bearings() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("svg")
+    from matplotlib import pyplot
+
+    from mechid import plotting
+
+    hits: dict[str, Any] = {"force": "force", "acceleration": ["a1", "a2"], "hits": True, "band_hz": (2, 100)}
+    found = mechid.modes("examples/hammer-1.csv", **hits, diagrams=True)
+    ax = plotting.stabilisation(found)
+    drawn = {line.get_label(): line.get_xdata() for line in ax.lines}
+    assert found.diagrams is not None
+    stable = np.array(found.diagrams["stabilisation"]["is_stable"])
+    assert len(drawn["stable"]) == stable.sum() and len(drawn["not stable"]) == (~stable).sum()
+    for mode in found.modes:
+        assert np.abs(drawn["stable"] - mode.natural_frequency_hz.value).min() < 0.1
+    assert plotting.shape(found, 2).lines and plotting.assurance(found).images
+    with pytest.raises(ValueError, match="diagrams=True"):
+        plotting.stabilisation(mechid.modes("examples/hammer-1.csv", **hits))
+    pyplot.close("all")
+    bearing = mechid.bearing(
+        "examples/bearing-rig.csv", baseline="examples/bearing-dry.csv",
+        **RIG, period=256, stator_mass=20.0, rotation_hz=50.0,
+    )
+    ax = plotting.dynamic_stiffness(bearing, force=1, motion=2)
+    real, imaginary = (line for line in ax.lines if len(line.get_xdata()) and line.get_marker() == "None")
+    np.testing.assert_allclose(imaginary.get_ydata(), 2 * np.pi * imaginary.get_xdata() * bearing.damping[0, 1])
+    rows = bearing.to_dict()["dynamic_stiffness"]
+    errors = np.array([row["standard_error_real"][1] for row in rows])
+    distance = np.abs(np.array([row["real"][1] for row in rows]) - real.get_ydata())
+    assert np.mean(distance < 3 * errors) > 0.95 and len(ax.containers) == 2
+    with pytest.raises(IndexError, match="not 3"):
+        plotting.dynamic_stiffness(bearing, force=3)
+    pyplot.close("all")
+
+
 @pytest.mark.parametrize("options", [{"period": 256}, {"settle": 40}, {}])
 def test_predictions_are_those_of_the_program(
     program: Callable[..., str], tmp_path: Path, options: dict[str, Any]

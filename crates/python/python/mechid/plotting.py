@@ -9,10 +9,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._results import FrequencyResponses, Identified, IdentifiedResponses, Machine, Reconstructed, Sweep
+from ._results import (
+    Decayed,
+    FrequencyResponses,
+    Identified,
+    IdentifiedBearing,
+    IdentifiedResponses,
+    Machine,
+    Modes,
+    Reconstructed,
+    Sweep,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+Shaped = Machine | Modes | Decayed | Identified | IdentifiedResponses
 
 
 def receptance(
@@ -173,7 +185,7 @@ def sweep(found: Sweep, *, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def modes(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | None = None) -> Axes:
+def modes(machine: Shaped, *, ax: Axes | None = None) -> Axes:
     """Plot the eigenvalues of a machine in the complex plane, in rad/s."""
     axes = _axes(ax)
     values = np.array([mode.eigenvalue for mode in machine.modes])
@@ -184,13 +196,13 @@ def modes(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | Non
     return axes
 
 
-def shape(machine: Machine | Identified | IdentifiedResponses, mode: int = 1, *, ax: Axes | None = None) -> Axes:
+def shape(machine: Shaped, mode: int = 1, *, ax: Axes | None = None) -> Axes:
     """Plot real and imaginary part of a mode shape over the degrees of freedom.
 
     Parameters
     ----------
-    machine : Machine, Identified or IdentifiedResponses
-        A machine with modes.
+    machine : Machine, Modes, Decayed, Identified or IdentifiedResponses
+        Something with modes.
     mode : int
         Number of the mode, counted from 1.
     ax : matplotlib.axes.Axes, optional
@@ -220,7 +232,7 @@ def shape(machine: Machine | Identified | IdentifiedResponses, mode: int = 1, *,
     return axes
 
 
-def assurance(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | None = None) -> Axes:
+def assurance(machine: Shaped, *, ax: Axes | None = None) -> Axes:
     """Plot the modal assurance criterion of each pair of modes as squares with numbers."""
     axes = _axes(ax)
     shapes = np.array([mode.shape for mode in machine.modes])
@@ -235,6 +247,94 @@ def assurance(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes |
     axes.set_yticks(numbers)
     axes.set_xlabel("Mode")
     axes.set_ylabel("Mode")
+    return axes
+
+
+def stabilisation(found: Modes, *, ax: Axes | None = None) -> Axes:
+    """Plot the poles of models of rising order, with the mode indicator of forced tests behind them.
+
+    Parameters
+    ----------
+    found : Modes
+        Modes that were found with ``diagrams=True``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If the result has no diagrams.
+    """
+    diagrams = found.diagrams
+    if diagrams is None:
+        raise ValueError("the result has no diagrams: find the modes with diagrams=True")
+    axes = _axes(ax)
+    poles, indicator = diagrams["stabilisation"], diagrams.get("mode_indicator")
+    order, frequency = np.array(poles["order"]), np.array(poles["frequency_hz"])
+    stable = np.array(poles["is_stable"], dtype=bool)
+    axes.plot(frequency[stable], order[stable], "o", color="C0", label="stable")
+    axes.plot(frequency[~stable], order[~stable], "x", color="0.6", label="not stable")
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Order of the model")
+    axes.legend()
+    if indicator is not None:
+        behind = axes.twinx()
+        for values in indicator["singular_values"]:
+            behind.semilogy(indicator["frequency_hz"], values, color="0.7", linewidth=0.9, zorder=0)
+        behind.set_ylabel("Singular value")
+    return axes
+
+
+def dynamic_stiffness(
+    found: IdentifiedBearing, force: int = 1, motion: int = 1, *, ax: Axes | None = None
+) -> Axes:
+    """Plot an entry of the measured dynamic stiffness of a bearing, with twice its standard errors.
+
+    Lines show K − ω² M and ω C of the coefficients.
+
+    Parameters
+    ----------
+    found : IdentifiedBearing
+        An identified bearing.
+    force, motion : int
+        Direction of the force and of the displacement: 1 is x, 2 is y.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    IndexError
+        If a direction is neither 1 nor 2.
+    """
+    if not {force, motion} <= {1, 2}:
+        raise IndexError(f"a bearing has the directions 1 and 2, not {force} and {motion}")
+    rows = found.to_dict()["dynamic_stiffness"]
+    frequency = np.array([row["frequency_hz"] for row in rows])
+    place, omega = 2 * (force - 1) + motion - 1, 2 * np.pi * frequency
+    entry = (force - 1, motion - 1)
+    model = {
+        "real": found.stiffness[entry] - omega**2 * found.mass[entry],
+        "imaginary": omega * found.damping[entry],
+    }
+    axes = _axes(ax)
+    for (part, line), marker in zip(model.items(), "os", strict=True):
+        values = np.array([row[part][place] for row in rows])
+        errors = [row.get(f"standard_error_{part}") for row in rows]
+        known = all(error is not None for error in errors)
+        bars = [2 * error[place] for error in errors] if known else None
+        drawn = axes.errorbar(frequency, values, yerr=bars, fmt=marker, markersize=4, label=f"{part} part")
+        axes.plot(frequency, line, color=drawn[0].get_color())
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Dynamic stiffness (N/m)")
+    axes.legend()
     return axes
 
 
