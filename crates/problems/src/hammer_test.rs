@@ -178,7 +178,7 @@ impl HammerTest {
         let weights = low_pass(finer, margin);
         let sampled = |channel: usize, k: usize| -> f64 {
             let samples = fine.column(channel);
-            weights.iter().zip(samples.iter().skip(k * finer)).map(|(w, x)| w * x).sum()
+            weights.iter().zip(&samples.as_slice()[k * finer..]).map(|(w, x)| w * x).sum()
         };
         let record = |channels: std::ops::Range<usize>| {
             let values = DMatrix::from_fn(self.sampling.len(), channels.len(), |k, channel| {
