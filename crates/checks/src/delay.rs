@@ -85,7 +85,7 @@ pub fn delay_of_open_records(
 ) -> Option<Finding> {
     let (first, others) = records.split_first()?;
     let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
-    let mut likelihood = DelayedOpenRecord::of(&all, unknowns, fit)?;
+    let mut likelihood = DelayedOpenRecord::from_fit(&all, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
     let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {

@@ -203,7 +203,7 @@ fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatri
         (0..n).for_each(|at| covariance[(at, at)] = Complex::from(units[row].norm_sqr().recip()));
         covariance
     };
-    let white = Whitened::of(data, unknowns, &values, of_unit)?;
+    let white = Whitened::new(data, unknowns, &values, of_unit)?;
     let column = |column: DVectorView<'_, f64>| {
         DMatrix::from_fn(n, data.len(), |channel, row| {
             let at = 2 * (n * row + channel);

@@ -30,7 +30,7 @@ pub fn negative_mass(estimate: &Estimate) -> Option<Finding> {
         .filter(|(_, p)| p.matrix() == Matrix::Mass && p.row() == p.column());
     let masses: Vec<(usize, f64, f64)> = own
         .map(|(at, p)| {
-            (p.row(), estimate.mass()[(p.row(), p.row())], spread.of(at).max(0.0).sqrt())
+            (p.row(), estimate.mass()[(p.row(), p.row())], spread.variance_of(at).max(0.0).sqrt())
         })
         .collect();
     let (row, mass, standard_error) = *masses

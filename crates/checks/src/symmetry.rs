@@ -40,8 +40,10 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
         let free = [places[i * n + j], places[j * n + i]];
         let variance = match free {
             [None, None] => continue,
-            [Some(one), None] | [None, Some(one)] => spread.of(one),
-            [Some(p), Some(q)] => spread.of(p) + spread.of(q) - 2.0 * spread.between(p, q),
+            [Some(one), None] | [None, Some(one)] => spread.variance_of(one),
+            [Some(p), Some(q)] => {
+                spread.variance_of(p) + spread.variance_of(q) - 2.0 * spread.between(p, q)
+            }
         };
         let difference = mass[(i, j)] - mass[(j, i)];
         let standard_error = variance.max(0.0).sqrt();

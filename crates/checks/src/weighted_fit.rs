@@ -145,7 +145,7 @@ impl<'a> Weighing<'a> {
     ) -> Option<Self> {
         let noise = records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
-        let relations = Relations::of(estimate.unknowns());
+        let relations = Relations::from_unknowns(estimate.unknowns());
         let mut weighing =
             Self { records, estimate, relations, noise, levels, small: false, extent };
         let unknowns = weighing.start().len();
@@ -191,7 +191,7 @@ impl<'a> Weighing<'a> {
         let one = |(at, data): (usize, &FrequencyData)| {
             let covariance = |row: usize| self.covariance(at, row);
             match self.small {
-                true => Whitened::of(data, unknowns, entries, covariance),
+                true => Whitened::new(data, unknowns, entries, covariance),
                 false => Whitened::residual_of(data, unknowns, entries, covariance),
             }
         };
@@ -214,7 +214,7 @@ impl<'a> Weighing<'a> {
         let other = Weighing {
             records,
             estimate: self.estimate,
-            relations: Relations::of(self.estimate.unknowns()),
+            relations: Relations::from_unknowns(self.estimate.unknowns()),
             noise: self.noise.clone(),
             levels: self.levels.clone(),
             small: self.small,

@@ -1,4 +1,4 @@
-//! Covariance of estimated parameters, every entry of it or the factors of a product.
+//! Covariance of estimated parameters, as a full matrix or as the factors of a product.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -8,13 +8,14 @@ pub enum Covariance {
     /// Every entry.
     /// In products of SI units.
     Full(DMatrix<f64>),
-    /// Products for equations that were solved one by one: n equations of 3n unknowns each have (3n²)² covariances,
-    /// but not many more than (3n)² numbers in them.
+    /// Factors, for equations that were solved one by one: n equations of 3n unknowns each have
+    /// (3n²)² covariances, but these depend on not many more than (3n)² numbers.
     Product(Product),
 }
 
-/// Cov(θ_p, θ_q) = S_ij h_p·h_q, with S the residual covariance between the equations i and j of the two
-/// parameters and h the rows of the pseudo-inverses, which equations of the same regressors share.
+/// Factors of Cov(θ_p, θ_q) = S_ij h_p·h_q, with the residual covariance S between the equations i
+/// and j of the two parameters and the rows h of the pseudo-inverses, which equations with the same
+/// regressors share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Product {
     /// S, equations × equations.
@@ -23,29 +24,29 @@ pub struct Product {
     /// The different rows h, one below the other.
     /// In inverse SI units of the regressors.
     pub rows: DMatrix<f64>,
-    /// For every parameter the number of its equation, and that of its row h.
+    /// Indices of the equation and of the row h of every parameter.
     pub places: Vec<(usize, usize)>,
-    /// Flag of each parameter that the data leave open.
+    /// Flag of each parameter that the data do not determine.
     pub open: Vec<bool>,
 }
 
 impl From<DMatrix<f64>> for Covariance {
-    fn from(all: DMatrix<f64>) -> Self {
-        Self::Full(all)
+    fn from(entries: DMatrix<f64>) -> Self {
+        Self::Full(entries)
     }
 }
 
 impl Covariance {
-    /// The variance of one parameter.
+    /// Returns the variance of one parameter.
     /// In the square of the SI unit.
-    pub fn of(&self, at: usize) -> f64 {
+    pub fn variance_of(&self, at: usize) -> f64 {
         match self {
             Self::Product(product) if product.open[at] => f64::INFINITY,
             _ => self.between(at, at),
         }
     }
 
-    /// The covariance of two parameters; NaN if the data leave one open.
+    /// Returns the covariance of two parameters; NaN if the data do not determine one of them.
     /// In the product of both SI units.
     pub fn between(&self, p: usize, q: usize) -> f64 {
         match self {
@@ -69,7 +70,8 @@ impl Covariance {
         }
     }
 
-    /// Says that the data leave a parameter open: its variance is infinite, its covariances are NaN.
+    /// Marks a parameter that the data do not determine: its variance is infinite, its covariances
+    /// are NaN.
     pub fn leave_open(&mut self, at: usize) {
         match self {
             Self::Full(all) => {
@@ -81,7 +83,7 @@ impl Covariance {
         }
     }
 
-    /// All entries, parameters × parameters.
+    /// Returns all entries, parameters × parameters.
     /// In products of SI units.
     pub fn full(&self) -> DMatrix<f64> {
         match self {
@@ -91,22 +93,29 @@ impl Covariance {
                 let across = DMatrix::from_fn(count, count, |h, k| rows.row(h).dot(&rows.row(k)));
                 DMatrix::from_fn(places.len(), places.len(), |p, q| {
                     let ((i, h), (j, k)) = (places[p], places[q]);
-                    match open[p] || open[q] {
-                        false => residual[(i, j)] * across[(h, k)],
-                        true if p == q => f64::INFINITY,
-                        true => f64::NAN,
+                    if !open[p] && !open[q] {
+                        residual[(i, j)] * across[(h, k)]
+                    } else if p == q {
+                        f64::INFINITY
+                    } else {
+                        f64::NAN
                     }
                 })
             }
         }
     }
 
-    /// The covariance of sums f_i = Σ w_p θ_p over the parameters p of equation i: 2n×2n, real parts first.
-    /// One weight for each parameter, in any unit.
+    /// Returns the covariance of the sums f_i = Σ w_p θ_p over the parameters p of equation i:
+    /// 2n×2n, real parts first. One weight for each parameter, in any unit.
     ///
     /// # Source
     /// The law of propagation of uncertainty.
-    pub fn of_sums(&self, weights: &[Complex<f64>], equations: &[usize], n: usize) -> DMatrix<f64> {
+    pub fn covariance_of_sums(
+        &self,
+        weights: &[Complex<f64>],
+        equations: &[usize],
+        n: usize,
+    ) -> DMatrix<f64> {
         let parts = || weights.iter().map(|w| [w.re, w.im]).zip(equations).enumerate();
         match self {
             Self::Full(all) => {
@@ -143,13 +152,14 @@ impl Covariance {
         }
     }
 
-    /// gᵀ Σ g, the variance of gᵀθ.
+    /// Returns the variance gᵀ Σ g of a linear combination gᵀθ.
     /// The gradient has one entry per parameter, in inverse SI units.
     pub fn variance(&self, gradient: &DVector<f64>) -> f64 {
         match self {
             Self::Full(all) => gradient.dot(&(all * gradient)),
             Self::Product(Product { residual, rows, places, .. }) => {
-                // Σ_ij S_ij y_i·y_j with y_i the rows of the parameters of equation i, added up.
+                // Σ_ij S_ij y_i·y_j, where y_i is the sum of the rows of the parameters of equation
+                // i.
                 let by_row = rows.transpose();
                 let mut sums = DMatrix::zeros(rows.ncols(), residual.nrows());
                 for (weight, (i, h)) in gradient.iter().zip(places) {
@@ -185,21 +195,21 @@ mod tests {
         let weight = |at: usize| Complex::new(number(at, 1), number(at, 7));
         let weights: Vec<_> = (0..6).map(weight).collect();
         let equations = [0, 0, 1, 1, 2, 2];
-        let sums = DMatrix::from_fn(6, 6, |row, at| match equations[at] == row % 3 {
-            true if row < 3 => weights[at].re,
-            true => weights[at].im,
-            false => 0.0,
+        let sums = DMatrix::from_fn(6, 6, |row, at| match equations[at] {
+            equation if equation != row % 3 => 0.0,
+            _ if row < 3 => weights[at].re,
+            _ => weights[at].im,
         });
         let expected_sums = &sums * &full * sums.transpose();
         let mut full = Covariance::Full(full);
         for covariance in [&product, &full] {
-            let sums = covariance.of_sums(&weights, &equations, 3);
+            let sums = covariance.covariance_of_sums(&weights, &equations, 3);
             assert!((sums - &expected_sums).amax() < 1e-13 * expected_sums.amax());
         }
         for covariance in [&mut product, &mut full] {
             assert!((covariance.variance(&gradient) / expected - 1.0).abs() < 1e-13);
             covariance.leave_open(3);
-            assert_eq!(covariance.of(3), f64::INFINITY);
+            assert_eq!(covariance.variance_of(3), f64::INFINITY);
         }
         let (product, full) = (product.full(), full.full());
         for (p, q) in product.iter().zip(&full) {

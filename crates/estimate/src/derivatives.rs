@@ -1,11 +1,11 @@
 //! Velocity and acceleration when only one of displacement and acceleration was measured.
 //!
-//! Differentiation amplifies noise in proportion to frequency, twice for the acceleration. How it is
-//! done is the caller's choice, because each way assumes something:
+//! Differentiation amplifies noise in proportion to the frequency, and to its square for the
+//! acceleration. The caller chooses the method, because each one assumes something:
 //!
 //! | Function | Assumes | Costs |
 //! |---|---|---|
-//! | [`spectral_from_displacement`] | the record is whole periods | nothing; exact up to Nyquist |
+//! | [`spectral_from_displacement`] | the record is whole periods | none; exact up to Nyquist |
 //! | [`spectral_from_acceleration`] | the same, and no interest in the mean | the static displacement |
 //! | [`SavitzkyGolay::motion`] | smooth over a window | the ends of the record, and the highest frequencies |
 //! | [`SavitzkyGolay::twice_differentiated`] | the same, of force and acceleration | as above, and noise four orders up |
@@ -16,7 +16,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
 
-/// x, ẋ and ẍ of a displacement (m) recorded over whole periods, by multiplying its lines by iω.
+/// Returns x, ẋ and ẍ of a displacement (m) recorded over whole periods: its lines times iω.
 ///
 /// The Nyquist line (even length) has no velocity at the samples.
 ///
@@ -32,10 +32,10 @@ pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, Est
     Ok(Response::new(displacement.clone(), velocity, acceleration)?)
 }
 
-/// x, ẋ and ẍ of an acceleration (m/s²) recorded over whole periods.
+/// Returns x, ẋ and ẍ of an acceleration (m/s²) recorded over whole periods.
 ///
-/// The mean of a periodic acceleration is zero and that of the displacement is lost: take the mean
-/// off the force too before fitting, [`Record::without_mean`].
+/// The mean of a periodic acceleration is zero, so the mean of the displacement is lost: subtract
+/// the mean of the force too before a fit ([`Record::without_mean`]).
 ///
 /// # Errors
 /// [`EstimateError::Signal`] if an integral is too large for a record.
@@ -63,10 +63,10 @@ fn times(
     Spectrum::from_lines(spectrum.sampling(), lines)?.to_record()
 }
 
-/// A sliding polynomial fit: 2·half_width + 1 samples, a polynomial of some order through them.
+/// A sliding polynomial fit to windows of 2·half_width + 1 samples.
 ///
-/// Exact for polynomials of that order. At the ends the first and last windows are used off their
-/// centres, with more noise.
+/// It is exact for polynomials of its order. Near the ends of the record the first and the last
+/// window are evaluated off their centres, with more noise.
 ///
 /// # Source
 /// Savitzky & Golay (1964), Analytical Chemistry 36, 1627–1639.
@@ -79,18 +79,18 @@ pub struct SavitzkyGolay {
 }
 
 impl SavitzkyGolay {
-    /// Largest half-width, in samples; a polynomial over more follows no vibration.
+    /// Largest half-width, in samples; a polynomial over more samples cannot follow a vibration.
     pub const MOST_HALF_WIDTH: usize = 10_000;
 
-    /// Highest order: powers of time beyond it do not differ by more than rounding.
+    /// Highest order; higher powers of time differ by rounding only.
     pub const MOST_ORDER: usize = 20;
 
-    /// Samples under the polynomial, 2·half_width + 1.
+    /// Number of samples of a window, 2·half_width + 1.
     pub fn window(&self) -> usize {
         2 * self.half_width + 1
     }
 
-    /// A polynomial of `order` through `2 * half_width + 1` samples.
+    /// Creates the fit of a polynomial of `order` to `2 * half_width + 1` samples.
     ///
     /// # Errors
     /// [`EstimateError::Window`] unless order ≤ 2·half_width and half_width > 0,
@@ -114,8 +114,8 @@ impl SavitzkyGolay {
         Ok(Self { half_width, order, inverse })
     }
 
-    /// The `times`-th derivative of every channel (0 smooths), samples × channels as the record, in
-    /// its unit per s^`times`.
+    /// Returns the `times`-th derivative of every channel (0 smooths), samples × channels like the
+    /// record, in its unit per s^`times`.
     ///
     /// # Errors
     /// [`SignalError::TooShort`] if the record is shorter than the window,
@@ -134,7 +134,7 @@ impl SavitzkyGolay {
         let mut data = DMatrix::zeros(len, record.channels());
         for k in 0..len {
             let start = k.saturating_sub(half).min(len - window);
-            // Off the centre at the two ends only: one kernel at a time, not all of them.
+            // Near the ends each sample has a kernel of its own, computed when it is needed.
             let end = (k - start != half).then(|| self.kernel(k - start, times, scale));
             let kernel = end.as_ref().unwrap_or(&centre);
             for channel in 0..record.channels() {
@@ -145,7 +145,7 @@ impl SavitzkyGolay {
         Ok(Record::new(record.sampling(), data)?)
     }
 
-    /// Smoothed x, ẋ and ẍ of a displacement (m).
+    /// Returns the smoothed x, ẋ and ẍ of a displacement (m).
     ///
     /// # Errors
     /// As [`SavitzkyGolay::differentiate`]; the order must be at least 2.
@@ -154,12 +154,11 @@ impl SavitzkyGolay {
         Ok(Response::new(derivative(0)?, derivative(1)?, derivative(2)?)?)
     }
 
-    /// Differentiates acceleration and force twice: M, C and K hold between the acceleration's
-    /// derivatives and those of the force as they do between the motion and the force,
-    /// M ẍ″ + C ẍ′ + K ẍ = F″, without integrating and without its drift.
+    /// Differentiates acceleration and force twice: M ẍ″ + C ẍ′ + K ẍ = F″ has the same matrices as
+    /// the equation of motion and needs no integration, which would drift.
     ///
-    /// Returns (ẍ, ẍ′, ẍ″) in the places of displacement, velocity and acceleration, and F″ in that
-    /// of the force, for [`crate::time_domain::equation_of_motion`].
+    /// Returns (ẍ, ẍ′, ẍ″) as displacement, velocity and acceleration, and F″ as force, for
+    /// [`crate::time_domain::equation_of_motion`].
     ///
     /// # Errors
     /// As [`SavitzkyGolay::motion`].
@@ -171,9 +170,9 @@ impl SavitzkyGolay {
         Ok((self.motion(acceleration)?, self.differentiate(force, 2)?))
     }
 
-    /// Weights of the samples of a window for a derivative at its `place`-th sample.
-    fn kernel(&self, place: usize, times: usize, scale: f64) -> Vec<f64> {
-        let t = place as f64 / self.half_width as f64 - 1.0;
+    /// Returns the weights of the samples of a window for a derivative at one sample of the window.
+    fn kernel(&self, sample: usize, times: usize, scale: f64) -> Vec<f64> {
+        let t = sample as f64 / self.half_width as f64 - 1.0;
         // The derivative of t^p is p (p − 1) … (p − times + 1) t^(p − times).
         let factor = |p: usize| (p + 1 - times..=p).map(|i| i as f64).product::<f64>();
         let weights = (times..=self.order)

@@ -1,4 +1,4 @@
-//! M ẍ + C ẋ + K x = F fitted row by row: the common core of the linear estimators.
+//! Least squares on M ẍ + C ẋ + K x = F, row by row: the common core of the linear estimators.
 
 use mechid_model::{Matrix, Parameter};
 use mechid_numerics::least_squares::{Solution, solve_compressed};
@@ -15,8 +15,8 @@ use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 /// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
 ///
 /// A row is one instant, or the real or imaginary part of one spectral line (then the
-/// "acceleration" is −ω²X and the "velocity" iωX). All motions and forces are reduced to one
-/// small triangle, so memory does not grow with the data, and the same rows can be solved for
+/// "acceleration" is −ω²X and the "velocity" iωX). All motions and forces are reduced to one small
+/// triangular factor: memory does not grow with the data, and the same rows can be solved for
 /// several sets of [`Unknowns`].
 ///
 /// ```
@@ -28,8 +28,8 @@ use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 /// let force: DMatrix<f64> = 2.0 * &a + 0.3 * &v + 8.0 * &x;
 /// let mut rows = EquationOfMotion::new(1);
 /// rows.push_rows(a.as_view(), v.as_view(), x.as_view(), force.as_view())?;
-/// let found = rows.solve(&Unknowns::unknown_mass(1)?)?;
-/// assert!((found.stiffness()[(0, 0)] - 8.0).abs() < 1e-12);
+/// let estimate = rows.solve(&Unknowns::unknown_mass(1)?)?;
+/// assert!((estimate.stiffness()[(0, 0)] - 8.0).abs() < 1e-12);
 /// # Ok::<(), mechid_estimate::EstimateError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ pub struct EquationOfMotion {
     factor: TriangularFactor,
 }
 
-/// The unknown columns of an equation of motion: which matrix, which degree of freedom.
+/// The unknown columns of an equation of motion, each by its matrix and its degree of freedom.
 pub(crate) type Columns = Vec<(Matrix, usize)>;
 
 /// Equations of motion (rows of M, C, K) that have the same unknown columns.
@@ -50,12 +50,12 @@ struct Group {
 }
 
 impl EquationOfMotion {
-    /// No rows yet, `dof` degrees of freedom.
+    /// Creates equations of `dof` degrees of freedom without any row.
     pub fn new(dof: usize) -> Self {
         Self { dof, factor: TriangularFactor::new(dof.saturating_mul(4)) }
     }
 
-    /// Rows seen so far.
+    /// Number of rows so far.
     pub fn rows(&self) -> usize {
         self.factor.rows()
     }
@@ -65,7 +65,7 @@ impl EquationOfMotion {
     ///
     /// # Errors
     /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; then
-    /// nothing is added.
+    /// no row is added.
     pub fn push_rows(
         &mut self,
         acceleration: DMatrixView<'_, f64>,
@@ -90,7 +90,7 @@ impl EquationOfMotion {
         Ok(())
     }
 
-    /// Adds everything `other` has seen, as from another record.
+    /// Adds the rows of `other`, such as those of another record.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if it has another number of degrees of freedom,
@@ -100,11 +100,11 @@ impl EquationOfMotion {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow.into()) }
     }
 
-    /// Least squares for the free entries of M, C and K: one equation of motion after another, or all of
-    /// them together where entries are related.
+    /// Solves for the free entries of M, C and K by least squares: one equation of motion after
+    /// another, or all of them together if entries are related.
     ///
-    /// Parameters the data do not excite are reported in [`Estimate::undetermined`];
-    /// the others are as they should be.
+    /// Parameters that the data do not determine are listed in [`Estimate::undetermined`]; the
+    /// other estimates are not affected by them.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if `unknowns` has another number of degrees of freedom,
@@ -125,8 +125,8 @@ impl EquationOfMotion {
         RelatedEquations { motions, targets, rows: self.rows(), unknowns }.solve()
     }
 
-    /// The estimate to be, and the factors of its covariance: how every parameter follows from the
-    /// right-hand side of its equation, and what that misses.
+    /// Returns the parts of the estimate and the factors of its covariance: the rows that give each
+    /// parameter from the right-hand side of its equation, and the residual covariance.
     pub(crate) fn findings(
         &self,
         unknowns: &Unknowns,
@@ -135,7 +135,7 @@ impl EquationOfMotion {
         self.check(unknowns, &free)?;
         let groups = self.groups(unknowns, &free)?;
         let places: Vec<Place<'_>> =
-            free.iter().map(|parameter| Place::of(parameter, &groups)).collect();
+            free.iter().map(|parameter| Place::new(parameter, &groups)).collect();
         let values = places.iter().map(|p| p.group.solution.coefficients[(p.row, p.target)]);
         let mut residual_nrmse = vec![0.0; self.dof];
         for group in &groups {
@@ -171,7 +171,8 @@ impl EquationOfMotion {
         Ok(())
     }
 
-    /// Rows \[ẍ | ẋ | x | F\] that stand for `rows` original ones with the same Gram matrix.
+    /// Creates equations from compressed rows \[ẍ | ẋ | x | F\], which have the Gram matrix of
+    /// `rows` original ones.
     pub(crate) fn from_compressed(
         dof: usize,
         [acceleration, velocity, displacement, force]: [DMatrixView<'_, f64>; 4],
@@ -183,7 +184,7 @@ impl EquationOfMotion {
         Ok(equations)
     }
 
-    /// The compressed columns \[ẋ | x | F\], side by side.
+    /// Returns the compressed columns \[ẋ | x | F\], side by side.
     pub(crate) fn motion_and_force(&self) -> DMatrixView<'_, f64> {
         self.factor.r().columns(self.dof, 3 * self.dof)
     }
@@ -218,7 +219,7 @@ impl EquationOfMotion {
         Ok(Group { equations, columns, solution })
     }
 
-    /// The force of one equation less what its known entries account for.
+    /// Returns the force of one equation minus the forces of its known entries.
     fn target(&self, unknowns: &Unknowns, equation: usize) -> DVector<f64> {
         let r = self.factor.r();
         let mut target = r.column(3 * self.dof + equation).into_owned();
@@ -237,7 +238,8 @@ impl EquationOfMotion {
     }
 }
 
-/// The equations of motion, counted from 0, with the same unknown columns: those columns, and the equations.
+/// Groups the equations of motion (counted from 0) by their unknown columns: each entry has the
+/// columns and the equations that share them.
 pub(crate) fn equations_by_columns(
     unknowns: &Unknowns,
     free: &[Parameter],
@@ -255,10 +257,10 @@ pub(crate) fn equations_by_columns(
     shared
 }
 
-/// Position of a free parameter among the solutions.
+/// Index of a free parameter in the solutions of the groups.
 struct Place<'a> {
     group: &'a Group,
-    /// Number of unknowns in the groups before.
+    /// Number of unknowns in the preceding groups.
     first: usize,
     row: usize,
     equation: usize,
@@ -266,7 +268,7 @@ struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    fn of(parameter: &Parameter, groups: &'a [Group]) -> Self {
+    fn new(parameter: &Parameter, groups: &'a [Group]) -> Self {
         let equation = parameter.row();
         let mut first = 0;
         let at = |group: &'a Group| {
@@ -281,7 +283,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// The factors of the covariance.
+/// Returns the factors of the covariance.
 fn product(groups: &[Group], places: &[Place<'_>], dof: usize) -> Product {
     let mut residual = DMatrix::zeros(dof, dof);
     let solved = || {

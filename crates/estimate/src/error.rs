@@ -36,7 +36,7 @@ pub enum EstimateError {
     /// A problem needs at least one degree of freedom.
     #[error("an identification needs at least one degree of freedom")]
     NoDof,
-    /// No parameter has that name.
+    /// An unknown parameter is asked for.
     #[error("no unknown parameter is called \"{name}\"; the unknowns are {known}")]
     NoSuchParameter {
         /// The name asked for.
@@ -44,7 +44,7 @@ pub enum EstimateError {
         /// The names there are.
         known: String,
     },
-    /// An equation of motion without force and without known entry fixes ratios only.
+    /// An equation of motion has neither a force nor a known entry: it fixes only ratios.
     #[error(
         "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \
          its equation of motion fixes their ratios only; give one of the masses, or apply a force there"
@@ -70,7 +70,7 @@ pub enum EstimateError {
         /// Value of that entry, in its SI unit.
         upper_value: f64,
     },
-    /// An entry of the damping is known, though all of it follows from mass and stiffness.
+    /// An entry of the damping matrix is given although proportional damping determines it.
     #[error(
         "{parameter} cannot be given: of proportional damping every entry follows from mass and stiffness"
     )]
@@ -78,7 +78,7 @@ pub enum EstimateError {
         /// Name of the entry.
         parameter: String,
     },
-    /// Entries of M, C and K are related, which an estimator knows nothing of.
+    /// Entries of M, C and K are related, which the estimator does not support.
     #[error(
         "{estimator} takes every entry of M, C and K by itself: least squares on the equation of motion and \
          maximum likelihood know of symmetric matrices and proportional damping"
@@ -92,10 +92,10 @@ pub enum EstimateError {
     Undetermined {
         /// Names of the parameters concerned.
         parameters: String,
-        /// The combinations of parameters on which the data say nothing.
+        /// The combinations of parameters that the data do not determine.
         directions: String,
     },
-    /// Values beyond the largest number stand behind a parameter.
+    /// A parameter or its standard error overflows.
     #[error(
         "{parameter} or its standard error is beyond the largest number: a known value or the force \
          is far too large, or the response far too small"
@@ -136,7 +136,7 @@ pub enum EstimateError {
         /// Order of the polynomial.
         order: usize,
     },
-    /// The machine has no motion of that period.
+    /// The identified system has no steady state with that period.
     #[error(
         "the identified machine has no steady state of period {period} s: it is undamped or unstable"
     )]
@@ -144,7 +144,7 @@ pub enum EstimateError {
         /// The period, in seconds.
         period: f64,
     },
-    /// A mode is too fast to be stepped from sample to sample.
+    /// A mode is too fast for a step from sample to sample.
     #[error(
         "the fastest mode turns at {rate:.3e} rad/s, too fast for samples {dt:.3e} s apart: leave out \
          degrees of freedom without mass of their own, or sample faster"
@@ -155,7 +155,7 @@ pub enum EstimateError {
         /// Sampling interval, in s.
         dt: f64,
     },
-    /// A computed response grows beyond all bounds.
+    /// A computed response diverges.
     #[error(
         "the response of the nonlinear system grows beyond all bounds within {}: its spring or damper \
          turns negative at that amplitude",
@@ -174,7 +174,7 @@ pub enum EstimateError {
         /// Frequency, in Hz.
         frequency_hz: f64,
     },
-    /// No search for the best fit (maximum likelihood, output error or a constant) ended at one.
+    /// No search for the best fit (maximum likelihood, output error or a constant) converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
          steps. This says nothing about the model; more lines, more periods, a known mass or fewer \

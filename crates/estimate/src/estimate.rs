@@ -14,8 +14,8 @@ use crate::{EstimateError, Unknowns};
 
 /// M̂, Ĉ, K̂ with the covariance of what was estimated.
 ///
-/// The standard errors assume a model that is right and regressors that are exact: they describe
-/// the scatter between repeated experiments, not the bias of an estimator.
+/// The standard errors assume a correct model and exact regressors: they describe the scatter
+/// between repeated experiments, not the bias of an estimator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     unknowns: Unknowns,
@@ -28,7 +28,7 @@ pub struct Estimate {
     undetermined: Vec<Undetermined>,
 }
 
-/// Results from which an estimator makes an [`Estimate`]; values in the order of `unknowns.free()`.
+/// Results of an estimator for an [`Estimate`]; values are in the order of `unknowns.free()`.
 pub struct EstimateParts {
     /// Unknown entries of M, C and K.
     pub unknowns: Unknowns,
@@ -42,7 +42,7 @@ pub struct EstimateParts {
     pub residual_nrmse: Vec<f64>,
     /// Condition number of the regressors with columns of unit length.
     pub condition: f64,
-    /// Combinations of parameters on which the data say nothing.
+    /// Combinations of parameters that the data do not determine.
     pub undetermined: Vec<Undetermined>,
 }
 
@@ -59,19 +59,22 @@ pub struct Estimated {
     pub degrees_of_freedom: usize,
 }
 
-/// A combination of parameters on which the data say nothing.
+/// A combination of parameters that the data do not determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undetermined {
-    /// Strength with which the data excite it, as a ratio to the best determined combination.
+    /// Ratio of its singular value to that of the best determined combination.
     pub relative_singular_value: f64,
-    /// The parameters and how much of each, in its unit (any multiple of all of them may be added).
+    /// Parameters and the weight of each, in its unit: the data fit as well with any multiple of
+    /// all weights added to the parameters.
     pub terms: Vec<(Parameter, f64)>,
 }
 
 impl Estimate {
+    /// Creates an estimate from the results of an estimator.
+    ///
     /// # Errors
-    /// [`EstimateError::Unbounded`] if numbers beyond the largest one leave a parameter without a
-    /// finite value or standard error, though there are equations enough for both.
+    /// [`EstimateError::Unbounded`] if a parameter or its standard error overflows although there
+    /// are enough equations for both.
     pub fn new(mut parts: EstimateParts) -> Result<Self, EstimateError> {
         let parameters = parts.unknowns.free();
         for undetermined in &parts.undetermined {
@@ -85,7 +88,8 @@ impl Estimate {
             parts.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
         };
         for (at, p) in parameters.iter().enumerate().filter(|(_, p)| !open(p)) {
-            let unbounded = !parts.values[at].is_finite() || !parts.covariance.of(at).is_finite();
+            let variance = parts.covariance.variance_of(at);
+            let unbounded = !parts.values[at].is_finite() || !variance.is_finite();
             if unbounded && parts.degrees_of_freedom > 0 {
                 return Err(EstimateError::Unbounded { parameter: p.to_string() });
             }
@@ -102,10 +106,10 @@ impl Estimate {
         })
     }
 
-    /// Squared distance of the parameters of another estimate from these, in units of this covariance: dᵀ Cov⁻¹ d, a
-    /// pure number; of estimates that differ by noise alone about as much as there are parameters, if this one is the
-    /// best. `None` where the covariance has no inverse, as where entries follow from others, or the other has other
-    /// parameters.
+    /// Squared Mahalanobis distance dᵀ Cov⁻¹ d of the parameters of another estimate from these,
+    /// with this covariance: a pure number. If the estimates differ by noise alone, its mean is
+    /// about the number of parameters. `None` if the covariance has no inverse, as with related
+    /// entries, or if the other estimate has other parameters.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -113,12 +117,13 @@ impl Estimate {
         if self.parameters != other.parameters || self.unknowns.is_related() {
             return None;
         }
-        let change = self.values.iter().zip(&other.values).map(|(own, other)| other - own);
+        let change = self.values.iter().zip(&other.values).map(|(value, other)| other - value);
         self.squared_length(&DVector::from_iterator(self.values.len(), change))
     }
 
-    /// The same of a change of the parameters.
-    /// A change has one entry per parameter, in its SI unit; the length is a pure number.
+    /// Squared Mahalanobis length of a change of the parameters, as in
+    /// [`Estimate::squared_distance`]. A change has one entry per parameter, in its SI unit; the
+    /// length is a pure number.
     ///
     /// # Source
     /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
@@ -136,7 +141,8 @@ impl Estimate {
         Some(change.dot(&correlation.cholesky()?.solve(&change)))
     }
 
-    /// The same fit at other values, in the order of [`Unknowns::free`], with another covariance.
+    /// Returns the same fit with other values, in the order of [`Unknowns::free`], and another
+    /// covariance.
     /// Values have one entry per parameter, in its SI unit.
     ///
     /// # Errors
@@ -158,16 +164,19 @@ impl Estimate {
         })
     }
 
-    /// Returns the machine without the decay that an exponential window exp(−σt) on force and response adds, from
-    /// the fit of responses under it: these are of M, C + 2σM and K + σC + σ²M.
+    /// Returns the estimate without the damping that an exponential window exp(−σt) on force and
+    /// response adds: windowed responses belong to M, C + 2σM and K + σC + σ²M.
     ///
-    /// `rate` is σ, in 1/s; `unknowns` has the known entries of the machine itself, and the same ones free.
+    /// `rate` is σ, in 1/s; `unknowns` has the known entries without that damping, and the same
+    /// free entries.
     ///
     /// # Errors
-    /// [`EstimateError::Undetermined`] if the data leave an entry open, [`NumericsError::Size`] if others are free.
+    /// [`EstimateError::Undetermined`] if the data do not determine an entry,
+    /// [`NumericsError::Size`] for another number of free entries.
     ///
     /// # Source
-    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential
+    /// window).
     pub fn without_added_decay(
         &self,
         rate: f64,
@@ -221,7 +230,7 @@ impl Estimate {
         &self.unknowns
     }
 
-    /// Degrees of freedom of the machine, n.
+    /// Number of mechanical degrees of freedom, n.
     pub fn dof(&self) -> usize {
         self.unknowns.dof()
     }
@@ -231,13 +240,14 @@ impl Estimate {
         self.parameters.iter().enumerate().map(|(at, parameter)| Estimated {
             parameter: *parameter,
             value: self.values[at],
-            standard_error: self.covariance.of(at).sqrt(),
+            standard_error: self.covariance.variance_of(at).sqrt(),
             degrees_of_freedom: self.degrees_of_freedom,
         })
     }
 
-    /// The same estimate with standard errors `scale` times as large (a pure number), which is known to that many
-    /// degrees of freedom: the Birge ratio, where the data disagree beyond their noise.
+    /// Returns the same estimate with standard errors multiplied by `scale` (a pure number), the
+    /// Birge ratio of data that disagree by more than their noise. The degrees of freedom are those
+    /// of `scale` if these are fewer.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -248,7 +258,7 @@ impl Estimate {
         self
     }
 
-    /// One estimated entry by its name, such as `"k12"`.
+    /// Returns one estimated entry by its name, such as `"k12"`.
     ///
     /// # Errors
     /// [`EstimateError::NoSuchParameter`] if it is not among the unknowns.
@@ -261,17 +271,17 @@ impl Estimate {
         )
     }
 
-    /// Covariance of the estimated entries, in the order of [`Unknowns::free`], each in the product of
-    /// the two parameters' units (kg, N·s/m, N/m).
+    /// Covariance of the estimated entries, in the order of [`Unknowns::free`], each in the product
+    /// of the two parameters' units (kg, N·s/m, N/m).
     ///
-    /// An undetermined parameter has an infinite variance and NaN covariances.
-    /// Least squares on the equations of motion keep its factors only: each call multiplies them out, and
-    /// n degrees of freedom have (3n²)² entries.
+    /// An undetermined parameter has an infinite variance and NaN covariances. After least squares
+    /// on the equations of motion only the factors are stored: each call multiplies them to (3n²)²
+    /// entries for n degrees of freedom.
     pub fn covariance(&self) -> DMatrix<f64> {
         self.covariance.full()
     }
 
-    /// Covariance in the form that the estimator found it in.
+    /// Covariance in the form that the estimator stores, full or as factors.
     pub fn spread(&self) -> &Covariance {
         &self.covariance
     }
@@ -294,12 +304,13 @@ impl Estimate {
         stiffness
     }
 
-    /// α (1/s) and β (s) of a damping C = αM + βK, where the unknowns say that it is proportional.
+    /// Factors α (1/s) and β (s) of a damping C = αM + βK; `None` unless the unknowns have
+    /// proportional damping.
     ///
     /// # Source
     /// Rayleigh, *The Theory of Sound*, vol. 1 (1877), article 97.
     pub fn proportional_damping(&self) -> Option<[Uncertain; 2]> {
-        let relations = Relations::of(&self.unknowns)?;
+        let relations = Relations::from_unknowns(&self.unknowns)?;
         let factors = relations.damping_factors(&self.values)?;
         Some(factors.map(|(value, gradient)| Uncertain {
             value,
@@ -308,10 +319,10 @@ impl Estimate {
         }))
     }
 
-    /// The identified machine.
+    /// The identified system.
     ///
     /// # Errors
-    /// [`EstimateError::Undetermined`] if the data leave any entry open,
+    /// [`EstimateError::Undetermined`] if the data do not determine an entry,
     /// [`EstimateError::Model`] if M̂ is singular.
     pub fn system(&self) -> Result<SecondOrderSystem, EstimateError> {
         self.check_determined()?;
@@ -319,18 +330,18 @@ impl Estimate {
         Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
     }
 
-    /// The identified machine with the covariance of what was estimated, such as a force
-    /// reconstruction counts.
+    /// The identified system with the covariance of its estimated entries, for example for a force
+    /// reconstruction.
     ///
     /// # Errors
-    /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, which it is
-    /// not with as many unknowns as equations.
+    /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, as with
+    /// as many unknowns as equations.
     pub fn uncertain_system(&self) -> Result<UncertainSystem, EstimateError> {
         let covariance = self.covariance();
         Ok(UncertainSystem::new(self.system()?, self.parameters.clone(), covariance)?)
     }
 
-    /// An error that names what the data leave open, if they do.
+    /// Checks that the data determine every parameter; the error names the others.
     ///
     /// # Errors
     /// [`EstimateError::Undetermined`].
@@ -345,12 +356,12 @@ impl Estimate {
         Ok(())
     }
 
-    /// Equations minus unknowns, of the equation of motion that has the fewest to spare.
+    /// Number of equations minus unknowns, the smallest of all equations of motion.
     pub fn degrees_of_freedom(&self) -> usize {
         self.degrees_of_freedom
     }
 
-    /// √(Σe² / Σb²), the ratio of residual to right-hand side, of each fitted equation.
+    /// Ratio √(Σe² / Σb²) of residual e to right-hand side b of each fitted equation.
     pub fn residual_nrmse(&self) -> &[f64] {
         &self.residual_nrmse
     }
@@ -360,15 +371,15 @@ impl Estimate {
         self.condition
     }
 
-    /// The combinations of parameters on which the data say nothing, one entry for each; empty when
-    /// all is well.
+    /// Combinations of parameters that the data do not determine, one entry for each; empty if the
+    /// data determine every parameter.
     pub fn undetermined(&self) -> &[Undetermined] {
         &self.undetermined
     }
 }
 
 impl Estimated {
-    /// The confidence interval [low, high] at `level` (0.95 for 95 %), by Student's t.
+    /// Returns the confidence interval [low, high] at `level` (0.95 for 95 %), by Student's t.
     ///
     /// # Errors
     /// [`NumericsError::Level`] unless 0 < level < 1.
@@ -378,7 +389,7 @@ impl Estimated {
 }
 
 impl fmt::Display for Estimated {
-    /// `k12 = 1.234560e7 ± 3.2e4 N/m`, the number after ± being one standard error.
+    /// Writes `k12 = 1.234560e7 ± 3.2e4 N/m`; the number after ± is one standard error.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (parameter, unit) = (self.parameter, self.parameter.matrix().unit());
         if self.value.is_nan() {
@@ -389,7 +400,7 @@ impl fmt::Display for Estimated {
 }
 
 impl fmt::Display for Undetermined {
-    /// `k12 − 0.500·c12`: the combination that may be added freely.
+    /// Writes the undetermined combination, such as `k12 − 0.500·c12`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (at, (parameter, weight)) in self.terms.iter().enumerate() {
             let size = weight.abs();
@@ -412,7 +423,7 @@ impl fmt::Display for Undetermined {
 }
 
 impl fmt::Display for Estimate {
-    /// One parameter a line.
+    /// Writes one parameter per line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.parameters().try_for_each(|parameter| writeln!(f, "{parameter}"))
     }

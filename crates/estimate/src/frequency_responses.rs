@@ -1,4 +1,4 @@
-//! Maximum likelihood on averaged frequency responses, with what their segments do to them.
+//! Maximum likelihood on averaged frequency responses, corrected for the window of their segments.
 
 use mechid_model::SecondOrderSystem;
 use mechid_spectra::SpectraError;
@@ -14,31 +14,35 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// An estimate from averaged frequency responses.
 #[derive(Debug, Clone)]
 pub struct ResponseEstimate {
-    /// The fit, whose covariance knows that neighbouring lines err together.
+    /// The fit; its covariance allows for errors that are correlated between neighbouring lines.
     pub fit: OutputErrorFit,
-    /// The responses of each record as they were fitted: less what their window blunts.
+    /// Fitted responses of each record: the measured ones, corrected for the bias of their window.
     pub responses: Vec<Frf>,
-    /// Largest change of a parameter by that, in its standard errors (pure number); zero where nothing is blunted.
+    /// Largest change of a parameter by this correction, in its standard errors (pure number); zero
+    /// if the window has no bias.
     pub blunted: f64,
-    /// True if the rounds in which the blunting and the parameters are found came to an end.
+    /// True if the alternation between the correction and the parameters converged.
     pub settled: bool,
 }
 
-/// Fits the frequency responses of one or several records of a machine, each with the degrees of freedom of its
-/// forces, counted from 0.
+/// Fits the frequency responses of one or several records of a machine, each with the degrees of
+/// freedom of its forces, counted from 0.
 ///
-/// Averages over segments smooth a response by |W|² of their window. What that does to the responses of the
-/// machine found is taken off the data, and the fit repeated, until neither changes. The covariance is that of
-/// errors which the window ties together from line to line, and which motions and forces share, with weights that
-/// are sampled from few segments.
+/// An average over segments smooths a response by |W|² of their window. The bias is computed from
+/// the identified system and subtracted from the data, and the fit is repeated, until neither
+/// changes. The covariance allows for three things: the window correlates the errors of
+/// neighbouring lines, motions and forces have errors in common, and the weights are sampled from
+/// few segments.
 ///
 /// # Errors
-/// As [`output_error`] and [`Frf::data`]; [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) without a record.
+/// As [`output_error`] and [`Frf::data`];
+/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) without a record.
 ///
 /// # Source
-/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73, for the correlation of lines; Bendat & Piersol,
-/// *Random Data*, 4th ed. (2010), section 8.5, for the bias by a window; White (1980), Econometrica 48, 817–838,
-/// for the covariance; Satterthwaite (1946), Biometrics Bulletin 2, 110–114.
+/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73, for the correlation of lines; Bendat
+/// & Piersol, *Random Data*, 4th ed. (2010), section 8.5, for the bias by a window; White (1980),
+/// Econometrica 48, 817–838, for the covariance; Satterthwaite (1946), Biometrics Bulletin 2,
+/// 110–114.
 pub fn output_error_of_responses(
     records: &[(Frf, Vec<usize>)],
     unknowns: &Unknowns,
@@ -54,16 +58,16 @@ pub fn output_error_of_responses(
     {
         return Ok(plain(fit));
     }
-    let relations = Relations::of(unknowns);
+    let relations = Relations::from_unknowns(unknowns);
     let model = Sharpening { records, unknowns, noise: &noise, relations: relations.as_ref() };
     let values: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
-    let start = match &relations {
+    let theta = match &relations {
         None => DVector::from_column_slice(&values),
         Some(relations) => relations.unknowns(&values),
     };
-    let Some(errors) = model.errors(&raw, &start) else { return Ok(plain(fit)) };
+    let Some(errors) = model.errors(&raw, &theta) else { return Ok(plain(fit)) };
     let start = Sharpened {
-        theta: start,
+        theta,
         responses: raw.clone(),
         errors,
         blunted: 0.0,
@@ -87,7 +91,7 @@ pub fn output_error_of_responses(
     Ok(ResponseEstimate { fit, responses, blunted, settled })
 }
 
-/// What the sharpening of responses needs to know.
+/// Data and model of the window correction.
 struct Sharpening<'a> {
     records: &'a [(Frf, Vec<usize>)],
     unknowns: &'a Unknowns,
@@ -95,7 +99,7 @@ struct Sharpening<'a> {
     relations: Option<&'a Relations>,
 }
 
-/// Parameters, and responses less what the window of their segments makes of those of the system with them.
+/// Parameters, and the responses corrected for the window bias of the system with these parameters.
 struct Sharpened {
     theta: DVector<f64>,
     responses: Vec<Frf>,
@@ -114,10 +118,10 @@ impl Sharpening<'_> {
     }
 
     fn errors(&self, responses: &[Frf], theta: &DVector<f64>) -> Option<Errors> {
-        Errors::of(self.records, responses, self.unknowns, &self.entries(theta), self.noise)
+        Errors::new(self.records, responses, self.unknowns, &self.entries(theta), self.noise)
     }
 
-    /// Takes turns in sharpening the responses with the system and estimating the system from them.
+    /// Alternates between the correction of the responses and the estimation of the system.
     fn sharpen(&self, start: Sharpened) -> Result<Sharpened, EstimateError> {
         let first = start.theta.clone();
         let mut at = start;
@@ -146,20 +150,20 @@ impl Sharpening<'_> {
     }
 }
 
-/// Responses, one after the other, as data of one fit.
+/// Concatenates the responses of all records to the data of one fit.
 fn joined(
     records: &[(Frf, Vec<usize>)],
     responses: &[Frf],
 ) -> Result<FrequencyData, EstimateError> {
-    let mut all: Option<FrequencyData> = None;
+    let mut joined: Option<FrequencyData> = None;
     for ((_, dofs), frf) in records.iter().zip(responses) {
         let data = frf.data(dofs)?;
-        all = Some(match all {
+        joined = Some(match joined {
             None => data,
             Some(before) => before.and(&data)?,
         });
     }
-    Ok(all.ok_or(SpectraError::NoExcitedLine)?)
+    Ok(joined.ok_or(SpectraError::NoExcitedLine)?)
 }
 
 /// Weighted residuals at some parameters, with their sensitivities J = Q R.
@@ -172,7 +176,7 @@ struct Errors {
 }
 
 impl Errors {
-    fn of(
+    fn new(
         records: &[(Frf, Vec<usize>)],
         responses: &[Frf],
         unknowns: &Unknowns,
@@ -180,7 +184,7 @@ impl Errors {
         noise: &NoiseSpectrum,
     ) -> Option<Self> {
         let data = joined(records, responses).ok()?;
-        let white = Whitened::of(&data, unknowns, entries, |row| noise.covariance(row).clone())?;
+        let white = Whitened::new(&data, unknowns, entries, |row| noise.covariance(row).clone())?;
         let mut sensitivity = white.sensitivity.clone();
         let lengths: Vec<f64> = sensitivity.column_iter().map(|c| c.norm()).collect();
         for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
@@ -197,24 +201,26 @@ impl Errors {
         root.iter().all(|v| v.is_finite()).then_some(Self { white, dof: data.dof(), q, root })
     }
 
-    /// The Gauss–Newton step.
+    /// Returns the Gauss–Newton step.
     fn step(&self) -> DVector<f64> {
         &self.root * self.q.tr_mul(&self.white.residual)
     }
 
-    /// Standard errors for independent lines.
+    /// Returns the standard errors of the parameters for independent lines.
     fn deviations(&self) -> DVector<f64> {
         DVector::from_iterator(self.root.nrows(), self.root.row_iter().map(|row| row.norm()))
     }
 
-    /// Covariance of the parameters, and the degrees of freedom of the variance that has the fewest.
+    /// Returns the covariance of the parameters, and the fewest degrees of freedom of their
+    /// variances.
     fn covariance(&self, records: &[(Frf, Vec<usize>)]) -> (DMatrix<f64>, usize) {
         covariance_of_errors(records, self.dof, &(&self.q * self.root.transpose()))
     }
 }
 
-/// Returns the covariance of the sums Σ b e of the weighted errors e of averaged responses, of `dof` outputs, with one
-/// column of `influence` each, and the degrees of freedom of the variance that has the fewest.
+/// Returns the covariance of the sums Σ b e over the weighted errors e of averaged responses of
+/// `dof` outputs, one for each column b of `influence`, and the fewest degrees of freedom of their
+/// variances.
 pub(crate) fn covariance_of_errors(
     records: &[(Frf, Vec<usize>)],
     dof: usize,
@@ -231,25 +237,25 @@ pub(crate) fn covariance_of_errors(
         }
         let pairs: Vec<(usize, usize)> =
             (0..dofs.len()).flat_map(|i| (0..dof).map(move |o| (o, i))).collect();
-        // Row of a line, of an output and an input, in units of its weight.
-        let at = |line: usize, (output, input): (usize, usize)| {
+        // Row of the real part of the response at a line from an input to an output.
+        let row_of = |line: usize, (output, input): (usize, usize)| {
             2 * (dof * (first + input * lines + line) + output)
         };
-        let of = |line: usize, pair: (usize, usize), parameter: usize| {
-            let row = at(line, pair);
+        let weight = |line: usize, pair: (usize, usize), parameter: usize| {
+            let row = row_of(line, pair);
             Complex::new(influence[(row, parameter)], influence[(row + 1, parameter)])
         };
-        let own = (frf.averages() - dofs.len() as f64).max(1.0);
+        let line_freedom = (frf.averages() - dofs.len() as f64).max(1.0);
         let mut shares = DMatrix::<f64>::zeros(lines, count);
         for line in 0..lines {
             let local = DMatrix::from_fn(pairs.len(), pairs.len(), |a, b| {
                 frf.error_covariance(line, [pairs[a], pairs[b]]).unwrap_or_default()
             });
-            let here = DMatrix::from_fn(pairs.len(), count, |a, p| of(line, pairs[a], p));
+            let here = DMatrix::from_fn(pairs.len(), count, |a, p| weight(line, pairs[a], p));
             let mut around = DMatrix::zeros(pairs.len(), count);
             for (other, c) in frf.correlated_lines(line) {
                 around += DMatrix::from_fn(pairs.len(), count, |a, p| {
-                    of(other, pairs[a], p) * Complex::from(c)
+                    weight(other, pairs[a], p) * Complex::from(c)
                 });
             }
             let part = (here.adjoint() * local * around).map(|z| z.re);
@@ -260,7 +266,7 @@ pub(crate) fn covariance_of_errors(
             for (other, c) in frf.correlated_lines(line) {
                 for parameter in 0..count {
                     spread[parameter] +=
-                        c * shares[(line, parameter)] * shares[(other, parameter)] / own;
+                        c * shares[(line, parameter)] * shares[(other, parameter)] / line_freedom;
                 }
             }
         }

@@ -1,10 +1,10 @@
-//! Stiffness, damping and mass from measured forces and motions, with honest uncertainties.
+//! Mass, damping and stiffness from measured forces and motions, with confidence intervals.
 //!
 //! ```
 //! use mechid_estimate::{EquationOfMotion, Unknowns};
 //! use nalgebra::{DMatrix, dmatrix};
 //!
-//! // 2 ẍ + 0.3 ẋ + 8 x = F at five instants, the force read to a tenth of a newton.
+//! // 2 ẍ + 0.3 ẋ + 8 x = F at five instants; the force is rounded to a tenth of a newton.
 //! let a = dmatrix![1.0; 0.0; 2.0; -1.0; 3.0];
 //! let v = dmatrix![0.0; 1.0; 1.0; -2.0; 1.0];
 //! let x = dmatrix![1.0; -1.0; 0.5; 1.5; 2.0];
@@ -13,16 +13,16 @@
 //!
 //! let mut rows = EquationOfMotion::new(1);
 //! rows.push_rows(a.as_view(), v.as_view(), x.as_view(), read.as_view())?;
-//! let found = rows.solve(&Unknowns::unknown_mass(1)?)?;
+//! let estimate = rows.solve(&Unknowns::unknown_mass(1)?)?;
 //!
-//! let stiffness = found.parameter("k")?;
+//! let stiffness = estimate.parameter("k")?;
 //! let [low, high] = stiffness.interval(0.95)?;
 //! assert!(low < 8.0 && 8.0 < high && high - low < 1.0);
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 //!
-//! Matrices are those of `nalgebra`, which a program that uses this crate depends on, too; the spectra
-//! and records are those of `mechid-signal`.
+//! The types of matrices come from `nalgebra`, which a program that uses this crate also depends
+//! on; the types of spectra and records come from `mechid-signal`.
 
 mod covariance;
 pub mod derivatives;

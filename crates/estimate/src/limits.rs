@@ -1,131 +1,146 @@
-//! Limits that decide something in this crate, each with what happens on either side.
+//! Limits of this crate, each with what happens on either side.
 
-/// Noise of more than this part of a line's power makes it unclear.
+/// Maximum share of noise in the power of a line whose noise is used as a weight; lines with more
+/// noise have no weight in the linear estimate.
 pub(crate) const WEIGHTING_CLEAR: f64 = 0.1;
 
-/// Steps of the search from one delay to the next.
+/// Maximum number of Gauss–Newton steps from one delay of the force to the next.
 pub(crate) const DELAY_STEPS: usize = 30;
 
-/// Steps of the first search.
+/// Maximum number of Gauss–Newton steps of the first search.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
-/// Steps of the others, which are there to confirm it.
+/// Maximum number of Gauss–Newton steps of the searches that confirm the first one.
 pub(crate) const STEPS_MORE: usize = 60;
 
-/// Steps of a search in resampled data, which need not end at a minimum.
+/// Maximum number of Gauss–Newton steps in resampled data, where the search need not converge.
 pub(crate) const STEPS_RESAMPLED: usize = 15;
 
-/// Minima whose sums of squares differ by less than this share are one.
+/// Largest relative difference of the sums of squares of two searches that count as one minimum.
 pub(crate) const RESTART_SAME: f64 = 1e-6;
 
-/// Sums of squares as small as this, in units of the noise or the response, are rounding.
+/// Sum of squares, in units of the noise or the response, below which it is rounding.
 pub(crate) const RESTART_EXACT: f64 = 1e-16;
 
-/// InitialEstimates whose sums of squares differ by less than this share are searched from last, for they
-/// would lead to the same minimum.
+/// Relative difference of the sums of squares of two initial estimates below which the second one
+/// is searched from last, because it probably leads to the same minimum.
 pub(crate) const RESTART_ALIKE: f64 = 0.01;
 
-/// Searches at least where the noise explains the best minimum.
+/// Minimum number of searches if the noise explains the best minimum.
 pub(crate) const RESTART_CONFIRMED: usize = 2;
 
-/// Searches at least where it does not.
+/// Minimum number of searches if the noise does not explain the best minimum.
 pub(crate) const CONFIRMED_OTHERWISE: usize = 4;
 
-/// Rounds of linear least squares before a search.
+/// Maximum number of rounds of linear least squares before a search.
 pub(crate) const LINEAR_ROUNDS: usize = 6;
 
-/// Restarts in a row that have to find nothing better where one minimum only has been seen.
+/// Number of successive restarts without a better minimum that end the search, if all searches have
+/// ended at one minimum.
 pub(crate) const RESTART_RESTARTS: usize = 2;
 
-/// The same where there are several that the noise explains.
+/// Number of successive restarts without a better minimum that end the search, if the noise
+/// explains several minima.
 pub(crate) const RESTARTS_AMONG_MANY: usize = 12;
 
-/// Restarts at most.
+/// Maximum number of restarts.
 pub(crate) const MAX_RESTARTS: u64 = 60;
 
-/// Ends of searches from which restarts are made, by turns.
+/// Number of the best minima that restarts begin from in turn.
 pub(crate) const RESTART_RESTARTED: usize = 3;
 
-/// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
+/// Ratio of a diagonal entry of a triangular factor to the length of its column below which the
+/// regressors are linearly dependent.
 pub(crate) const GRAM_DEPENDENT: f64 = 1e-14;
 
-/// Part of its length that every regressor of related entries has to itself.
+/// Ridge added to every regressor of related entries, relative to its length, so that dependent
+/// regressors still have a triangular factor.
 pub(crate) const GRAM_RIDGE: f64 = 1e-7;
 
-/// Lines whose products are held at a time.
+/// Number of lines whose products are in memory at a time.
 pub(crate) const GRAM_LINES: usize = 256;
 
-/// Steps of Lanczos, after which an extreme eigenvalue is known to many digits.
+/// Maximum number of Lanczos steps; after as many, an extreme eigenvalue is accurate to many
+/// digits.
 pub(crate) const GRAM_LANCZOS: usize = 80;
 
-/// Standard deviations by which the misfit ratio of a right model may differ from 1.
+/// Number of standard deviations by which the misfit ratio of a correct model may differ from 1.
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the lines are taken to err one by one.
+/// Maximum number of sensitivities (residuals times parameters) for a covariance with correlated
+/// lines; in larger fits the errors of the lines are assumed to be independent.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 22;
 
-/// Relative change of the noise levels below which another round of weighting is useless.
+/// Relative change of the noise levels that ends the rounds of weighting.
 pub(crate) const WEIGHT_TOLERANCE: f64 = 1e-3;
 
-/// A residual this small against the motion is rounding.
+/// Ratio of residual to motion below which the residual is rounding.
 pub(crate) const RESIDUAL_ROUNDING: f64 = 1e-12;
 
-/// Rounds of weighting by levels; the second is nearly always the last but one.
+/// Maximum number of rounds of weighting by noise levels; three nearly always suffice.
 pub(crate) const MAX_ROUNDS: usize = 10;
 
-/// Rounds of weighting by a spectrum: the first is efficient already, the others find its form.
+/// Maximum number of rounds of weighting by a noise spectrum: the first is already efficient, the
+/// others refine the shape of the spectrum.
 pub(crate) const COLOURED_ROUNDS: usize = 3;
 
-/// Maximum number of sensitivities, residuals times parameters, of which leverages are computed.
+/// Maximum number of sensitivities (residuals times parameters) for the computation of leverages;
+/// larger fits neglect them.
 pub(crate) const MAX_LEVERAGES: usize = 1 << 20;
 
-/// Rounds of sinusoids found in the residual of a fit to what is left without those found before, and the change
-/// of what is left, over the residual, below which another one is useless.
+/// Maximum number of rounds that alternate between the sinusoids in the residual and the fit to the
+/// data without them.
 pub(crate) const SINUSOID_ROUNDS: usize = 8;
+
+/// Change of the data without sinusoids, relative to the residual, that ends these rounds.
 pub(crate) const SINUSOID_TOLERANCE: f64 = 1e-3;
 
-/// Least power of a residual, relative to that of the noise before.
+/// Minimum power of a residual relative to the noise of the round before; a smaller residual would
+/// have an unbounded weight.
 pub(crate) const NOISE_LEAST: f64 = 1e-12;
 
-/// Least part of its noise that a residual is taken to keep.
+/// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
 pub(crate) const NOISE_KEPT: f64 = 0.1;
 
-/// Rounds of weighting by the dynamic stiffness found before.
+/// Number of rounds of weighting by the dynamic stiffness of the round before.
 pub(crate) const INITIAL_ROUNDS: usize = 4;
 
-/// Rounds of sharpening at most; each takes most of what is left of the bias.
+/// Maximum number of corrections of the window bias; each removes most of the remaining bias.
 pub(crate) const SHARPENING_ROUNDS: usize = 20;
 
-/// Step, in standard errors of the parameters, below which nothing is left.
+/// Step, in standard errors of the parameters, that ends the corrections.
 pub(crate) const SHARPENING_SETTLED: f64 = 0.02;
 
-/// Least modal assurance criterion of real eigenvalues that belong together where there are several pairs.
+/// Minimum modal assurance criterion of two real eigenvalues that form an overdamped pair, if there
+/// are several pairs.
 pub(crate) const SAME_SHAPE: f64 = 0.9;
 
-/// Level of the interval by which a mode is one of a rigid body.
+/// Level of the confidence interval of the squared frequency that decides about a rigid-body mode.
 pub(crate) const RIGID_BODY_LEVEL: f64 = 0.99;
 
-/// Relative singular value below which a direction of the start does not show in the motion.
+/// Relative singular value below which a direction of the initial state is unobservable.
 pub(crate) const INITIAL_UNSEEN: f64 = 1e-10;
 
-/// Steps of the search for proportional damping, the only relation that is not linear.
+/// Maximum number of steps of the search for proportional damping, the only nonlinear relation.
 pub(crate) const RELATED_STEPS: usize = 100;
 
-/// Change of the unknowns, in their scale, that ends the search.
+/// Relative change of the unknowns that ends this search.
 pub(crate) const RELATED_SETTLED: f64 = 1e-12;
 
-/// Residual of an equation over its force that is rounding.
+/// Ratio of residual to force of an equation below which the residual is rounding.
 pub(crate) const EQUATION_ROUNDING: f64 = 1e-11;
 
-/// Rows per equation from which the residuals show how the equations are correlated.
+/// Minimum number of rows per equation for a correlation between equations; with fewer rows their
+/// residuals are assumed to be uncorrelated.
 pub(crate) const ROWS_PER_EQUATION: usize = 10;
 
-/// Pairs reduced at a time.
+/// Number of pairs of samples that are reduced to triangular form at a time.
 pub(crate) const TRANSITION_BLOCK: usize = 256;
 
-/// Number of parts into which the band of a fit, or the time of a record, is split to compare what they say: fewer
-/// average an error of the model away, more have too few lines each.
+/// Number of parts that the band of a fit, or the time of a record, is split into for a comparison:
+/// fewer parts average an error of the model, more have too few lines each.
 pub(crate) const PARTS: usize = 4;
 
-/// Information of a part about a combination of parameters, relative to that of all data, below which it says nothing.
+/// Information of a part about a combination of parameters, relative to the information of all
+/// data, below which the part does not determine the combination.
 pub(crate) const PART_INFORMS: f64 = 1e-9;

@@ -1,5 +1,5 @@
-//! Natural frequencies, damping ratios and mode shapes of an identified machine, with what the
-//! uncertainty of its matrices makes of them.
+//! Natural frequencies, damping ratios and mode shapes of an identified machine, with the standard
+//! errors that follow from the covariance of its matrices.
 
 use mechid_model::{
     EIGENVALUE_ROUNDING, Matrix, Mode, Parameter, SecondOrderSystem, UncertainSystem,
@@ -14,51 +14,50 @@ use crate::{Estimate, EstimateError};
 /// A mode of an identified machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifiedMode {
-    /// Eigenvalue and shape of the identified matrices, the shape's largest entry being 1.
+    /// Eigenvalue and shape of the identified matrices; the largest entry of the shape is 1.
     pub mode: Mode,
-    /// Re λ, in 1/s: rate at which the free response grows, negative where it decays. Of a mode that does
+    /// Re λ, in 1/s: growth rate of the free response, negative if it decays. For a mode that does
     /// not oscillate it is the eigenvalue.
     pub growth_rate: Uncertain,
     /// Im λ / 2π, in Hz; 0 for a mode that does not oscillate.
     pub damped_frequency_hz: Uncertain,
-    /// |λ| / 2π, of an overdamped pair √(λ₁ λ₂) / 2π, in Hz.
+    /// |λ| / 2π or, for an overdamped pair, √(λ₁ λ₂) / 2π, in Hz.
     pub natural_frequency_hz: Uncertain,
-    /// −Re λ / |λ|, of an overdamped pair −(λ₁ + λ₂) / (2 √(λ₁ λ₂)).
+    /// −Re λ / |λ| or, for an overdamped pair, −(λ₁ + λ₂) / (2 √(λ₁ λ₂)).
     pub damping_ratio: Uncertain,
-    /// Square of the natural frequency, |λ|² or, of a pair of real eigenvalues, λ₁ λ₂, in rad²/s². Unlike
-    /// the frequency it is smooth in the matrices where it is zero.
+    /// Square of the natural frequency, |λ|² or, for a pair of real eigenvalues, λ₁ λ₂, in rad²/s².
+    /// Unlike the frequency it is a smooth function of the matrices where it is zero.
     pub squared_frequency: Uncertain,
-    /// Index of the other mode of a pair of real eigenvalues; `None` for a mode that oscillates, and where
-    /// no shape tells which real eigenvalues belong together.
+    /// Index of the other mode of a pair of real eigenvalues; `None` for a mode that oscillates,
+    /// and if the shapes do not show which real eigenvalues form a pair.
     pub partner: Option<usize>,
-    /// `true` for a motion without restoring force: the 99 % interval of `squared_frequency` contains
-    /// zero, or the eigenvalue is zero to rounding.
+    /// `true` for a motion without restoring force: the 99 % interval of `squared_frequency`
+    /// contains zero, or the eigenvalue is zero to rounding.
     pub is_rigid_body: bool,
-    /// Standard errors of the real and the imaginary part of every entry of the shape; those
-    /// of the entry that is 1 by definition are 0.
+    /// Standard errors of the real and the imaginary part of every entry of the shape; they are 0
+    /// for the entry that is 1 by definition.
     pub shape_standard_error: DVector<Complex<f64>>,
 }
 
 impl IdentifiedMode {
-    /// The confidence interval of the natural frequency, in Hz, at `level` (0.95 for 95 %); of a rigid-body
-    /// mode from zero to the square root of the upper limit of the squared frequency.
+    /// Returns the confidence interval of the natural frequency, in Hz, at `level` (0.95 for 95 %);
+    /// for a rigid-body mode it extends from zero to the square root of the upper limit of the
+    /// squared frequency.
     ///
     /// # Errors
     /// [`NumericsError::Level`] unless 0 < level < 1.
     pub fn natural_frequency_interval_hz(&self, level: f64) -> Result<[f64; 2], NumericsError> {
-        match self.is_rigid_body {
-            true => {
-                let [_, high] = self.squared_frequency.interval(level)?;
-                Ok([0.0, high.max(0.0).sqrt() / std::f64::consts::TAU])
-            }
-            false => self.natural_frequency_hz.interval(level),
+        if !self.is_rigid_body {
+            return self.natural_frequency_hz.interval(level);
         }
+        let [_, high] = self.squared_frequency.interval(level)?;
+        Ok([0.0, high.max(0.0).sqrt() / std::f64::consts::TAU])
     }
 }
 
 impl Estimate {
-    /// The modes of the identified machine by rising natural frequency, with standard errors
-    /// to first order in those of M̂, Ĉ and K̂.
+    /// Returns the modes of the identified machine by rising natural frequency, with standard
+    /// errors to first order in the errors of M̂, Ĉ and K̂.
     ///
     /// ```
     /// use mechid_model::ResponseQuantity;
@@ -67,7 +66,7 @@ impl Estimate {
     /// use mechid_estimate::frequency_domain::equation_error;
     /// use nalgebra::{Complex, DMatrix};
     ///
-    /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies, displacements read to a micrometre.
+    /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies, displacements rounded to a micrometre.
     /// let omega = vec![10.0, 20.0, 30.0];
     /// let force = DMatrix::from_element(3, 1, Complex::new(50.0, 0.0));
     /// let displacement = DMatrix::from_fn(3, 1, |row, _| {
@@ -84,26 +83,27 @@ impl Estimate {
     /// ```
     ///
     /// # Errors
-    /// [`EstimateError::Undetermined`] if the data leave a parameter open,
+    /// [`EstimateError::Undetermined`] if the data do not determine a parameter,
     /// [`EstimateError::Model`] if M̂ is singular or the eigenvalues do not converge.
     ///
     /// # Source
-    /// Dissertation, Appendix E; derivatives after Nelson (1976), AIAA Journal 14, 1201–1205,
-    /// here bordered and with damping.
+    /// Dissertation, Appendix E; derivatives after Nelson (1976), AIAA Journal 14, 1201–1205, here
+    /// with damping and a bordered matrix.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, EstimateError> {
         let parameters: Vec<Parameter> = self.parameters().map(|p| p.parameter).collect();
         modes(&self.system()?, &parameters, self.spread(), self.degrees_of_freedom())
     }
 }
 
-/// The modes of a machine identified elsewhere or read back from a file, as [`Estimate::modes`]:
-/// `degrees_of_freedom` are those of the residual variance behind its covariance.
+/// Returns the modes of a machine that was identified elsewhere or read from a file, as
+/// [`Estimate::modes`] does; `degrees_of_freedom` belong to the residual variance of its
+/// covariance.
 ///
 /// # Errors
 /// [`EstimateError::Model`] if the eigenvalues do not converge.
 ///
 /// # Source
-/// That of [`Estimate::modes`].
+/// As [`Estimate::modes`].
 pub fn identified_modes(
     machine: &UncertainSystem,
     degrees_of_freedom: usize,
@@ -123,7 +123,7 @@ fn modes(
     let modes = system.modes()?;
     let partners = partners(&modes);
     let sensitivities: Vec<Sensitivity> =
-        modes.iter().map(|mode| Sensitivity::of(mode, system, parameters)).collect();
+        modes.iter().map(|mode| Sensitivity::new(mode, system, parameters)).collect();
     let largest = modes.iter().map(Mode::natural_frequency).fold(0.0, f64::max);
     let identify = |(at, partner): (usize, &Option<usize>)| {
         let partner = partner.map(|other| (other, &modes[other], &sensitivities[other]));
@@ -132,8 +132,8 @@ fn modes(
     Ok(partners.iter().enumerate().map(identify).collect())
 }
 
-/// Pairs the real eigenvalues of overdamped modes: the only two there are, otherwise those whose shapes
-/// agree best, as proportional damping makes them do exactly.
+/// Pairs the real eigenvalues of overdamped modes: the only two, or those whose shapes agree best;
+/// with proportional damping the two shapes of a pair are equal.
 fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
     let mut partners = vec![None; modes.len()];
     let real: Vec<usize> = (0..modes.len()).filter(|at| !modes[*at].oscillates()).collect();
@@ -145,24 +145,25 @@ fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
     let mut pairs: Vec<(f64, usize, usize)> = pairs.map(|(i, j)| (likeness(i, j), i, j)).collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (likeness, i, j) in pairs {
-        let alike = real.len() == 2 || likeness >= SAME_SHAPE;
-        if alike && partners[i].is_none() && partners[j].is_none() {
+        let is_pair = real.len() == 2 || likeness >= SAME_SHAPE;
+        if is_pair && partners[i].is_none() && partners[j].is_none() {
             (partners[i], partners[j]) = (Some(j), Some(i));
         }
     }
     partners
 }
 
-/// Scatter of the parameters.
+/// Uncertainty of the parameters.
 struct Spread<'a> {
     covariance: &'a Covariance,
-    /// Equation of motion of each of them.
+    /// Equation of motion of each parameter.
     equations: &'a [usize],
     degrees_of_freedom: usize,
 }
 
 impl Spread<'_> {
-    /// An eigenvalue up to `rounding` (rad/s) is zero.
+    /// Returns a mode with standard errors; an eigenvalue of modulus up to `rounding` (rad/s) is
+    /// zero.
     fn propagate(
         &self,
         mode: &Mode,
@@ -170,61 +171,56 @@ impl Spread<'_> {
         partner: Option<(usize, &Mode, &Sensitivity)>,
         rounding: f64,
     ) -> IdentifiedMode {
-        let (lambda, own) = (mode.eigenvalue(), &sensitivity.eigenvalue);
+        let (lambda, gradient) = (mode.eigenvalue(), &sensitivity.eigenvalue);
         let tau = std::f64::consts::TAU;
-        // The mode that oscillates has its conjugate for a partner, the real one without any itself.
-        let (other, of_other) = match partner {
+        // The partner of an oscillating mode is its conjugate; a real eigenvalue without a partner
+        // is paired with itself.
+        let (other, other_gradient) = match partner {
             Some((_, mode, sensitivity)) => (mode.eigenvalue(), sensitivity.eigenvalue.clone()),
-            None => (lambda.conj(), own.map(|d| d.conj())),
+            None => (lambda.conj(), gradient.map(|d| d.conj())),
         };
-        let sum_slope = own.zip_map(&of_other, |d, e| (d + e).re);
-        let (square, square_slope) =
-            ((lambda * other).re, own.zip_map(&of_other, |d, e| (d * other + e * lambda).re));
-        let squared_frequency = self.uncertain(square, &square_slope);
-        // Real eigenvalues of opposite sign are no oscillator.
-        let (size, ratio) = match square > 0.0 {
-            true => (square.sqrt(), -0.5 * (lambda + other).re / square.sqrt()),
-            false => (mode.natural_frequency(), mode.damping_ratio()),
+        let sum = Value {
+            value: (lambda + other).re,
+            gradient: gradient.zip_map(&other_gradient, |d, e| (d + e).re),
         };
-        let (growth, damping) = match square > 0.0 {
-            true => {
-                let growth = square_slope / (2.0 * size);
-                let damping = sum_slope.zip_map(&growth, |s, g| (-0.5 * s - ratio * g) / size);
-                (growth, damping)
-            }
-            // The modulus of a real eigenvalue; its damping ratio is ±1 whatever the matrices.
-            false => (own.map(|d| d.re * lambda.re.signum()), DVector::zeros(own.len())),
+        let square = Value {
+            value: (lambda * other).re,
+            gradient: gradient.zip_map(&other_gradient, |d, e| (d * other + e * lambda).re),
         };
+        let squared_frequency = self.uncertain(square.value, &square.gradient);
+        let [modulus, ratio] = modulus_and_damping(mode, gradient, &sum, &square);
         let is_rigid_body = lambda.norm() <= rounding
             || squared_frequency.standard_error.is_finite()
                 && squared_frequency
                     .interval(RIGID_BODY_LEVEL)
                     .is_ok_and(|[low, high]| high.is_finite() && low <= 0.0 && 0.0 <= high)
                 && squared_frequency.standard_error > 0.0;
-        let natural_frequency_hz = match is_rigid_body {
-            true => Uncertain {
-                value: square.max(0.0).sqrt() / tau,
+        let natural_frequency_hz = if is_rigid_body {
+            Uncertain {
+                value: square.value.max(0.0).sqrt() / tau,
                 standard_error: squared_frequency.standard_error.sqrt() / tau,
                 degrees_of_freedom: self.degrees_of_freedom,
-            },
-            false => self.uncertain(size / tau, &(growth / tau)),
+            }
+        } else {
+            self.uncertain(modulus.value / tau, &(modulus.gradient / tau))
         };
-        let mut growth_rate = self.uncertain(lambda.re, &own.map(|d| d.re));
+        let mut growth_rate = self.uncertain(lambda.re, &gradient.map(|d| d.re));
         if is_rigid_body && !mode.oscillates() {
-            // Near a double zero the eigenvalues are as roots of their product, and no derivative says how far.
+            // Near a double zero the eigenvalues vary like the square root of their product, which
+            // has no derivative there.
             let of_root = squared_frequency.standard_error.sqrt();
             growth_rate.standard_error = growth_rate.standard_error.max(of_root);
         }
         IdentifiedMode {
             growth_rate,
             damped_frequency_hz: self
-                .uncertain(mode.damped_frequency_hz(), &own.map(|d| d.im / tau)),
+                .uncertain(mode.damped_frequency_hz(), &gradient.map(|d| d.im / tau)),
             natural_frequency_hz,
-            damping_ratio: self.uncertain(ratio, &damping),
+            damping_ratio: self.uncertain(ratio.value, &ratio.gradient),
             squared_frequency,
             partner: partner.map(|(at, ..)| at),
             is_rigid_body,
-            shape_standard_error: self.of_shape(sensitivity),
+            shape_standard_error: self.shape_error(sensitivity),
             mode: mode.clone(),
         }
     }
@@ -235,15 +231,15 @@ impl Spread<'_> {
         Uncertain { value, standard_error, degrees_of_freedom }
     }
 
-    /// Standard errors of real and imaginary parts of dφ = −U f, f being what the parameters change in the
-    /// equations of motion.
-    fn of_shape(&self, sensitivity: &Sensitivity) -> DVector<Complex<f64>> {
+    /// Returns the standard errors of the real and imaginary parts of dφ = −U f, where f is the
+    /// change of the equations of motion by the parameters.
+    fn shape_error(&self, sensitivity: &Sensitivity) -> DVector<Complex<f64>> {
         let answers = &sensitivity.answers;
         let n = answers.ncols();
         if sensitivity.push.iter().any(|p| !(p.re.is_finite() && p.im.is_finite())) {
             return DVector::from_element(n, Complex::new(f64::INFINITY, f64::INFINITY));
         }
-        let of_push = self.covariance.of_sums(&sensitivity.push, self.equations, n);
+        let of_push = self.covariance.covariance_of_sums(&sensitivity.push, self.equations, n);
         let deviation = |weights: DVector<f64>| weights.dot(&(&of_push * &weights)).max(0.0).sqrt();
         DVector::from_fn(n, |entry, _| {
             let answer = |i: usize| answers[(entry, i % n)];
@@ -255,7 +251,7 @@ impl Spread<'_> {
         })
     }
 
-    /// √(gᵀ Σ g).
+    /// Returns the standard error √(gᵀ Σ g) of a quantity with gradient g.
     fn deviation(&self, gradient: &DVector<f64>) -> f64 {
         if gradient.iter().any(|g| !g.is_finite()) {
             return f64::INFINITY;
@@ -264,11 +260,43 @@ impl Spread<'_> {
     }
 }
 
+/// A quantity with its gradient over the free parameters.
+struct Value {
+    value: f64,
+    gradient: DVector<f64>,
+}
+
+/// Returns the modulus (rad/s) and the damping ratio of a mode from the `sum` and the product
+/// (`square`) of its eigenvalue and the partner; `gradient` is that of the eigenvalue.
+fn modulus_and_damping(
+    mode: &Mode,
+    gradient: &DVector<Complex<f64>>,
+    sum: &Value,
+    square: &Value,
+) -> [Value; 2] {
+    if square.value > 0.0 {
+        let modulus = square.value.sqrt();
+        let ratio = -0.5 * sum.value / modulus;
+        let of_modulus = &square.gradient / (2.0 * modulus);
+        let of_ratio = sum.gradient.zip_map(&of_modulus, |s, g| (-0.5 * s - ratio * g) / modulus);
+        [Value { value: modulus, gradient: of_modulus }, Value { value: ratio, gradient: of_ratio }]
+    } else {
+        // Real eigenvalues of opposite sign do not form an oscillator. The modulus is that of the
+        // eigenvalue, and its damping ratio is ±1 for any matrices.
+        let sign = mode.eigenvalue().re.signum();
+        let of_ratio = DVector::zeros(gradient.len());
+        [
+            Value { value: mode.natural_frequency(), gradient: gradient.map(|d| d.re * sign) },
+            Value { value: mode.damping_ratio(), gradient: of_ratio },
+        ]
+    }
+}
+
 /// Derivatives of one mode with respect to the free parameters.
 struct Sensitivity {
-    /// dλ, one per parameter.
+    /// Derivative of λ with respect to each parameter.
     eigenvalue: DVector<Complex<f64>>,
-    /// Change of the equation of motion of each parameter by its own, at fixed λ.
+    /// Derivative of the equation of motion of each parameter with respect to it, at fixed λ.
     push: Vec<Complex<f64>>,
     /// U of dφ = −U f for changes f of the equations of motion, n×n.
     answers: DMatrix<Complex<f64>>,
@@ -282,8 +310,8 @@ impl Sensitivity {
     /// └     e_rᵀ             0     ┘ └ dλ ┘ = − └         0         ┘
     /// ```
     ///
-    /// The bordered matrix is regular for every simple eigenvalue, M, C and K of any symmetry.
-    fn of(mode: &Mode, system: &SecondOrderSystem, parameters: &[Parameter]) -> Self {
+    /// The bordered matrix is regular for every simple eigenvalue, with M, C and K of any symmetry.
+    fn new(mode: &Mode, system: &SecondOrderSystem, parameters: &[Parameter]) -> Self {
         let (m, c, k) = (system.mass(), system.damping(), system.stiffness());
         let (n, lambda, shape) = (mode.shape().len(), mode.eigenvalue(), mode.shape());
         let pencil =
@@ -292,10 +320,10 @@ impl Sensitivity {
         let mut bordered = DMatrix::zeros(n + 1, n + 1);
         bordered.view_mut((0, 0), (n, n)).copy_from(&pencil);
         bordered.view_mut((0, n), (n, 1)).copy_from(&slope);
-        // Any row that fixes φ_r will do; this one is as large as the terms of the others.
+        // The row that fixes φ_r has the size of the other rows, for a small condition number.
         let size = m.norm() * lambda.norm_sqr() + c.norm() * lambda.norm() + k.norm();
         bordered[(n, fixed_entry(shape))] = Complex::from(size);
-        // Entry (i, j) of a matrix acts on equation i alone: n right-hand sides serve all.
+        // Entry (i, j) of a matrix acts on equation i alone: n right-hand sides suffice.
         let mut unit = DMatrix::identity(n + 1, n);
         let regular = bordered.lu().solve_mut(&mut unit);
         let push = |parameter: &Parameter| {
@@ -317,7 +345,7 @@ impl Sensitivity {
     }
 }
 
-/// The entry of a scaled shape that is 1.
+/// Returns the index of the entry of a scaled shape that is 1.
 fn fixed_entry(shape: &DVector<Complex<f64>>) -> usize {
     shape.map(|z| (z - 1.0).norm()).imin()
 }

@@ -15,11 +15,12 @@ pub use self::initial_state::{StartFit, fitted_start};
 pub use self::periodic::predict_periodic;
 use crate::EstimateError;
 
-/// Returns the part of the variation of each channel that a prediction explains, in per cent:
-/// 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100 is perfect, 0 no better than the mean, negative worse.
+/// Returns the fit of a prediction to each channel, in per cent: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100
+/// is perfect, 0 is no better than the mean, a negative fit is worse than the mean.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
+/// the records do not belong together.
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 16 (fit).
@@ -29,19 +30,19 @@ pub fn fit_percent(measured: &Record, predicted: &Record) -> Result<Vec<f64>, Es
     let around_mean = measured.without_mean();
     let gap = measured.data() - predicted.data();
     let norms = gap.column_iter().zip(around_mean.data().column_iter());
-    Ok(norms.map(|(gap, own)| 100.0 * (1.0 - gap.norm() / own.norm())).collect())
+    Ok(norms.map(|(gap, motion)| 100.0 * (1.0 - gap.norm() / motion.norm())).collect())
 }
 
-/// Displacement and velocity of a machine under a sampled force (N), from `start` for an open
-/// record, in the steady state for a whole period (`start` is not used then).
+/// Predicts the response of a machine to a sampled force (N): from the initial state `start` for an
+/// open record, in the steady state for a whole period (without `start`).
 ///
-/// The force between samples is what the discretisation says; Euler's is taken as held. The
-/// acceleration is the one of the equation of motion.
+/// The discretisation defines the force between samples; for Euler it is held. The acceleration
+/// follows from the equation of motion.
 ///
 /// # Errors
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::NoSteadyState`] if
-/// the machine has none with this period, [`EstimateError::Signal`] if an unstable motion
-/// overflows.
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,
+/// [`EstimateError::NoSteadyState`] if the machine has no steady state with this period,
+/// [`EstimateError::Signal`] if an unstable motion overflows.
 ///
 /// # Source
 /// Van Loan (1978), IEEE Trans. Automatic Control 23, 395–404 (the exact step); Åström &
@@ -70,11 +71,11 @@ pub fn predict(
     Ok(Response::new(record(x)?, record(v)?, record(a)?)?)
 }
 
-/// z⁺ = Φ z + Γ₀ F + Γ₁ F⁺ on the state (x, Δt ẋ).
+/// Time step z⁺ = Φ z + Γ₀ F + Γ₁ F⁺ of the state (x, Δt ẋ).
 struct Step {
     dt: f64,
     transition: DMatrix<f64>,
-    /// Row by row, Φ beside Γ₀ and Γ₁: what multiplies (z, F, F⁺).
+    /// Rows of \[Φ Γ₀ Γ₁\], which multiplies (z, F, F⁺).
     rows: Vec<f64>,
 }
 
@@ -97,7 +98,8 @@ impl Step {
         Ok(Self { dt, transition, rows })
     }
 
-    /// Displacement, velocity and acceleration at the samples, each samples × n, in one pass.
+    /// Returns displacement, velocity and acceleration at the samples, each samples × n, in one
+    /// pass.
     fn responses(
         &self,
         system: &SecondOrderSystem,
@@ -116,8 +118,8 @@ impl Step {
             for (velocity, scaled) in velocity.iter_mut().zip(scaled) {
                 *velocity = scaled / self.dt;
             }
-            for (i, left) in inertia.iter_mut().enumerate() {
-                *left = loads[(k, i)]
+            for (i, inertia) in inertia.iter_mut().enumerate() {
+                *inertia = loads[(k, i)]
                     - sum_of_products(damping.row(i).iter(), &velocity)
                     - sum_of_products(stiffness.row(i).iter(), displacement);
             }
@@ -135,7 +137,7 @@ impl Step {
         predicted
     }
 
-    /// The state one step after the last sample.
+    /// Returns the state one step after the last sample.
     fn run(&self, force: &Record, start: &DVector<f64>) -> DVector<f64> {
         let mut at = At::new(start.as_slice());
         for k in 0..force.len() {
@@ -144,7 +146,8 @@ impl Step {
         DVector::from_column_slice(at.state())
     }
 
-    /// Advances from the state at a sample of the force to the next; the first sample follows the last.
+    /// Advances the state by one step from a sample of the force; the first sample follows the
+    /// last.
     fn advance(&self, force: &Record, sample: usize, at: &mut At) {
         let (loads, next) = (force.data(), (sample + 1) % force.len());
         let size = at.next.len();
@@ -158,7 +161,7 @@ impl Step {
         at.now[..size].copy_from_slice(&at.next);
     }
 
-    /// The state that returns after the period: (I − Φᴺ) z = what rest leads to.
+    /// Returns the periodic state: (I − Φᴺ) z equals the state after one period that began at rest.
     fn steady_state(&self, force: &Record) -> Result<DVector<f64>, EstimateError> {
         let size = self.transition.nrows();
         let from_rest = self.run(force, &DVector::zeros(size));
@@ -175,7 +178,7 @@ impl Step {
     }
 }
 
-/// Beginning of a step, (z, F, F⁺), and the state that it leads to.
+/// Buffers of a step: its input (z, F, F⁺) and the next state.
 struct At {
     now: Vec<f64>,
     next: Vec<f64>,
@@ -197,7 +200,7 @@ impl At {
     }
 }
 
-/// Σ a_j b_j, from the first term to the last.
+/// Returns Σ a_j b_j, summed from the first term to the last.
 fn sum_of_products<'a>(a: impl Iterator<Item = &'a f64>, b: &[f64]) -> f64 {
     a.zip(b).map(|(a, b)| a * b).reduce(|sum, term| sum + term).unwrap_or(0.0)
 }

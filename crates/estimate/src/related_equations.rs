@@ -1,4 +1,4 @@
-//! Least squares on all equations of motion together, where their entries are related.
+//! Least squares on all equations of motion together, for related entries.
 
 use mechid_model::{Matrix, Parameter};
 use mechid_numerics::NumericsError;
@@ -17,25 +17,26 @@ use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 pub(crate) struct RelatedEquations<'a> {
     /// Columns \[ẍ | ẋ | x\] of all degrees of freedom.
     pub(crate) motions: DMatrix<f64>,
-    /// Force of each equation less what its known entries account for.
+    /// Force of each equation minus the forces of its known entries.
     pub(crate) targets: DMatrix<f64>,
-    /// Original rows that they stand for.
+    /// Number of original rows.
     pub(crate) rows: usize,
     pub(crate) unknowns: &'a Unknowns,
 }
 
-/// One solution of them.
+/// Solution of the related equations.
 struct Fit {
     unknowns: DVector<f64>,
     solution: Solution,
 }
 
 impl RelatedEquations<'_> {
-    /// Least squares for the independent unknowns, each equation weighted by what it leaves.
+    /// Solves for the independent unknowns by least squares; the weights of the equations follow
+    /// from the covariance of their residuals.
     pub(crate) fn solve(&self) -> Result<Estimate, EstimateError> {
         let free = self.unknowns.free();
         let (Some(relations), Some(linear)) =
-            (Relations::of(self.unknowns), Relations::linear(self.unknowns))
+            (Relations::from_unknowns(self.unknowns), Relations::linear(self.unknowns))
         else {
             unreachable!("entries are related");
         };
@@ -58,7 +59,7 @@ impl RelatedEquations<'_> {
         self.estimate(&free, &relations, fit.unknowns, fit.solution)
     }
 
-    /// Gauss–Newton steps, of which linear relations take one.
+    /// Searches for the least squares by Gauss–Newton steps; linear relations need one step.
     fn search(
         &self,
         free: &[Parameter],
@@ -77,7 +78,7 @@ impl RelatedEquations<'_> {
             if !step.iter().all(|value| value.is_finite()) {
                 return Ok(Fit { unknowns, solution });
             }
-            // In units of what the data tell of each unknown.
+            // Standard errors up to a common factor: they give each unknown its scale.
             let scale = solution.unscaled_covariance.diagonal().map(f64::sqrt);
             let size = unknowns.component_div(&scale).norm();
             let settled = step.component_div(&scale).norm() <= RELATED_SETTLED * size;
@@ -88,7 +89,7 @@ impl RelatedEquations<'_> {
             });
             match lower {
                 Some((next, lower)) => (unknowns, before) = (next, lower),
-                // As low as rounding lets it be.
+                // No part of the step lowers the cost: the minimum is reached to rounding.
                 None => return Ok(Fit { unknowns, solution }),
             }
             if settled {
@@ -98,7 +99,7 @@ impl RelatedEquations<'_> {
         Err(EstimateError::NotConverged { searches: 1, steps: RELATED_STEPS })
     }
 
-    /// Change of the independent unknowns to the least squares of the weighted equations, linearised.
+    /// Returns the Gauss–Newton step of the independent unknowns for the weighted equations.
     fn step(
         &self,
         free: &[Parameter],
@@ -133,7 +134,7 @@ impl RelatedEquations<'_> {
         Ok(solve_compressed(regressors, targets, n * self.rows)?)
     }
 
-    /// What the equations leave of the force, rows × equations.
+    /// Returns the residual force of the equations, rows × equations.
     fn residuals(&self, free: &[Parameter], theta: &DVector<f64>) -> DMatrix<f64> {
         let mut residuals = self.targets.clone();
         for (p, value) in free.iter().zip(theta.iter()) {
@@ -142,11 +143,12 @@ impl RelatedEquations<'_> {
         residuals
     }
 
-    /// L⁻¹ of the covariance L Lᴴ of the residuals of all equations, or of their variances alone where
-    /// there are few rows; `None` where the residuals are rounding.
+    /// Returns L⁻¹ of the covariance L Lᴴ of the residuals of all equations, without correlations
+    /// if there are few rows; `None` if the residuals are rounding.
     ///
     /// # Source
-    /// Zellner (1962), J. American Statistical Association 57, 348–368 (seemingly unrelated regressions).
+    /// Zellner (1962), J. American Statistical Association 57, 348–368 (seemingly unrelated
+    /// regressions).
     fn weights(&self, residuals: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let n = residuals.ncols();
         let size = self.targets.norm();
@@ -179,8 +181,8 @@ impl RelatedEquations<'_> {
         let theta = relations.entries(unknowns.as_slice());
         let tangent = relations.tangent(unknowns.as_slice());
         let covariance = solution.unscaled_covariance * solution.residual_covariance[(0, 0)];
-        let left = self.residuals(free, &theta);
-        // Not every equation has a force of its own.
+        let residuals = self.residuals(free, &theta);
+        // Mean over the equations, because an equation may have no force.
         let force = self.targets.norm() / (self.targets.ncols() as f64).sqrt();
         let undetermined = solution.undetermined.iter().map(|direction| {
             let of_entries = &tangent * &direction.combination;
@@ -199,7 +201,7 @@ impl RelatedEquations<'_> {
             values: theta.as_slice().to_vec(),
             covariance: Covariance::Full(&tangent * covariance * tangent.transpose()),
             degrees_of_freedom: solution.degrees_of_freedom,
-            residual_nrmse: left.column_iter().map(|residual| residual.norm() / force).collect(),
+            residual_nrmse: residuals.column_iter().map(|e| e.norm() / force).collect(),
             condition: solution.condition,
             undetermined: undetermined.collect(),
         })

@@ -1,4 +1,4 @@
-//! Relations between the entries of M, C and K, and the independent unknowns that they leave.
+//! Relations between the entries of M, C and K, and the independent unknowns.
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,22 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Unknowns;
 
-/// Independent unknowns p behind free entries θ(p), which are not all independent.
+/// Dependence of the free entries θ(p) on the independent unknowns p.
 #[derive(Debug, Clone)]
 pub struct Relations {
-    /// How each free entry follows from the unknowns, in the order of [`Unknowns::free`].
+    /// Source of each free entry, in the order of [`Unknowns::free`].
     entries: Vec<Source>,
-    /// Number of unknowns that are entries themselves; α and β of proportional damping come after them.
+    /// Number of unknowns that are entries themselves; α and β of proportional damping follow them.
     shared: usize,
     proportional: bool,
 }
 
-/// How a free entry follows from the independent unknowns.
+/// Dependence of a free entry on the independent unknowns.
 #[derive(Debug, Clone)]
 enum Source {
-    /// It is one of them.
+    /// The entry is an unknown, given by its index.
     Shared(usize),
-    /// α m + β k of an entry of the damping.
+    /// Entry α m + β k of the damping matrix.
     Damping { mass: Part, stiffness: Part },
 }
 
@@ -43,22 +43,23 @@ impl Part {
 }
 
 impl Relations {
-    /// The relations between entries; none if every free entry is independent.
-    pub fn of(unknowns: &Unknowns) -> Option<Self> {
+    /// Returns the relations between entries; `None` if every free entry is independent.
+    pub fn from_unknowns(unknowns: &Unknowns) -> Option<Self> {
         unknowns.is_related().then(|| Self::new(unknowns, unknowns.has_proportional_damping()))
     }
 
-    /// The linear ones of these relations: proportional damping is left out.
+    /// Returns the linear relations only, without proportional damping.
     pub fn linear(unknowns: &Unknowns) -> Option<Self> {
         unknowns.is_related().then(|| Self::new(unknowns, false))
     }
 
     fn new(unknowns: &Unknowns, proportional: bool) -> Self {
         let mut places: BTreeMap<(usize, usize, usize), usize> = BTreeMap::new();
-        let mut place = |matrix: Matrix, row: usize, column: usize| {
-            let key = match unknowns.is_symmetric(matrix) {
-                true => (matrix as usize, row.min(column), row.max(column)),
-                false => (matrix as usize, row, column),
+        let mut index = |matrix: Matrix, row: usize, column: usize| {
+            let key = if unknowns.is_symmetric(matrix) {
+                (matrix as usize, row.min(column), row.max(column))
+            } else {
+                (matrix as usize, row, column)
             };
             let next = places.len();
             *places.entry(key).or_insert(next)
@@ -68,14 +69,14 @@ impl Relations {
         let mut entries: Vec<Option<Source>> = free
             .iter()
             .map(|p| {
-                let own = !of_damping(p);
-                own.then(|| Source::Shared(place(p.matrix(), p.row(), p.column())))
+                let is_shared = !of_damping(p);
+                is_shared.then(|| Source::Shared(index(p.matrix(), p.row(), p.column())))
             })
             .collect();
         for (entry, p) in entries.iter_mut().zip(&free) {
             let mut part = |matrix| match unknowns.fixed(matrix, p.row(), p.column()) {
                 Some(value) => Part::Known(value),
-                None => Part::Shared(place(matrix, p.row(), p.column())),
+                None => Part::Shared(index(matrix, p.row(), p.column())),
             };
             entry.get_or_insert_with(|| Source::Damping {
                 mass: part(Matrix::Mass),
@@ -91,10 +92,10 @@ impl Relations {
         self.shared + if self.proportional { 2 } else { 0 }
     }
 
-    /// The unknown that a free entry is, of relations that are linear.
+    /// Returns the index of the unknown that a free entry is, for linear relations.
     ///
     /// # Panics
-    /// If it is an entry of proportional damping.
+    /// For an entry of proportional damping.
     pub fn shared(&self, entry: usize) -> usize {
         match self.entries[entry] {
             Source::Shared(at) => at,
@@ -102,7 +103,7 @@ impl Relations {
         }
     }
 
-    /// θ(p).
+    /// Returns the free entries θ(p).
     /// In SI units.
     ///
     /// # Source
@@ -118,7 +119,7 @@ impl Relations {
         DVector::from_iterator(self.entries.len(), self.entries.iter().map(value))
     }
 
-    /// ∂θ/∂p, entries × unknowns.
+    /// Returns the derivative ∂θ/∂p, entries × unknowns.
     /// In SI units.
     ///
     /// # Source
@@ -141,9 +142,9 @@ impl Relations {
         tangent
     }
 
-    /// p of entries that obey the relations; of others the means of those that should be one, and the α and
-    /// β that come nearest.
-    /// In SI units.
+    /// Returns the unknowns p of entries that obey the relations. For other entries it returns the
+    /// mean of the entries that share an unknown, and the α and β of a least-squares fit. In SI
+    /// units.
     ///
     /// # Source
     /// As [`Relations::entries`].
@@ -166,8 +167,8 @@ impl Relations {
         unknowns
     }
 
-    /// α and β with their gradients over the entries, which obey the relations; `None` without proportional
-    /// damping.
+    /// Returns α and β with their gradients over entries that obey the relations; `None` without
+    /// proportional damping.
     /// In SI units.
     ///
     /// # Source
@@ -182,11 +183,11 @@ impl Relations {
         let lengths = [0, 1].map(|part| columns.column(part).norm());
         let factors = [unknowns[self.shared], unknowns[self.shared + 1]];
         let gradient = |of: usize| {
-            // What the other factor does not explain of the entries of this matrix.
-            let (own, other) = (columns.column(of), columns.column(1 - of));
+            // Part of this matrix that is orthogonal to the matrix of the other factor.
+            let (column, other) = (columns.column(of), columns.column(1 - of));
             let unit = if lengths[1 - of] > 0.0 { other / lengths[1 - of] } else { other.into() };
-            let left = own - &unit * unit.dot(&own);
-            let weights = &left / left.norm_squared();
+            let orthogonal = column - &unit * unit.dot(&column);
+            let weights = &orthogonal / orthogonal.norm_squared();
             let mut gradient = DVector::zeros(self.entries.len());
             for ((entry, _), weight) in rows.iter().zip(weights.iter()) {
                 gradient[*entry] += weight;
@@ -194,8 +195,8 @@ impl Relations {
                 for (part, factor) in [mass, stiffness].into_iter().zip(factors) {
                     let Part::Shared(at) = part else { continue };
                     let same = |s: &Source| matches!(s, Source::Shared(of) if of == at);
-                    let place = self.entries.iter().position(same).expect("a free entry");
-                    gradient[place] -= factor * weight;
+                    let index = self.entries.iter().position(same).expect("a free entry");
+                    gradient[index] -= factor * weight;
                 }
             }
             gradient
@@ -203,18 +204,18 @@ impl Relations {
         Some([(factors[0], gradient(0)), (factors[1], gradient(1))])
     }
 
-    /// Place of every free entry of proportional damping, with its mass and stiffness.
+    /// Returns the index of every free entry of proportional damping, with its mass and stiffness.
     fn damping(&self, unknowns: &[f64]) -> Vec<(usize, [f64; 2])> {
-        let of = |(at, source): (usize, &Source)| match source {
+        let row = |(at, source): (usize, &Source)| match source {
             Source::Shared(_) => None,
             Source::Damping { mass, stiffness } => {
                 Some((at, [mass.value(unknowns), stiffness.value(unknowns)]))
             }
         };
-        self.entries.iter().enumerate().filter_map(of).collect()
+        self.entries.iter().enumerate().filter_map(row).collect()
     }
 
-    /// α and β of the least squares of C − αM − βK over the entries of the damping.
+    /// Returns α and β of the least-squares fit C ≈ αM + βK over the free entries of the damping.
     fn nearest(&self, entries: &[f64], unknowns: &[f64]) -> [f64; 2] {
         let rows = self.damping(unknowns);
         let rows = rows.iter().map(|(at, [mass, stiffness])| [*mass, *stiffness, entries[*at]]);
@@ -228,7 +229,7 @@ impl Relations {
         }
         let [[mm, mk, mc], [_, kk, kc], _] = products;
         let determinant = mm * kk - mk * mk;
-        // Damping that one of the two explains as well as the other is taken for that of the stiffness.
+        // If αM and βK are indistinguishable, the damping is attributed to the stiffness.
         if determinant > 1e-12 * mm * kk {
             [(kk * mc - mk * kc) / determinant, (mm * kc - mk * mc) / determinant]
         } else if kk > 0.0 {
@@ -260,7 +261,7 @@ mod tests {
     #[test]
     fn entries_follow_from_independent_unknowns_and_lead_back_to_them() {
         let unknowns = chain();
-        let relations = Relations::of(&unknowns).unwrap();
+        let relations = Relations::from_unknowns(&unknowns).unwrap();
         // m1, m2, m3, then k11 k12 k22 k23 k33, then α and β.
         assert_eq!(relations.count(), 10);
         let p = [2.0, 3.0, 4.0, 50.0, -20.0, 60.0, -30.0, 70.0, 0.5, 0.01];
@@ -279,7 +280,7 @@ mod tests {
 
     #[test]
     fn the_tangent_is_the_derivative_of_the_entries() {
-        let relations = Relations::of(&chain()).unwrap();
+        let relations = Relations::from_unknowns(&chain()).unwrap();
         let p = DVector::from_fn(relations.count(), |at, _| 1.0 + (3.0 * at as f64).sin());
         let tangent = relations.tangent(p.as_slice());
         for (at, column) in tangent.column_iter().enumerate() {
@@ -295,6 +296,6 @@ mod tests {
 
     #[test]
     fn unrelated_entries_have_no_relations() {
-        assert!(Relations::of(&Unknowns::unknown_mass(2).unwrap()).is_none());
+        assert!(Relations::from_unknowns(&Unknowns::unknown_mass(2).unwrap()).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! One estimator over a range of settings, such as time steps, and which of them is best.
+//! One estimator over a range of settings, such as time steps, and the best setting.
 
 use mechid_model::SecondOrderSystem;
 use rayon::prelude::*;
@@ -10,13 +10,13 @@ use crate::Estimate;
 pub struct SweepPoint<S, E> {
     /// The setting, such as an NPI.
     pub setting: S,
-    /// The estimate with its intervals, or why there is none.
+    /// The estimate with its intervals, or the error.
     pub outcome: Result<Estimate, E>,
-    /// Merit of the outcome, a pure number, the smaller the better; `None` if there is no complete
-    /// estimate.
+    /// Relative error of the outcome, a pure number; `None` if there is no complete estimate.
     ///
-    /// With a reference: the largest error of an entry of M, C or K relative to the largest entry
-    /// of that matrix. Without: the same of the standard errors, which say nothing of bias.
+    /// With a reference it is the largest error of an entry of M, C or K relative to the largest
+    /// entry of that matrix. Without a reference the standard errors replace the errors; they do
+    /// not include bias.
     pub error: Option<f64>,
 }
 
@@ -26,7 +26,7 @@ pub struct Sweep<S, E> {
     points: Vec<SweepPoint<S, E>>,
 }
 
-/// Runs `estimate` at every setting, in parallel, and rates what it finds.
+/// Runs `estimate` at every setting, in parallel, and rates the results.
 ///
 /// The result does not depend on the number of threads. `progress` is called after every setting,
 /// from any thread, with the number of settings done.
@@ -43,14 +43,14 @@ pub struct Sweep<S, E> {
 /// let unknowns = Unknowns::known_mass(system.mass())?;
 /// let euler = TimeDomain::new(Discretisation::Euler, Extent::WholePeriod);
 /// let settings: Vec<f64> = (1..=8).map(f64::from).collect();
-/// let found = sweep(&settings, Some(&system), |npi| {
+/// let points = sweep(&settings, Some(&system), |npi| {
 ///     let sampling = npi_sampling(*npi, 256, machine.natural_frequency())?;
 ///     let force = Multisine::flat(1..=127, 50.0, Phases::Schroeder)?.sample(sampling)?;
 ///     let motion = exact_zoh_periodic(&system, &force)?;
 ///     let fit = euler.fit(motion.displacement(), motion.velocity(), &force, &unknowns)?;
 ///     Ok::<_, Box<dyn std::error::Error + Send + Sync>>(fit.into_estimate())
 /// }, |_done| {});
-/// assert_eq!(found.best().map(|point| point.setting), Some(1.0));
+/// assert_eq!(points.best().map(|point| point.setting), Some(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn sweep<S, E>(
@@ -79,7 +79,8 @@ impl<S, E> Sweep<S, E> {
         &self.points
     }
 
-    /// The setting with the smallest error; the first of equals. `None` if nothing was found.
+    /// Returns the point with the smallest error, the first one if several are equal; `None` if no
+    /// setting has a complete estimate.
     pub fn best(&self) -> Option<&SweepPoint<S, E>> {
         let rated = self.points.iter().filter_map(|point| Some((point, point.error?)));
         rated.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(point, _)| point)

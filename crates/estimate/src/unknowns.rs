@@ -15,7 +15,7 @@ use crate::relations::Relations;
 /// use mechid_model::Matrix;
 /// use nalgebra::dmatrix;
 ///
-/// // The rotor's mass is known, and the film does not couple the velocities.
+/// // The mass of the rotor is known, and the film does not couple the velocities.
 /// let unknowns = Unknowns::known_mass(&dmatrix![14.8, 0.0; 0.0, 14.8])?
 ///     .fix(Matrix::Damping, 0, 1, 0.0)?
 ///     .fix(Matrix::Damping, 1, 0, 0.0)?;
@@ -25,26 +25,26 @@ use crate::relations::Relations;
 /// ```
 ///
 /// Entries may be related: [`Unknowns::symmetric`] makes two of them one unknown, and
-/// [`Unknowns::proportional_damping`] leaves two unknowns of all the damping. Machines of many masses need
-/// that, for every entry by itself has to be excited.
+/// [`Unknowns::proportional_damping`] replaces the whole damping matrix by two unknowns. Machines
+/// of many masses need such relations, because otherwise the test must excite every entry
+/// separately.
 ///
-/// With the feature `serde` it is written as three matrices, `null` where an entry is free, and its
-/// relations.
+/// The feature `serde` writes three matrices, with `null` for a free entry, and the relations.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "form::UnknownsForm", into = "form::UnknownsForm"))]
 pub struct Unknowns {
     dof: usize,
-    /// M, C, K: `None` where the entry is free.
+    /// Known entries of M, C and K; `None` for a free entry.
     fixed: [DMatrix<Option<f64>>; 3],
-    /// M, C, K: whether entries (i, j) and (j, i) are one.
+    /// True for each of M, C and K whose entries (i, j) and (j, i) are one unknown.
     symmetric: [bool; 3],
-    /// C = αM + βK.
+    /// True for C = αM + βK.
     proportional: bool,
 }
 
 impl Unknowns {
-    /// Every entry of C and K is free, M (n×n, kg) is known.
+    /// Creates unknowns with every entry of C and K free and M (n×n, kg) known.
     ///
     /// # Errors
     /// [`EstimateError::NoDof`], [`EstimateError::Shape`], [`EstimateError::FixedValue`].
@@ -63,7 +63,7 @@ impl Unknowns {
         Ok(unknowns)
     }
 
-    /// Every entry of M, C and K is free.
+    /// Creates unknowns with every entry of M, C and K free.
     ///
     /// # Errors
     /// [`EstimateError::NoDof`] if `dof` is 0.
@@ -76,7 +76,7 @@ impl Unknowns {
         Ok(Self { dof, fixed, symmetric: [false; 3], proportional: false })
     }
 
-    /// The same, with one entry (counted from 0) known: kg, N·s/m or N/m.
+    /// Returns the same unknowns with one entry (counted from 0) known: kg, N·s/m or N/m.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if there is no such entry, [`EstimateError::FixedValue`] unless
@@ -99,7 +99,7 @@ impl Unknowns {
         Ok(self)
     }
 
-    /// The same, with one entry (counted from 0) to be found.
+    /// Returns the same unknowns with one entry (counted from 0) free.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if there is no such entry.
@@ -121,8 +121,8 @@ impl Unknowns {
         }
     }
 
-    /// The same, with a matrix that is symmetric: its entries (i, j) and (j, i) are one unknown, and where one
-    /// of them is known both are.
+    /// Returns the same unknowns with a symmetric matrix: its entries (i, j) and (j, i) are one
+    /// unknown, and if one of them is known, both are.
     ///
     /// # Errors
     /// [`EstimateError::Asymmetric`] if two such entries are known and differ.
@@ -149,7 +149,8 @@ impl Unknowns {
         Ok(self)
     }
 
-    /// The same, with a damping matrix C = αM + βK: of all its entries, α (1/s) and β (s) are unknown.
+    /// Returns the same unknowns with proportional damping C = αM + βK: α (1/s) and β (s) are the
+    /// only unknowns of the damping.
     ///
     /// # Errors
     /// [`EstimateError::RelatedDamping`] if an entry of the damping is known.
@@ -172,25 +173,26 @@ impl Unknowns {
         self.dof
     }
 
-    /// The known value of an entry (counted from 0) in kg, N·s/m or N/m; `None` if it is free.
+    /// Returns the known value of an entry (counted from 0) in kg, N·s/m or N/m; `None` if it is
+    /// free.
     ///
     /// # Panics
     /// If there is no such entry.
     pub fn fixed(&self, matrix: Matrix, row: usize, column: usize) -> Option<f64> {
         if self.proportional && matrix == Matrix::Damping {
-            let zero = |of: Matrix| self.fixed[of as usize][(row, column)] == Some(0.0);
+            let zero = |matrix: Matrix| self.fixed[matrix as usize][(row, column)] == Some(0.0);
             return (zero(Matrix::Mass) && zero(Matrix::Stiffness)).then_some(0.0);
         }
         self.fixed[matrix as usize][(row, column)]
     }
 
-    /// Returns whether entries (i, j) and (j, i) of a matrix are one unknown: as was said, or as proportional damping
-    /// has it from mass and stiffness.
+    /// Returns whether entries (i, j) and (j, i) of a matrix are one unknown. Proportional damping
+    /// is symmetric if mass and stiffness are.
     pub fn is_symmetric(&self, matrix: Matrix) -> bool {
         let [mass, damping, stiffness] = self.symmetric;
         match matrix {
             Matrix::Damping => damping || self.proportional && mass && stiffness,
-            of => self.symmetric[of as usize],
+            Matrix::Mass | Matrix::Stiffness => self.symmetric[matrix as usize],
         }
     }
 
@@ -204,31 +206,29 @@ impl Unknowns {
         self.proportional || self.symmetric.contains(&true)
     }
 
-    /// Number of independent unknowns: as many as [`Unknowns::free`] has entries, but for those that are
-    /// related.
+    /// Number of independent unknowns; without relations it is the number of entries of
+    /// [`Unknowns::free`].
     pub fn independent(&self) -> usize {
-        Relations::of(self).map_or_else(|| self.free().len(), |relations| relations.count())
+        Relations::from_unknowns(self)
+            .map_or_else(|| self.free().len(), |relations| relations.count())
     }
 
-    /// Returns an error if entries are related, for an estimator that takes each by itself.
+    /// Returns an error if entries are related, for an estimator that does not support relations.
     ///
     /// # Errors
     /// [`EstimateError::Related`], which names `estimator`.
     pub fn check_unrelated(&self, estimator: &'static str) -> Result<(), EstimateError> {
-        match self.is_related() {
-            false => Ok(()),
-            true => Err(EstimateError::Related { estimator }),
-        }
+        if self.is_related() { Err(EstimateError::Related { estimator }) } else { Ok(()) }
     }
 
-    /// The free entries in the order of every covariance: M, C, K, each row by row.
+    /// Returns the free entries in the order of every covariance: M, C, K, each row by row.
     pub fn free(&self) -> Vec<Parameter> {
         let is_free = |p: &Parameter| self.fixed(p.matrix(), p.row(), p.column()).is_none();
         Parameter::all(self.dof).filter(is_free).collect()
     }
 
-    /// The three matrices with the known values in place and `values` (in the order of
-    /// [`Unknowns::free`]) in the free entries: M (kg), C (N·s/m) and K (N/m), n×n each.
+    /// Returns M (kg), C (N·s/m) and K (N/m), n×n each, with the known values and with `values` (in
+    /// the order of [`Unknowns::free`]) as free entries.
     ///
     /// # Panics
     /// If there are not as many values as free entries.
@@ -242,7 +242,7 @@ impl Unknowns {
         matrices
     }
 
-    /// M, n×n, in kg, if all of it is known.
+    /// Returns M, n×n, in kg, if all its entries are known.
     pub fn mass(&self) -> Option<DMatrix<f64>> {
         let known = &self.fixed[Matrix::Mass as usize];
         let values: Option<Vec<f64>> = known.iter().copied().collect();
@@ -295,9 +295,9 @@ mod form {
             let matrices = [form.mass, form.damping, form.stiffness];
             for (matrix, entries) in Matrix::ALL.into_iter().zip(matrices) {
                 let rows = entries.len();
-                let other = entries.iter().map(Vec::len).find(|columns| *columns != dof);
-                if rows != dof || other.is_some() {
-                    let columns = other.unwrap_or(dof);
+                let wrong = entries.iter().map(Vec::len).find(|columns| *columns != dof);
+                if rows != dof || wrong.is_some() {
+                    let columns = wrong.unwrap_or(dof);
                     return Err(EstimateError::Shape { matrix, rows, columns, dof });
                 }
                 for (row, values) in entries.iter().enumerate() {
@@ -311,15 +311,13 @@ mod form {
             for matrix in form.symmetric {
                 unknowns = unknowns.symmetric(matrix)?;
             }
-            match form.proportional_damping {
-                true => unknowns.proportional_damping(),
-                false => Ok(unknowns),
-            }
+            if form.proportional_damping { unknowns.proportional_damping() } else { Ok(unknowns) }
         }
     }
 }
 
-/// Returns the error of an equation of motion, counted from 0, that has neither a force nor a known entry.
+/// Returns the error for an equation of motion (counted from 0) that has neither a force nor a
+/// known entry.
 pub fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
     let of_equation = unknowns.free().into_iter().filter(|p| p.row() == equation);
     let parameters = message::list(of_equation, ", ", NAMED_PARAMETERS);

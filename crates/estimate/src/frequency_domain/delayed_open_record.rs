@@ -14,8 +14,8 @@ use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
 
-/// Maximum likelihood for the lines of open records with the force some time later, the loads of their ends being
-/// found anew with each delay.
+/// Maximum likelihood for the lines of open records with the force some time later, the loads of
+/// their ends being found anew with each delay.
 pub struct DelayedOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
@@ -27,13 +27,13 @@ pub struct DelayedOpenRecord<'a> {
 
 impl<'a> DelayedOpenRecord<'a> {
     /// Begins with the result of a `fit` to the same data.
-    pub fn of(
+    pub fn from_fit(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,
         fit: &OutputErrorFit,
     ) -> Option<Self> {
         let entries: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
-        let mut theta = match Relations::of(unknowns) {
+        let mut theta = match Relations::from_unknowns(unknowns) {
             None => entries,
             Some(relations) => relations.unknowns(&entries).as_slice().to_vec(),
         };

@@ -1,5 +1,5 @@
-//! InitialEstimates of the search for the maximum of the likelihood: linear estimates of the equation of
-//! motion, with weights and corrections for noise.
+//! InitialEstimates of the search for the maximum of the likelihood: linear estimates of the
+//! equation of motion, with weights and corrections for noise.
 
 use std::borrow::Cow;
 
@@ -91,9 +91,9 @@ impl<'a> InitialEstimates<'a> {
         self
     }
 
-    /// Every start, those that are rounds of one iteration together, the most trusted first: total least
-    /// squares and ordinary ones weighted by the dynamic stiffness found before, then the machine
-    /// expected and ordinary least squares with weights ω^−e and with those of the noise.
+    /// Every start, those that are rounds of one iteration together, the most trusted first: total
+    /// least squares and ordinary ones weighted by the dynamic stiffness found before, then the
+    /// machine expected and ordinary least squares with weights ω^−e and with those of the noise.
     pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
         let powers =
             EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));
@@ -105,7 +105,7 @@ impl<'a> InitialEstimates<'a> {
         let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
         let single = single.chain(weighted.map(|solution| values(&solution)));
         let all = std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start]));
-        let relations = Relations::of(self.unknowns);
+        let relations = Relations::from_unknowns(self.unknowns);
         let with_ends = |start: DVector<f64>| {
             let independent = match &relations {
                 None => start,
@@ -159,7 +159,8 @@ impl<'a> InitialEstimates<'a> {
         weights.iter().all(|w| w.is_finite()).then_some(weights)
     }
 
-    /// The free entries, of each equation of motion by itself or, where they are related, of all together.
+    /// The free entries, of each equation of motion by itself or, where they are related, of all
+    /// together.
     fn estimate(&self, kind: Kind, weights: &Weights) -> Option<DVector<f64>> {
         let theta = match &self.linear {
             Some(linear) => self.estimate_together(kind, weights, linear)?,
@@ -238,7 +239,8 @@ impl<'a> InitialEstimates<'a> {
         factor.push(&[rows.as_view()]).then(|| factor.r().clone())
     }
 
-    /// E of the Gram matrix of the columns of [`InitialEstimates::triangle`] that noise alone would have.
+    /// E of the Gram matrix of the columns of [`InitialEstimates::triangle`] that noise alone would
+    /// have.
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
         let mut gram = DMatrix::zeros(last + 1, last + 1);
@@ -280,8 +282,8 @@ impl<'a> InitialEstimates<'a> {
     }
 }
 
-/// The unknowns of a triangle whose last column is the force; `noise` gives the Gram matrix of its columns that
-/// noise alone would have.
+/// The unknowns of a triangle whose last column is the force; `noise` gives the Gram matrix of its
+/// columns that noise alone would have.
 fn solve(
     kind: Kind,
     mut triangle: DMatrix<f64>,
@@ -316,9 +318,9 @@ fn values(estimate: &Estimate) -> DVector<f64> {
 /// θ for which |R [θ; −1]|² is least against [θ; −1]ᵀ N [θ; −1].
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 6.3; Pintelon & Schoukens, *System
-/// Identification: A Frequency Domain Approach*, the chapter on estimation with known noise models
-/// (weighted generalized total least squares, bootstrapped).
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 6.3; Pintelon & Schoukens,
+/// *System Identification: A Frequency Domain Approach*, the chapter on estimation with known noise
+/// models (weighted generalized total least squares, bootstrapped).
 fn total_least_squares(triangle: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let lower = triangle.transpose();
     let half = lower.solve_lower_triangular(noise)?;

@@ -21,23 +21,24 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
 ///
 /// Minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
-/// from several starts: [`equation_error`] with several weights, and total least squares weighted by
-/// the dynamic stiffness found before. Where they do not lead to one minimum, the search is repeated from
-/// the best ones after a few steps in resampled data; the best is kept. Unbiased and of least scatter to first order in the noise. The weights come from
-/// [`FrequencyData::noise`]:
+/// from several starts: [`equation_error`] with several weights, and total least squares weighted
+/// by the dynamic stiffness found before. Where they do not lead to one minimum, the search is
+/// repeated from the best ones after a few steps in resampled data; the best is kept. Unbiased and
+/// of least scatter to first order in the noise. The weights come from [`FrequencyData::noise`]:
 ///
 /// - noise on displacement alone (force exact): the output-error estimator;
 /// - noise on force too: errors in variables, the true force being eliminated row by row;
-/// - no noise stated: the noise of each channel found from the residual, white in the quantity measured or
-///   of a smooth spectrum ([`Pooling::Automatic`]), the force exact.
+/// - no noise stated: the noise of each channel found from the residual, white in the quantity
+///   measured or of a smooth spectrum ([`Pooling::Automatic`]), the force exact.
 ///
 /// Weights from few repeated periods are themselves uncertain; the covariance allows for that.
 ///
 /// # Errors
 /// What [`equation_error`] refuses, [`EstimateError::Undetermined`] if the data leave a parameter
 /// open, [`EstimateError::SingularNoise`] if a stated noise covariance cannot be inverted,
-/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if it comes from too few periods to weight with, and
-/// [`EstimateError::NotConverged`] if no start leads to a minimum.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if it comes from
+/// too few periods to weight with, and [`EstimateError::NotConverged`] if no start leads to a
+/// minimum.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
@@ -49,12 +50,12 @@ pub fn output_error(
     search_near(data, unknowns, None, Pooling::Automatic)
 }
 
-/// [`output_error`] that also starts its search from a machine that is expected to be near, such as a
-/// finite element model.
+/// [`output_error`] that also starts its search from a machine that is expected to be near, such as
+/// a finite element model.
 ///
 /// # Errors
-/// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the machine has another number of degrees of
-/// freedom.
+/// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the
+/// machine has another number of degrees of freedom.
 ///
 /// # Source
 /// That of [`output_error`].
@@ -72,8 +73,9 @@ pub fn output_error_near(
 /// [`output_error`] with a given way to find the noise from the residual where the data state none.
 ///
 /// # Errors
-/// As [`output_error`]; [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) for [`Pooling::PerLine`] where the data state no
-/// noise: the residual is one sample of each line.
+/// As [`output_error`];
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) for
+/// [`Pooling::PerLine`] where the data state no noise: the residual is one sample of each line.
 ///
 /// # Source
 /// That of [`output_error`].
@@ -135,7 +137,7 @@ pub fn in_units_of_noise(
     estimate: &Estimate,
 ) -> Option<DMatrix<Complex<f64>>> {
     let mut theta: DVector<f64> = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
-    if let Some(relations) = Relations::of(estimate.unknowns()) {
+    if let Some(relations) = Relations::from_unknowns(estimate.unknowns()) {
         theta = relations.unknowns(theta.as_slice());
     }
     let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;

@@ -29,8 +29,8 @@ pub struct OutputErrorFit {
     /// noise is estimated from the residual.
     pub misfit_ratio: f64,
     /// Twice the negative logarithm of the likelihood, up to a constant and allowing for sampled
-    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits of
-    /// the same data differ by is a [`likelihood_ratio`].
+    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits
+    /// of the same data differ by is a [`likelihood_ratio`].
     ///
     /// [`likelihood_ratio`]: super::likelihood_ratio()
     pub deviance: Option<f64>,
@@ -41,15 +41,16 @@ pub struct OutputErrorFit {
     /// Number of searches that ended at this minimum; of two or more it is the global one as far as
     /// searches can tell.
     pub agreeing: usize,
-    /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
-    /// periods, or one from the residual; none where the noise is known beforehand.
+    /// Noise spectra by which it was weighted where they were estimated: one of each experiment
+    /// from its periods, or one from the residual; none where the noise is known beforehand.
     pub noise: Vec<NoiseModel>,
-    /// Noise by which the lines were weighted: stated, or found from the residual up to its common level.
+    /// Noise by which the lines were weighted: stated, or found from the residual up to its common
+    /// level.
     pub spectrum: NoiseSpectrum,
     /// Loads of the ends of open records, `None` where all rows belong to periods.
     pub ends: Option<EndLoads>,
-    /// Sinusoids of each open record that were found beside the response to the forces and taken off it; none where
-    /// the noise is stated.
+    /// Sinusoids of each open record that were found beside the response to the forces and taken
+    /// off it; none where the noise is stated.
     pub sinusoids: Vec<Vec<Sinusoid>>,
 }
 
@@ -57,8 +58,8 @@ pub struct OutputErrorFit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLoads {
     tau: Vec<f64>,
-    /// τᵀ Cov(τ)⁻¹ τ: its χ² distribution has as many degrees of freedom as there are loads, if the records
-    /// are periods.
+    /// τᵀ Cov(τ)⁻¹ τ: its χ² distribution has as many degrees of freedom as there are loads, if the
+    /// records are periods.
     pub statistic: f64,
     /// Power of the loads on the lines over that of the forces, a ratio.
     pub share: f64,
@@ -76,13 +77,15 @@ impl EndLoads {
         &self.tau
     }
 
-    /// Probability that periods show loads like these: the tail of the χ² distribution beyond the statistic.
+    /// Probability that periods show loads like these: the tail of the χ² distribution beyond the
+    /// statistic.
     pub fn p_value(&self) -> f64 {
         let chi_squared = ChiSquared::new(self.tau.len() as f64);
         chi_squared.map_or(f64::NAN, |chi_squared| chi_squared.sf(self.statistic))
     }
 
-    /// The records that were fitted, each with its loads taken off the force (N): as if it were a period.
+    /// The records that were fitted, each with its loads taken off the force (N): as if it were a
+    /// period.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
@@ -101,11 +104,12 @@ impl EndLoads {
         Ok(closed.collect())
     }
 
-    /// The records that were fitted, each as the response to its force alone: what the loads of its ends make
-    /// of `system` is taken off the displacement (m), where its receptance exists.
+    /// The records that were fitted, each as the response to its force alone: what the loads of its
+    /// ends make of `system` is taken off the displacement (m), where its receptance exists.
     ///
     /// # Errors
-    /// As [`EndLoads::taken_off`], and [`NumericsError::Size`] for another number of degrees of freedom.
+    /// As [`EndLoads::taken_off`], and [`NumericsError::Size`] for another number of degrees of
+    /// freedom.
     pub fn taken_off_responses(
         &self,
         records: &[FrequencyData],
@@ -147,7 +151,8 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
 pub(super) struct Scale {
     /// Power of the noise over that of the weights.
     pub(super) level: f64,
-    /// Factor by which the covariance is larger for weights that are uncertain, where nothing better is known.
+    /// Factor by which the covariance is larger for weights that are uncertain, where nothing
+    /// better is known.
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
     /// Matrix that lines which err together add to the inverse of the Fisher information.
@@ -160,8 +165,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Returns the covariance of the independent unknowns, over the level of the noise, and its degrees of
-    /// freedom, from the inverse of the Fisher information.
+    /// Returns the covariance of the independent unknowns, over the level of the noise, and its
+    /// degrees of freedom, from the inverse of the Fisher information.
     fn covariance(&self, inverse: DMatrix<f64>) -> (DMatrix<f64>, usize) {
         let (covariance, degrees_of_freedom) = match &self.weights {
             None => (inverse * self.inflation, self.degrees_of_freedom),
@@ -177,13 +182,14 @@ impl Scale {
     }
 }
 
-/// Returns the free entries of M, C and K and their covariance, from those of the independent unknowns.
+/// Returns the free entries of M, C and K and their covariance, from those of the independent
+/// unknowns.
 fn of_entries(
     unknowns: &Unknowns,
     independent: &[f64],
     covariance: DMatrix<f64>,
 ) -> (Vec<f64>, DMatrix<f64>) {
-    match Relations::of(unknowns) {
+    match Relations::from_unknowns(unknowns) {
         None => (independent.to_vec(), covariance),
         Some(relations) => {
             let tangent = relations.tangent(independent);
@@ -256,13 +262,14 @@ pub(super) fn uncertain_weights(
 
 /// The free entries of M, C and K.
 pub(super) fn entries(unknowns: &Unknowns, independent: &[f64]) -> DVector<f64> {
-    match Relations::of(unknowns) {
+    match Relations::from_unknowns(unknowns) {
         None => DVector::from_column_slice(independent),
         Some(relations) => relations.entries(independent),
     }
 }
 
-/// The independent unknowns of M, C and K among the parameters of a search, and the loads of open ends.
+/// The independent unknowns of M, C and K among the parameters of a search, and the loads of open
+/// ends.
 pub(super) fn parts<'a>(data: &FrequencyData, theta: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
     theta.as_slice().split_at(theta.len() - transient::len(data))
 }
@@ -281,7 +288,8 @@ pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
 /// one computed.
 ///
 /// # Errors
-/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) where it does not exist.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) where it does not
+/// exist.
 pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
     if nu.is_infinite() {
         return Ok(1.0);

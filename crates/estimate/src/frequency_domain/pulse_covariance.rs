@@ -11,14 +11,15 @@ use super::output_error_fit::{entries, parts};
 use crate::Unknowns;
 use crate::limits::MAX_SENSITIVITIES;
 
-/// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the lines to err one by
-/// one; `None` without such noise and for large fits.
+/// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the
+/// lines to err one by one; `None` without such noise and for large fits.
 ///
-/// The estimate errs by (JᵀJ)⁻¹ Jᵀ r, with sensitivities J less what the loads of the ends explain, and the weighted
-/// response r to each sample of a pulse in turn.
+/// The estimate errs by (JᵀJ)⁻¹ Jᵀ r, with sensitivities J less what the loads of the ends explain,
+/// and the weighted response r to each sample of a pulse in turn.
 ///
 /// # Source
-/// White (1980), Econometrica 48, 817–838, for the covariance of a weighted fit whose errors have another one.
+/// White (1980), Econometrica 48, 817–838, for the covariance of a weighted fit whose errors have
+/// another one.
 pub(super) fn excess(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -33,7 +34,7 @@ pub(super) fn excess(
     let values = entries(unknowns, independent);
     let covariance = |row: usize| noise.covariance(row).clone();
     let closed = data.without_transient(tau);
-    let mut sensitivity = Whitened::of(&closed, unknowns, &values, covariance)?.sensitivity;
+    let mut sensitivity = Whitened::new(&closed, unknowns, &values, covariance)?.sensitivity;
     let responses = ForceResponses::new(data, unknowns, &values, noise)?;
     for record in 0..data.transient().ncols() / 2 {
         let (rows, transient) = transient_basis(data, record, &responses)?;
@@ -64,7 +65,8 @@ impl ForceResponses {
         (0..data.dof()).map(to_force).collect::<Option<_>>().map(Self)
     }
 
-    /// Returns the weighted response of some rows to a force of this amplitude on degree of freedom `dof`.
+    /// Returns the weighted response of some rows to a force of this amplitude on degree of freedom
+    /// `dof`.
     fn to(
         &self,
         rows: &Range<usize>,
@@ -86,8 +88,8 @@ impl ForceResponses {
     }
 }
 
-/// Returns the residuals of an open record and orthonormal columns that span what the loads of its transient explain
-/// of them.
+/// Returns the residuals of an open record and orthonormal columns that span what the loads of its
+/// transient explain of them.
 pub(super) fn transient_basis(
     data: &FrequencyData,
     record: usize,
@@ -122,7 +124,8 @@ pub(super) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>
     Some((q, root))
 }
 
-/// Returns the covariance of Qᵀr by the noise of all pulses, less what independent lines would have.
+/// Returns the covariance of Qᵀr by the noise of all pulses, less what independent lines would
+/// have.
 pub(super) fn scatter(
     data: &FrequencyData,
     responses: &ForceResponses,

@@ -33,8 +33,8 @@ struct Weighted {
     noise: NoiseSpectrum,
 }
 
-/// Noise of unknown level of each channel of the motion, white or of the spectrum that the residual shows, found
-/// in turn with the parameters; the forces have the noise that the data state of them.
+/// Noise of unknown level of each channel of the motion, white or of the spectrum that the residual
+/// shows, found in turn with the parameters; the forces have the noise that the data state of them.
 pub(super) fn with_unknown_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -82,7 +82,8 @@ pub(super) fn with_unknown_noise(
     Ok(OutputErrorFit { sinusoids, ..finish(data, unknowns, &mut misfit, &fit, scale)? })
 }
 
-/// A fit in white noise to what is left of open records without the sinusoids that stand out of its residual.
+/// A fit in white noise to what is left of open records without the sinusoids that stand out of its
+/// residual.
 struct BesideSinusoids<'a> {
     data: Cow<'a, FrequencyData>,
     sinusoids: Vec<Vec<Sinusoid>>,
@@ -125,8 +126,8 @@ impl<'a> BesideSinusoids<'a> {
     }
 }
 
-/// White noise of unknown level per channel, and whether the residual is only rounding; searched near a minimum
-/// `from` of nearly the same data, or from all starts.
+/// White noise of unknown level per channel, and whether the residual is only rounding; searched
+/// near a minimum `from` of nearly the same data, or from all starts.
 fn with_white_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -149,7 +150,8 @@ fn with_white_noise(
             Some(before) => before.followed(&mut misfit)?,
         };
         let sizes = levels_of(data, &misfit);
-        // With an exact force only the ratios between the channels weigh; the common level is the residual's.
+        // With an exact force only the ratios between the channels weigh; the common level is the
+        // residual's.
         let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
@@ -192,8 +194,9 @@ fn with_coloured_noise(
     Ok(last)
 }
 
-/// The noise that a residual shows, of each channel by itself, or of unmeasured forces: at each line as much more
-/// than that of the round before as the residual is more than its noise. What the noise of the force accounts for is not counted twice.
+/// The noise that a residual shows, of each channel by itself, or of unmeasured forces: at each
+/// line as much more than that of the round before as the residual is more than its noise. What the
+/// noise of the force accounts for is not counted twice.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -229,8 +232,8 @@ fn spectrum_of_residual(
     Ok(noise.with_force_variance(data.force_variance()))
 }
 
-/// Share of the noise at each row and channel that the parameters take up, rows × n; `None` of large fits,
-/// where it is small.
+/// Share of the noise at each row and channel that the parameters take up, rows × n; `None` of
+/// large fits, where it is small.
 fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
     let (n, rows) = (data.dof(), data.len());
     if 2 * n * rows * unknowns.free().len() > MAX_LEVERAGES {
@@ -239,7 +242,7 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
     let (independent, tau) = parts(data, &fit.fit.minimum.parameters);
     let (data, entries) = (data.without_transient(tau), entries(unknowns, independent));
     let covariance = |row: usize| fit.noise.covariance(row).clone();
-    let mut sensitivity = Whitened::of(&data, unknowns, &entries, covariance)?.sensitivity;
+    let mut sensitivity = Whitened::new(&data, unknowns, &entries, covariance)?.sensitivity;
     for mut column in sensitivity.column_iter_mut() {
         let length = column.norm();
         if length > 0.0 {
@@ -267,7 +270,8 @@ fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Ve
     (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
 }
 
-/// White noise of the levels that the residual of a fit with the parameters `theta` shows, one for each channel.
+/// White noise of the levels that the residual of a fit with the parameters `theta` shows, one for
+/// each channel.
 pub(super) fn white_noise_at(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -288,8 +292,8 @@ fn levels_of(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
     }
 }
 
-/// Standard deviation of the noise of each channel, in the quantity measured, beside which that of the forces
-/// makes the residual most likely.
+/// Standard deviation of the noise of each channel, in the quantity measured, beside which that of
+/// the forces makes the residual most likely.
 fn levels_beside_force(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
     let (errors, by_force) = (misfit.errors(), misfit.variance_by_force());
     let level = |channel: usize| {

@@ -1,4 +1,5 @@
-//! Uncertainty of an estimate that follows from that of the smooth noise spectrum by which it is weighted.
+//! Uncertainty of an estimate that follows from that of the smooth noise spectrum by which it is
+//! weighted.
 
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{DMatrix, DVector};
@@ -16,11 +17,11 @@ pub(super) struct WeightUncertainty {
 }
 
 impl WeightUncertainty {
-    /// Judges an estimate at the entries `values`, weighted by `noise`; `None` where the noise is no smooth spectrum or the
-    /// fit is a large one.
+    /// Judges an estimate at the entries `values`, weighted by `noise`; `None` where the noise is
+    /// no smooth spectrum or the fit is a large one.
     ///
-    /// With log powers B β of unit information times ν, orthonormal sensitivities Q and
-    /// P_i = Σ b_li Q_lᵀQ_l, the estimate scatters more by Λ = (Σ h_l Q_lᵀQ_l − Σ P_i P_i)/ν, and the
+    /// With log powers B β of unit information times ν, orthonormal sensitivities Q and P_i = Σ
+    /// b_li Q_lᵀQ_l, the estimate scatters more by Λ = (Σ h_l Q_lᵀQ_l − Σ P_i P_i)/ν, and the
     /// inverse of the Fisher information is too small by as much.
     ///
     /// # Source
@@ -38,7 +39,7 @@ impl WeightUncertainty {
             return None;
         }
         let covariance = |row: usize| noise.covariance(row).clone();
-        let mut sensitivity = Whitened::of(data, unknowns, values, covariance)?.sensitivity;
+        let mut sensitivity = Whitened::new(data, unknowns, values, covariance)?.sensitivity;
         let mut scale = DVector::from_element(count, 1.0);
         for (mut column, scale) in sensitivity.column_iter_mut().zip(scale.iter_mut()) {
             *scale = column.norm();

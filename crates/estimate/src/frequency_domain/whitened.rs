@@ -16,22 +16,21 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 /// channel, the next one its imaginary part.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
-/// likelihood in errors-in-variables.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+/// maximum likelihood in errors-in-variables.
 pub struct Whitened {
     /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
     /// One entry for each real and imaginary part of each line and channel.
     pub residual: DVector<f64>,
-    /// Derivative of −`residual` with respect to the free parameters, the independent ones where they are
-    /// related, at the most likely force.
-    /// Residuals × parameters, in inverse SI units.
+    /// Derivative of −`residual` with respect to the free parameters, the independent ones where
+    /// they are related, at the most likely force. Residuals × parameters, in inverse SI units.
     pub sensitivity: DMatrix<f64>,
 }
 
 impl Whitened {
-    /// `covariance` is that of displacement and force (2n×2n) at each row of the data. `None` if the
-    /// covariance of a residual is singular, or if there is no receptance at a line.
-    pub fn of(
+    /// `covariance` is that of displacement and force (2n×2n) at each row of the data. `None` if
+    /// the covariance of a residual is singular, or if there is no receptance at a line.
+    pub fn new(
         data: &FrequencyData,
         unknowns: &Unknowns,
         values: &DVector<f64>,
@@ -39,7 +38,7 @@ impl Whitened {
     ) -> Option<Self> {
         let mut whitened =
             Self::sensitive_to(&unknowns.free(), data, unknowns, values, covariance)?;
-        if let Some(relations) = Relations::of(unknowns) {
+        if let Some(relations) = Relations::from_unknowns(unknowns) {
             let independent = relations.unknowns(values.as_slice());
             whitened.sensitivity *= relations.tangent(independent.as_slice());
         }

@@ -1,4 +1,4 @@
-//! Errors of prediction from one measured sample to the next.
+//! One-step prediction errors: from one measured sample to the next.
 
 use mechid_model::{Discretisation, Matrix};
 use mechid_numerics::least_squares::solve_compressed;
@@ -12,31 +12,31 @@ use nalgebra::{DMatrix, DVector};
 use super::{At, Step};
 use crate::{Estimate, EstimateError};
 
-/// The mean force (N) that is missing in each measured interval, and the inertia force (N) it is
-/// left of: intervals × degrees of freedom, on the time axis of the records.
+/// Returns the mean missing force (N) of each measured interval, and the inertia force (N) to
+/// compare it with: intervals × degrees of freedom, on the time axis of the records.
 ///
-/// From each measured state (displacement in m, velocity in m/s) the machine found is led one
-/// interval ahead by the force (N); M (ẋ measured − ẋ predicted)/Δt is the force that would have
-/// led it where it was measured. What a change of the free parameters accounts for is then taken
-/// out by least squares, equation by equation, so that their own uncertainty does not show.
-/// So a wrong known mass does, and a machine of another kind.
+/// From each measured state (displacement in m, velocity in m/s) the motion of the identified
+/// system under the force (N) is predicted one interval ahead; M (ẋ measured − ẋ predicted)/Δt is
+/// the force that is missing for the measured velocity. Least squares then remove, equation by
+/// equation, the part that a change of the free parameters explains, so that the uncertainty of the
+/// parameters does not appear as a missing force. The rest shows a wrong known mass or a wrong type
+/// of model.
 ///
-/// A machine that is right leaves what disturbs its motion at random, which is white, and of white
-/// noise on the measured motion that of two neighbouring samples, which is correlated at lag 1 and
-/// no further.
+/// For a correct model the rest is white if random forces disturb the motion; white noise on the
+/// measured motion enters two neighbouring intervals, so its rest is correlated at lag 1 only.
 ///
-/// With `between`, the factor and the interpolation of a refined fit, the machine goes in so many
-/// steps under the force interpolated as there. The motions between the samples are not used: an
-/// interval has one error however many points lie in it. The force between points is what the
-/// discretisation says; Euler's is taken as held.
+/// `between` is the factor and the interpolation of a refined fit: the prediction then takes as
+/// many steps per interval, under the interpolated force. Motions between the samples are not used,
+/// so an interval has one error for any number of points. The discretisation defines the force
+/// between points; for Euler it is held.
 ///
 /// # Errors
-/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the machine,
-/// or together, or cannot be refined; [`EstimateError::Undetermined`] if the estimate is no machine;
-/// [`NumericsError::TooFewRows`].
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not fit the machine or
+/// each other, or cannot be refined; [`EstimateError::Undetermined`] if the data do not determine
+/// the machine; [`NumericsError::TooFewRows`].
 ///
 /// # Source
-/// The refinement is that of Appendix B of the dissertation.
+/// Dissertation Appendix B for the refinement.
 pub fn missing_force(
     estimate: &Estimate,
     [displacement, velocity, force]: [&Record; 3],
@@ -52,7 +52,7 @@ pub fn missing_force(
     let (factor, way) = between.unwrap_or((1, Interpolation::Linear));
     let finer = refine(force, factor, way)?;
     let step = Step::new(&system, finer.sampling().dt(), discretisation)?;
-    // Of the interpolations only a Fourier series goes on after the last sample.
+    // Only a Fourier series is defined after the last sample.
     let goes_on = between.is_none_or(|(_, way)| way == Interpolation::BandLimited);
     let (samples, dt) = (force.len(), force.sampling().dt());
     let closes = extent == Extent::WholePeriod && goes_on;
@@ -68,23 +68,25 @@ pub fn missing_force(
     let mut missing = rise(&|k, c| ahead[(k, c)]);
     let predicted = (ahead - v) / dt;
     for equation in 0..n {
-        let of = |parameter: &mechid_model::Parameter| match parameter.matrix() {
+        let regressor = |parameter: &mechid_model::Parameter| match parameter.matrix() {
             Matrix::Mass => predicted.column(parameter.column()).into_owned(),
             Matrix::Damping => v.column(parameter.column()).into_owned(),
             Matrix::Stiffness => x.column(parameter.column()).into_owned(),
         };
         let parameters = estimate.unknowns().free().into_iter().filter(|p| p.row() == equation);
-        let columns: Vec<DVector<f64>> = parameters.map(|parameter| of(&parameter)).collect();
+        let columns: Vec<DVector<f64>> =
+            parameters.map(|parameter| regressor(&parameter)).collect();
         if !columns.is_empty() {
-            let left = remainder(DMatrix::from_columns(&columns), missing.column(equation).into())?;
-            missing.set_column(equation, &left);
+            let regressors = DMatrix::from_columns(&columns);
+            let unexplained = remainder(regressors, missing.column(equation).into())?;
+            missing.set_column(equation, &unexplained);
         }
     }
     let sampling = force.sampling().with_len(intervals)?;
     Ok([Record::new(sampling, missing)?, Record::new(sampling, inertia)?])
 }
 
-/// Returns the remainder of a column once the others have been fitted to it.
+/// Returns the residual of a target after a least-squares fit of the columns.
 fn remainder(columns: DMatrix<f64>, target: DVector<f64>) -> Result<DVector<f64>, EstimateError> {
     let mut factor = TriangularFactor::new(columns.ncols() + 1);
     let right = DMatrix::from_columns(&[target]);
@@ -97,8 +99,8 @@ fn remainder(columns: DMatrix<f64>, target: DVector<f64>) -> Result<DVector<f64>
 }
 
 impl Step {
-    /// The velocities (intervals × n) that the states at the starts of the intervals lead to after
-    /// `steps` steps of the force.
+    /// Returns the velocities (intervals × n) predicted `steps` steps after the states at the
+    /// starts of the intervals.
     fn ahead(
         &self,
         force: &Record,

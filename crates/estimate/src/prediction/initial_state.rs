@@ -11,20 +11,20 @@ use super::predict;
 use crate::EstimateError;
 use crate::limits::INITIAL_UNSEEN;
 
-/// The displacement and velocity at the first sample with which [`predict`] comes closest to the
-/// motions measured, each channel relative to its size: noise on the first sample does not matter,
-/// and one kind of motion is enough.
+/// Estimates the displacement and velocity at the first sample so that [`predict`] fits the
+/// measured motions best, each channel relative to its size. All samples count, so noise on the
+/// first one does not matter, and one measured quantity is enough.
 ///
-/// What does not show in the motion (the place of a free body whose acceleration alone was measured)
-/// is taken as 0.
+/// An unobservable part of the state (such as the position of a free body with a measured
+/// acceleration only) is set to 0.
 ///
 /// # Errors
 /// As [`predict`] for [`Extent::Open`]; [`NumericsError::Size`] or [`EstimateError::Signal`] if the
 /// motions do not belong to the force.
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares); the motion
-/// is the one from rest and, linear in the start, the free one.
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares): the motion
+/// is the response from rest plus the free response, which is linear in the initial state.
 pub fn fitted_start(
     system: &SecondOrderSystem,
     force: &Record,
@@ -36,26 +36,27 @@ pub fn fitted_start(
     fit.start()
 }
 
-/// The start of a record that comes in stretches, as [`fitted_start`] finds it: memory does not grow
-/// with the record.
+/// Estimate of the initial state of a record that comes in segments, as [`fitted_start`]: memory
+/// does not grow with the record.
 ///
 /// # Source
-/// That of [`fitted_start`]; chapter 6 there (a triangle brought up to date by rows).
+/// As [`fitted_start`]; chapter 6 there (a triangular factor updated by rows).
 #[derive(Debug, Clone)]
 pub struct StartFit {
     system: SecondOrderSystem,
     discretisation: Discretisation,
-    /// Present states of the motions that are superposed: free ones from each unit start, and the
-    /// one from rest under the force.
+    /// Present states of the superposed motions: the free responses to each unit initial state, and
+    /// the response from rest to the force.
     runs: Vec<InitialState>,
-    /// Factor for each measured channel of the columns \[free motions | what the forced one leaves\].
+    /// Triangular factor for each measured channel of the columns
+    /// \[free responses | measured motion minus response from rest\].
     channels: Vec<TriangularFactor>,
     /// Sum of squares of each measured channel.
     sizes: Vec<f64>,
 }
 
 impl StartFit {
-    /// Creates sums without a sample.
+    /// Creates a fit without a sample.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if the machine has no degree of freedom.
@@ -71,8 +72,8 @@ impl StartFit {
         Ok(Self { system: system.clone(), discretisation, runs, channels, sizes })
     }
 
-    /// Takes the next stretch, which begins with the last sample of the one before: force (N) and the
-    /// motions measured, the same kinds each time (samples × degrees of freedom).
+    /// Adds the next segment, which begins with the last sample of the preceding one: force (N) and
+    /// the measured motions, the same quantities each time (samples × degrees of freedom).
     ///
     /// # Errors
     /// As [`predict`] for [`Extent::Open`]; [`NumericsError::Size`] or [`EstimateError::Signal`] if
@@ -87,43 +88,44 @@ impl StartFit {
             check_size("channels of the motion", n, record.channels())?;
             record.check_same_sampling(force)?;
         }
-        let still = Record::new(force.sampling(), DMatrix::zeros(len, n))?;
+        let no_force = Record::new(force.sampling(), DMatrix::zeros(len, n))?;
         let mut responses = Vec::new();
         for (at, run) in self.runs.iter_mut().enumerate() {
-            let force = if at < 2 * n { &still } else { force };
+            let force = if at < 2 * n { &no_force } else { force };
             let response = predict(&self.system, force, self.discretisation, Extent::Open, run)?;
             *run = last(&response)?;
             responses.push(response);
         }
-        let seen = usize::from(!self.channels.is_empty());
-        if seen == 0 {
+        // The first sample of a later segment is already in the sums.
+        let first = usize::from(!self.channels.is_empty());
+        if first == 0 {
             let channels = n * measured.len();
             self.channels = vec![TriangularFactor::new(2 * n + 1); channels];
             self.sizes = vec![0.0; channels];
         }
-        let all =
+        let channels =
             measured.iter().flat_map(|(kind, record)| (0..n).map(move |c| (*kind, record, c)));
         for ((kind, record, c), (factor, size)) in
-            all.zip(self.channels.iter_mut().zip(&mut self.sizes))
+            channels.zip(self.channels.iter_mut().zip(&mut self.sizes))
         {
             let measured = record.channel(c);
             let column = |at: usize| responses[at].quantity(kind).channel(c);
-            let rows = DMatrix::from_fn(len - seen, 2 * n + 1, |k, at| match at {
-                gap if gap == 2 * n => measured[seen + k] - column(gap)[seen + k],
-                free => column(free)[seen + k],
+            let rows = DMatrix::from_fn(len - first, 2 * n + 1, |k, at| match at {
+                gap if gap == 2 * n => measured[first + k] - column(gap)[first + k],
+                free => column(free)[first + k],
             });
             if !factor.push(&[rows.as_view()]) {
                 return Err(NumericsError::Overflow.into());
             }
-            *size += measured[seen..].iter().map(|x| x * x).sum::<f64>();
+            *size += measured[first..].iter().map(|x| x * x).sum::<f64>();
         }
         Ok(())
     }
 
-    /// The start that fits all stretches so far.
+    /// Returns the initial state that fits all segments so far.
     ///
     /// # Errors
-    /// [`NumericsError::TooFewRows`] if there was none.
+    /// [`NumericsError::TooFewRows`] without a segment.
     pub fn start(&self) -> Result<InitialState, EstimateError> {
         let n = self.system.dof();
         if self.channels.iter().all(|factor| factor.rows() == 0) {
@@ -132,7 +134,7 @@ impl StartFit {
         let width = 2 * n + 1;
         let mut rows = DMatrix::zeros(self.channels.len() * width, width);
         for (at, (factor, size)) in self.channels.iter().zip(&self.sizes).enumerate() {
-            // A stretch that was refused leaves channels without rows.
+            // A segment that was refused can leave channels without rows.
             if factor.rows() > 0 {
                 let scale = if *size > 0.0 { size.sqrt() } else { 1.0 };
                 rows.rows_mut(at * width, width).copy_from(&factor.r().unscale(scale));
@@ -160,10 +162,10 @@ impl StartFit {
     }
 }
 
-/// The state at the last sample; rest, where its squares are too small to be told from 0.
+/// Returns the state at the last sample; rest if its squares underflow.
 fn last(response: &Response) -> Result<InitialState, EstimateError> {
-    let of = |record: &Record| record.data().row(record.len() - 1).transpose();
-    let (x, v) = (of(response.displacement()), of(response.velocity()));
+    let last_sample = |record: &Record| record.data().row(record.len() - 1).transpose();
+    let (x, v) = (last_sample(response.displacement()), last_sample(response.velocity()));
     if x.amax().max(v.amax()) < f64::MIN_POSITIVE.sqrt() {
         return Ok(InitialState::rest(x.len()));
     }

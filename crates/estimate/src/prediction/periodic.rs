@@ -1,4 +1,4 @@
-//! The steady state under a band-limited force, line by line.
+//! Steady state under a band-limited force, line by line.
 
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_numerics::check_size;
@@ -7,14 +7,14 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
 
-/// Displacement, velocity and acceleration of a machine in the steady state under the band-limited
-/// force (N) through the samples of whole periods: what a fit of spectra predicts.
+/// Predicts displacement, velocity and acceleration of a machine in the steady state under the
+/// band-limited force (N) through the samples of whole periods, as a fit of spectra does.
 ///
-/// Nothing is predicted at half the sampling rate (even length), where samples carry no phase.
+/// The prediction is zero at half the sampling rate (even length), where samples have no phase.
 ///
 /// # Errors
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::Model`] if a line stands
-/// on an undamped resonance, DC included.
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,
+/// [`EstimateError::Model`] if a line is at an undamped resonance, DC included.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),

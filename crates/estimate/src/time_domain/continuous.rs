@@ -6,20 +6,20 @@ use nalgebra::DMatrix;
 
 use crate::EstimateError;
 
-/// \[A B\] from \[Φ − I, Γ\], and the derivative of that.
+/// Continuous-time \[A B\] from \[Φ − I, Γ\], and its derivative.
 ///
-/// Works on the state (x, Δt ẋ), in which both rows of Φ are of one size.
+/// The logarithm is computed for the state (x, Δt ẋ), in which both rows of Φ have the same size.
 pub(super) struct Continuous {
     dt: f64,
     dof: usize,
-    /// Empty for Euler, which has AΔt = Φ − I.
+    /// `None` for Euler, where AΔt = Φ − I.
     generator: Option<Generator>,
     /// \[A B\]: 2n × (2n + forces).
     pub(super) value: DMatrix<f64>,
 }
 
 impl Continuous {
-    /// `change` is \[Φ − I, Γ\]: 2n × (2n + forces).
+    /// Computes \[A B\] from `change` = \[Φ − I, Γ\]: 2n × (2n + forces).
     pub(super) fn new(
         change: &DMatrix<f64>,
         dt: f64,
@@ -43,14 +43,14 @@ impl Continuous {
         Ok(this)
     }
 
-    /// Returns the change of \[A B\] with \[Φ − I, Γ\].
+    /// Returns the first-order change of \[A B\] for a change of \[Φ − I, Γ\].
     pub(super) fn derivative(&self, change: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
         let Some(generator) = &self.generator else { return Ok(change / self.dt) };
         let moved = generator.derivative(&self.scaled(change, 1.0))?;
         Ok(self.scaled(&moved, -1.0) / self.dt)
     }
 
-    /// Transforms to the state (x, Δt ẋ), or with `power` −1 back to (x, ẋ).
+    /// Transforms a matrix to the state (x, Δt ẋ), or with `power` −1 back to (x, ẋ).
     fn scaled(&self, matrix: &DMatrix<f64>, power: f64) -> DMatrix<f64> {
         let (n, factor) = (self.dof, self.dt.powf(power));
         let mut scaled = matrix.clone();

@@ -1,4 +1,4 @@
-//! The equation of motion at the samples, when accelerations are measured.
+//! Least squares on the equation of motion at the samples, with measured accelerations.
 
 use mechid_model::Response;
 use mechid_signal::Record;
@@ -7,19 +7,19 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 
 /// Fits M ẍ + C ẋ + K x = F at every sample of a response (force: samples × degrees of freedom, N).
 ///
-/// There is no discretisation error: whatever the step, the equation holds at each instant. For
-/// records too long for memory, or several of them, push their rows to an [`EquationOfMotion`].
+/// There is no discretisation error: the equation holds at each instant for any time step. For
+/// several records, or records too long for memory, push their rows to an [`EquationOfMotion`].
 ///
-/// On the output of an integrator that enforces this very equation at its steps this fit proves
-/// nothing: it gives the parameters back however wrong the motion is.
+/// This fit cannot verify an integrator that enforces this equation at its steps: it returns the
+/// exact parameters for a wrong motion, too.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] if the force lies on another time axis, else as
+/// [`EstimateError::Signal`] if the force has another time axis, otherwise as
 /// [`EquationOfMotion::solve`].
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares), of the
-/// equation of motion (3.2.1) of the dissertation.
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares); equation of
+/// motion (3.2.1) of the dissertation.
 pub fn equation_of_motion(
     response: &Response,
     force: &Record,

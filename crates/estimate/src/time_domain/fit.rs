@@ -1,4 +1,4 @@
-//! The time-domain estimate: M, C, K and the transition they come from.
+//! Time-domain estimate: M, C, K and the state equations.
 
 use mechid_model::{Discretisation, Matrix, Parameter};
 use mechid_numerics::check_size;
@@ -12,27 +12,27 @@ use crate::covariance::Product;
 use crate::estimate::EstimateParts;
 use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
-/// M̂, Ĉ, K̂ and the sampled and continuous state equations they were found through.
+/// M̂, Ĉ, K̂ and the sampled and continuous state equations from which they are computed.
 ///
-/// The residual ratios of its [`Estimate`] are those of the velocity increments ẋ⁺ − ẋ.
+/// The residual ratios of its [`Estimate`] refer to the velocity increments ẋ⁺ − ẋ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeDomainFit {
     estimate: Estimate,
     discretisation: Discretisation,
-    /// \[Φ − I, Γ(, Γ⁺)\], forces left out put back as zeros.
+    /// \[Φ − I, Γ(, Γ⁺)\], with zeros for omitted forces.
     change: DMatrix<f64>,
     state_matrix: DMatrix<f64>,
     dt: f64,
 }
 
-/// The least-squares answer in terms of the state equations.
+/// Least-squares solution in terms of the state equations.
 struct Fitted<'a> {
     rows: &'a Transitions,
     regression: Regression,
     continuous: Continuous,
 }
 
-/// Dependence of each parameter on \[A₂₁ A₂₂ B₂\]: d p = −Σ_j M_ij weight · d(row j).
+/// Sensitivity of a parameter to \[A₂₁ A₂₂ B₂\]: dp = −Σ_j M_ij weight · d(row j).
 struct Sensitivity {
     equation: usize,
     weight: RowDVector<f64>,
@@ -69,12 +69,12 @@ impl TimeDomainFit {
         &self.estimate
     }
 
-    /// M̂, Ĉ, K̂ with their covariance, leaving the state equations behind.
+    /// Returns M̂, Ĉ, K̂ with their covariance, without the state equations.
     pub fn into_estimate(self) -> Estimate {
         self.estimate
     }
 
-    /// The assumption between samples.
+    /// Assumption about the force between samples.
     pub fn discretisation(&self) -> Discretisation {
         self.discretisation
     }
@@ -85,15 +85,16 @@ impl TimeDomainFit {
         self.change.columns(0, states) + DMatrix::identity(states, states)
     }
 
-    /// A of ż = A z + B F with z = (x, ẋ) in m and m/s: 2n × 2n. In exact data its upper half is \[0 I\].
+    /// A of ż = A z + B F with z = (x, ẋ) in m and m/s: 2n × 2n. For exact data its upper half is
+    /// \[0 I\].
     pub fn state_matrix(&self) -> &DMatrix<f64> {
         &self.state_matrix
     }
 
-    /// Inconsistency of the identified dx/dt with the measured velocity: the largest deviation of the
-    /// upper half of A from \[0 I\], relative (a pure number), displacements counted in steps of velocity.
+    /// Inconsistency of the identified dx/dt with the measured velocity: the largest deviation of
+    /// the upper half of A from \[0 I\] for the state (x, Δt ẋ), a pure number.
     ///
-    /// A velocity of the wrong scale shows here, as does a discretisation that does not fit.
+    /// It shows a velocity of the wrong scale or a wrong discretisation.
     ///
     /// # Source
     /// Ours.
@@ -104,12 +105,12 @@ impl TimeDomainFit {
         of_velocity.amax().max(of_displacement.amax())
     }
 
-    /// Errors of prediction one step ahead, on this or another record: rows × 2n, first the
-    /// errors of x⁺ (m), then those of ẋ⁺ (m/s).
+    /// Returns the one-step prediction errors on this or another record: rows × 2n, first the
+    /// errors of x⁺ (m), then the errors of ẋ⁺ (m/s).
     ///
     /// # Errors
-    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size), [`EstimateError::Signal`], [`EstimateError::Step`] if the record
-    /// does not fit.
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size), [`EstimateError::Signal`],
+    /// [`EstimateError::Step`] if the record does not fit.
     ///
     /// # Source
     /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 3 (prediction).
@@ -145,14 +146,14 @@ impl TimeDomainFit {
     }
 }
 
-/// The increments regressed on states and forces.
+/// Regression of the increments on states and forces.
 pub(super) struct Regression {
-    /// Forces that are not identically zero.
+    /// Indices of the forces that are not identically zero.
     forces: Vec<usize>,
-    /// Coefficients of the force at the next sample, too.
+    /// True if the force at the next sample has coefficients, too.
     two_forces: bool,
     pub(super) solution: Solution,
-    /// Regressors × 2n: the smallest of those that fit equally well.
+    /// Coefficients, regressors × 2n: the smallest of those that fit equally well.
     coefficients: DMatrix<f64>,
 }
 
@@ -178,7 +179,7 @@ pub(super) fn regression(
 }
 
 impl Regression {
-    /// \[Φ − I, Γ₀ + Γ₁\].
+    /// Returns \[Φ − I, Γ₀ + Γ₁\].
     pub(super) fn change(&self, dof: usize) -> DMatrix<f64> {
         let (states, forces) = (2 * dof, self.forces.len());
         let mut change = self.coefficients.rows(0, states + forces).transpose();
@@ -190,7 +191,7 @@ impl Regression {
         change
     }
 
-    /// \[Φ − I, Γ(, Γ⁺)\] with zeros for the forces left out.
+    /// Returns \[Φ − I, Γ(, Γ⁺)\] with zeros for omitted forces.
     fn all_forces(&self, n: usize) -> DMatrix<f64> {
         let groups = if self.two_forces { 2 } else { 1 };
         let mut change = DMatrix::zeros(2 * n, (2 + groups) * n);
@@ -206,7 +207,7 @@ impl Regression {
 }
 
 impl Fitted<'_> {
-    /// The values, and how they follow from the state equations.
+    /// Returns the parameters and their sensitivities to the state equations.
     fn parameters(
         &self,
         unknowns: &Unknowns,
@@ -221,7 +222,7 @@ impl Fitted<'_> {
         }
     }
 
-    /// K̂ = −M A₂₁, Ĉ = −M A₂₂.
+    /// Computes K̂ = −M A₂₁ and Ĉ = −M A₂₂.
     fn with_known_mass(
         &self,
         unknowns: &Unknowns,
@@ -231,37 +232,38 @@ impl Fitted<'_> {
         let n = self.rows.dof();
         let lower = self.continuous.value.rows(n, n);
         let force = -(mass * lower);
-        let place = |p: &Parameter| p.column() + if p.matrix() == Matrix::Damping { n } else { 0 };
+        let column = |p: &Parameter| p.column() + if p.matrix() == Matrix::Damping { n } else { 0 };
         let sensitivity = |p: &Parameter| {
             let mut weight = RowDVector::zeros(lower.ncols());
-            weight[place(p)] = 1.0;
+            weight[column(p)] = 1.0;
             Sensitivity { equation: p.row(), weight }
         };
         let findings = EstimateParts {
             unknowns: unknowns.clone(),
-            values: free.iter().map(|p| force[(p.row(), place(p))]).collect(),
+            values: free.iter().map(|p| force[(p.row(), column(p))]).collect(),
             covariance: DMatrix::zeros(0, 0).into(),
             degrees_of_freedom: 0,
             residual_nrmse: Vec::new(),
             condition: 1.0,
-            undetermined: self.undetermined(free, place),
+            undetermined: self.undetermined(free, column),
         };
         (findings, free.iter().map(sensitivity).collect())
     }
 
-    /// The directions of the regressors on which the data say nothing, for every equation of motion.
+    /// Returns the directions of the regressors that the data do not determine, for every equation
+    /// of motion.
     fn undetermined(
         &self,
         free: &[Parameter],
-        place: impl Fn(&Parameter) -> usize,
+        column: impl Fn(&Parameter) -> usize,
     ) -> Vec<Undetermined> {
         let mut undetermined = Vec::new();
         for direction in &self.regression.solution.undetermined {
             for equation in 0..self.rows.dof() {
                 let parameters = free.iter().filter(|p| p.row() == equation);
                 let terms: Vec<_> = parameters
-                    .filter(|p| direction.involved[place(p)])
-                    .map(|p| (*p, direction.combination[place(p)]))
+                    .filter(|p| direction.involved[column(p)])
+                    .map(|p| (*p, direction.combination[column(p)]))
                     .collect();
                 // A direction among the forces alone concerns neither C nor K.
                 if !terms.is_empty() {
@@ -273,7 +275,7 @@ impl Fitted<'_> {
         undetermined
     }
 
-    /// M ẍ + C ẋ + K x = F with the accelerations that belong to the samples.
+    /// Fits M ẍ + C ẋ + K x = F with the accelerations A₂₁x + A₂₂ẋ + B₂F at the samples.
     fn by_equation_of_motion(
         &self,
         unknowns: &Unknowns,
@@ -292,19 +294,20 @@ impl Fitted<'_> {
         let (findings, Product { rows: inverse, places, .. }) = equations.findings(unknowns)?;
         let motion = equations.motion_and_force();
         let sensitivity = |(at, p): (usize, &Parameter)| {
-            // Back from the order ẋ, x, F to x, ẋ, and the forces that act.
-            let all = inverse.row(places[at].1) * motion;
+            // The columns are ẋ, x, F; the sensitivity has x, ẋ and the nonzero forces.
+            let by_column = inverse.row(places[at].1) * motion;
             let order =
                 (n..2 * n).chain(0..n).chain(self.regression.forces.iter().map(|j| 2 * n + j));
-            let weight: Vec<f64> = order.map(|column| all[column]).collect();
+            let weight: Vec<f64> = order.map(|column| by_column[column]).collect();
             Sensitivity { equation: p.row(), weight: RowDVector::from_vec(weight) }
         };
         let sensitivities = free.iter().enumerate().map(sensitivity).collect();
         Ok((findings, sensitivities))
     }
 
-    /// The delta method: with G_p the derivative of parameter p by the coefficients (regressors ×
-    /// 2n), W = (ZᵀZ)⁻¹ and S the residual covariance, Cov(p, q) = ⟨W G_p S, G_q⟩.
+    /// Returns the covariance by the delta method: Cov(p, q) = ⟨W G_p S, G_q⟩ with the derivative
+    /// G_p of parameter p with respect to the coefficients (regressors × 2n), W = (ZᵀZ)⁻¹ and the
+    /// residual covariance S.
     fn covariance(
         &self,
         mass: &DMatrix<f64>,
@@ -339,7 +342,7 @@ impl Fitted<'_> {
             .collect();
         let count = sensitivities.len();
         Ok(DMatrix::from_fn(count, count, |p, q| {
-            // Symmetric to the last bit: both orders are computed the same way.
+            // Both orders are computed in the same way, so that the matrix is exactly symmetric.
             let (p, q) = (p.min(q), p.max(q));
             weighted[p].dot(&gradients[q])
         }))

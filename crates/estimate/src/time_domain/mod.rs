@@ -1,9 +1,9 @@
 //! M, C and K from sampled displacement, velocity and force.
 //!
-//! From one sample to the next a machine moves by z⁺ = Φ z + Γ F, with the state z = (x, ẋ).
-//! Φ and Γ are fitted by least squares, every entry left free, and turned into M, C and K by what
-//! is assumed to happen between the samples ([`Discretisation`]). A force that is identically
-//! zero is left out.
+//! From one sample to the next the state z = (x, ẋ) of a machine changes by z⁺ = Φ z + Γ F. Φ and Γ
+//! are fitted by least squares, with every entry free, and converted to M, C and K by an assumption
+//! about the force between the samples ([`Discretisation`]). A force that is identically zero is
+//! omitted.
 //!
 //! | Discretisation | The force between samples | Error on noise-free data |
 //! |---|---|---|
@@ -13,8 +13,8 @@
 //!
 //! When the acceleration is measured too, [`equation_of_motion`] needs no discretisation at all.
 //!
-//! Noise on displacement or velocity makes all of these biased (they stand among the regressors);
-//! for noisy periodic records use the [frequency domain](crate::frequency_domain).
+//! Noise on displacement or velocity biases all these estimates, because they are regressors; for
+//! noisy periodic records use the [frequency domain](crate::frequency_domain).
 //!
 //! ```
 //! use mechid_estimate::Unknowns;
@@ -53,7 +53,7 @@ pub use transitions::Transitions;
 
 use crate::{EstimateError, Unknowns};
 
-/// A time-domain estimator: a discretisation, and what the records are.
+/// A time-domain estimator: a discretisation and the extent of the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeDomain {
     discretisation: Discretisation,
@@ -61,12 +61,12 @@ pub struct TimeDomain {
 }
 
 impl TimeDomain {
-    /// An estimator for records of that extent.
+    /// Creates an estimator for records of this extent.
     pub fn new(discretisation: Discretisation, extent: Extent) -> Self {
         Self { discretisation, extent }
     }
 
-    /// The assumption between samples.
+    /// Assumption about the force between samples.
     pub fn discretisation(&self) -> Discretisation {
         self.discretisation
     }
@@ -80,8 +80,8 @@ impl TimeDomain {
     /// freedom on one time axis.
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together,
-    /// and as [`Transitions::fit`].
+    /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size)
+    /// if the records do not belong together, and as [`Transitions::fit`].
     pub fn fit(
         &self,
         displacement: &Record,
@@ -95,16 +95,17 @@ impl TimeDomain {
         rows.fit(self.discretisation, unknowns)
     }
 
-    /// The same for displacement, velocity and force with `factor − 1` intermediate points in every interval: the step, and
-    /// with it Euler's bias, becomes `factor` times smaller, as far as the interpolation is right.
+    /// Fits displacement, velocity and force with `factor − 1` interpolated points in every
+    /// interval: the step, and with it the bias of Euler's rule, is `factor` times smaller if the
+    /// interpolation is correct.
     ///
-    /// Band-limited interpolation takes the record as one whole period; after any other the refined
-    /// record is open.
+    /// Band-limited interpolation assumes that the record is one whole period; after any other
+    /// interpolation the refined record is open.
     ///
-    /// Intermediate points are no new measurements: all equations within one measured interval hold
-    /// the same disturbance, so the residual variance, the standard errors and the degrees of
-    /// freedom are those of as many equations as intervals were measured. Without that, standard
-    /// errors come out too small by √factor.
+    /// Interpolated points are not new measurements: all equations within one measured interval
+    /// have the same disturbance. The residual variance, the standard errors and the degrees of
+    /// freedom therefore count one equation per measured interval; otherwise the standard errors
+    /// would be too small by √factor.
     ///
     /// # Errors
     /// As [`TimeDomain::fit`], and [`EstimateError::Signal`] if the record cannot be refined.

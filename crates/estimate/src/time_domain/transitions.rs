@@ -1,4 +1,4 @@
-//! Pairs of neighbouring samples, gathered from any number of records.
+//! Pairs of neighbouring samples from any number of records.
 
 use mechid_model::Discretisation;
 use mechid_numerics::triangular::TriangularFactor;
@@ -12,14 +12,14 @@ use super::TimeDomainFit;
 use crate::limits::TRANSITION_BLOCK;
 use crate::{EstimateError, Unknowns};
 
-/// Pairs of neighbouring samples, reduced block by block to one small triangle.
+/// Pairs of neighbouring samples, reduced block by block to one small triangular factor.
 ///
 /// Memory does not grow with the records. A long open record can be pushed in pieces that overlap
-/// by one sample; a record from another experiment simply follows.
+/// by one sample; records of other experiments can follow.
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 6 (a triangle brought up to
-/// date by rows).
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 6 (a triangular factor updated
+/// by rows).
 #[derive(Debug, Clone)]
 pub struct Transitions {
     dof: usize,
@@ -29,10 +29,10 @@ pub struct Transitions {
 }
 
 impl Transitions {
-    /// No pairs yet, of records with step `dt` in seconds.
+    /// Creates transitions without a pair, for records with the time step `dt` in seconds.
     ///
     /// # Errors
-    /// [`EstimateError::NoDof`], [`EstimateError::Signal`] for an impossible step.
+    /// [`EstimateError::NoDof`], [`EstimateError::Signal`] for an invalid time step.
     pub fn new(dof: usize, dt: f64) -> Result<Self, EstimateError> {
         if dof == 0 {
             return Err(EstimateError::NoDof);
@@ -51,7 +51,7 @@ impl Transitions {
         self.dt
     }
 
-    /// Pairs seen so far.
+    /// Number of pairs so far.
     pub fn rows(&self) -> usize {
         self.factor.rows()
     }
@@ -59,8 +59,8 @@ impl Transitions {
     /// Adds the pairs of one record: displacement (m), velocity (m/s), force (N).
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if they lie on different time axes, [`NumericsError::Size`] for a
-    /// wrong number of channels, [`EstimateError::Step`] for another step than the first record's,
+    /// [`EstimateError::Signal`] if the time axes differ, [`NumericsError::Size`] for a wrong
+    /// number of channels, [`EstimateError::Step`] if the time step is not [`Transitions::dt`],
     /// [`NumericsError::Overflow`].
     pub fn push(
         &mut self,
@@ -94,7 +94,7 @@ impl Transitions {
         Ok(())
     }
 
-    /// Adds everything `other` has seen.
+    /// Adds the pairs of `other`.
     ///
     /// # Errors
     /// [`NumericsError::Size`], [`EstimateError::Step`], [`NumericsError::Overflow`].
@@ -106,12 +106,12 @@ impl Transitions {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow.into()) }
     }
 
-    /// Adds the pairs of one record with `factor − 1` intermediate points in every interval; the step
-    /// of these transitions is `factor` times smaller than that of the record.
+    /// Adds the pairs of one record with `factor − 1` interpolated points in every interval; the
+    /// time step of these transitions is `factor` times smaller than the step of the record.
     ///
-    /// Band-limited interpolation takes the record as one whole period; after any other the refined
-    /// record is open. However many points there are, [`Transitions::rows`] and all standard errors
-    /// count the intervals that were measured, as [`super::TimeDomain::fit_refined`] says.
+    /// Band-limited interpolation assumes that the record is one whole period; after any other
+    /// interpolation the refined record is open. [`Transitions::rows`] and all standard errors
+    /// count the measured intervals, as explained at [`super::TimeDomain::fit_refined`].
     ///
     /// # Errors
     /// As [`Transitions::push`], and [`EstimateError::Signal`] if the record cannot be refined.
@@ -133,17 +133,16 @@ impl Transitions {
         Ok(())
     }
 
-    /// M, C and K from all pairs so far.
+    /// Estimates M, C and K from all pairs so far.
     ///
-    /// With M known and C and K free they are K̂ = −M A₂₁ and Ĉ = −M A₂₂ from the lower half of
-    /// the state matrix A; the coefficient of the force is left free and not used. Otherwise the
-    /// equation of motion is fitted to the accelerations A₂₁x + A₂₂ẋ + B₂F that belong to the
-    /// samples, with whatever is known held fixed. Standard errors follow by the delta method
-    /// through the logarithm.
+    /// If M is known and C and K are free, the estimates are K̂ = −M A₂₁ and Ĉ = −M A₂₂ from the
+    /// lower half of the state matrix A; the free coefficient of the force is not used. Otherwise
+    /// the equation of motion is fitted to the accelerations A₂₁x + A₂₂ẋ + B₂F at the samples, with
+    /// the known entries fixed. Standard errors follow from the delta method through the logarithm.
     ///
     /// # Errors
-    /// [`NumericsError::TooFewRows`], [`NumericsError::Underflow`]; [`NumericsError::NoLogarithm`] if the samples belong to no
-    /// continuous machine; and as [`crate::EquationOfMotion::solve`].
+    /// [`NumericsError::TooFewRows`], [`NumericsError::Underflow`]; [`NumericsError::NoLogarithm`]
+    /// if no continuous-time system has these samples; and as [`crate::EquationOfMotion::solve`].
     ///
     /// # Source
     /// Dissertation eqs. (4.5.12), (4.5.28) with its last rows corrected to Δt/M.
@@ -157,11 +156,11 @@ impl Transitions {
         TimeDomainFit::new(self, discretisation, unknowns)
     }
 
-    /// Returns the condition number of the scaled regressors, and how many directions they leave open.
-    /// A pure number.
+    /// Returns the condition number of the scaled regressors (a pure number), and the number of
+    /// directions that they do not determine.
     ///
     /// # Errors
-    /// What [`Transitions::fit`] refuses.
+    /// As [`Transitions::fit`].
     pub fn condition(&self, discretisation: Discretisation) -> Result<(f64, usize), EstimateError> {
         let solution = super::fit::regression(self, discretisation)?.solution;
         Ok((solution.condition, solution.undetermined.len()))
@@ -170,7 +169,7 @@ impl Transitions {
     /// Returns A of ż = A z + B F, 2n × 2n, in 1/s.
     ///
     /// # Errors
-    /// What [`Transitions::fit`] refuses.
+    /// As [`Transitions::fit`].
     pub fn state_matrix(
         &self,
         discretisation: Discretisation,
@@ -190,7 +189,7 @@ impl Transitions {
         let n = self.dof;
         let samples = quantities[0].nrows();
         for (kind, quantity) in quantities.iter().enumerate() {
-            // Where the value now and the value (force) or increment (state) next go.
+            // Columns of the present value and of the next value (force) or increment (state).
             let (now, next) = [(0, 4), (1, 5), (2, 3)][kind];
             for channel in 0..n {
                 let values = quantity.column(channel);
@@ -205,7 +204,7 @@ impl Transitions {
         }
     }
 
-    /// An error if the squares of a quantity are too small to be told from 0.
+    /// Returns an error if the squares of a quantity underflow.
     pub(super) fn check_size(&self) -> Result<(), EstimateError> {
         if self.rows() == 0 {
             return Err(NumericsError::TooFewRows { rows: 0, unknowns: 3 * self.dof }.into());
@@ -219,7 +218,8 @@ impl Transitions {
         }
     }
 
-    /// Columns of the triangle: 0 x, 1 ẋ, 2 F, 3 F⁺, 4 the increments of x, 5 those of ẋ.
+    /// Returns columns of the triangular factor by kind: 0 x, 1 ẋ, 2 F, 3 F⁺, 4 increments of x, 5
+    /// increments of ẋ.
     pub(super) fn columns(&self, kind: usize) -> DMatrixView<'_, f64> {
         self.factor.r().columns(kind * self.dof, self.dof)
     }

@@ -37,8 +37,8 @@ enum Noise<'a> {
 /// displacement of each row have been eliminated.
 ///
 /// The Jacobian of row l is W_l E_ij X̂_l s^p with W = L⁻¹G, a Kronecker product. X̂ is the
-/// displacement under the most likely force F̂: because F̂ minimises, the gradient Jᵀr is that of the
-/// sum of squares, and JᵀJ is the Fisher information.
+/// displacement under the most likely force F̂: because F̂ minimises, the gradient Jᵀr is that of
+/// the sum of squares, and JᵀJ is the Fisher information.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the
@@ -49,8 +49,8 @@ pub(super) struct Misfit<'a> {
     relations: Option<Relations>,
     layout: Layout,
     noise: Noise<'a>,
-    /// n × rows, so that the forces of one row are contiguous; less the load of the ends of open records at
-    /// the parameters last tried.
+    /// n × rows, so that the forces of one row are contiguous; less the load of the ends of open
+    /// records at the parameters last tried.
     force: ComplexMatrix,
     displacement: ComplexMatrix,
     /// Independent unknowns last accepted, and those last tried.
@@ -82,7 +82,7 @@ impl<'a> Misfit<'a> {
         Ok(Self {
             data,
             unknowns,
-            relations: Relations::of(unknowns),
+            relations: Relations::from_unknowns(unknowns),
             layout: Layout::new(unknowns, data.transient().ncols()),
             noise,
             force: data.force().transpose(),
@@ -105,8 +105,9 @@ impl<'a> Misfit<'a> {
         errors.transpose()
     }
 
-    /// Variance that the noise of the forces, where that of the displacement is not known, makes of the
-    /// displacement, rows × n, in m²: the diagonal of G S_FF Gᴴ at the parameters last accepted.
+    /// Variance that the noise of the forces, where that of the displacement is not known, makes of
+    /// the displacement, rows × n, in m²: the diagonal of G S_FF Gᴴ at the parameters last
+    /// accepted.
     pub(super) fn variance_by_force(&self) -> DMatrix<f64> {
         let of_force = self.data.force_variance();
         DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
@@ -115,8 +116,8 @@ impl<'a> Misfit<'a> {
         })
     }
 
-    /// Σ |G|² of each channel over the forces, rows × n, in (m/N)²: the power that its displacement has where all
-    /// forces have the same, at the parameters last accepted.
+    /// Σ |G|² of each channel over the forces, rows × n, in (m/N)²: the power that its displacement
+    /// has where all forces have the same, at the parameters last accepted.
     pub(super) fn gain(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
             self.rows[row].receptance().row(channel).iter().map(|g| g.norm_sqr()).sum()
@@ -129,8 +130,8 @@ impl<'a> Misfit<'a> {
         DMatrix::from_rows(&rows)
     }
 
-    /// Derivative of entries and loads of ends with respect to the independent unknowns last accepted, where
-    /// the entries are related.
+    /// Derivative of entries and loads of ends with respect to the independent unknowns last
+    /// accepted, where the entries are related.
     fn tangent(&self) -> Option<DMatrix<f64>> {
         let relations = self.relations.as_ref()?;
         let ends = transient::len(self.data);
@@ -173,8 +174,8 @@ impl<'a> Misfit<'a> {
         cost.is_finite().then_some(cost)
     }
 
-    /// The regressors φ of a displacement, given by row and channel, the weights WᴴW and the weighted
-    /// residuals Wᴴr.
+    /// The regressors φ of a displacement, given by row and channel, the weights WᴴW and the
+    /// weighted residuals Wᴴr.
     fn factors(&self, displacement: impl Fn(usize, usize) -> Complex<f64>) -> Factors {
         let (lines, n) = (self.rows.len(), self.data.dof());
         let columns = self.layout.columns();
@@ -266,8 +267,8 @@ impl SumOfSquares for Misfit<'_> {
 }
 
 impl Restartable for Misfit<'_> {
-    /// Returns the step to the minimum of |W (D X − F)|² for fixed W: the Gauss–Newton equations with the measured
-    /// X in place of X̂.
+    /// Returns the step to the minimum of |W (D X − F)|² for fixed W: the Gauss–Newton equations
+    /// with the measured X in place of X̂.
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
         let NormalEquations { gram, gradient, coordinates } =

@@ -94,8 +94,8 @@ impl Row {
             && lower.solve_lower_triangular_mut(&mut self.white_receptance)
     }
 
-    /// Whitens as [`Row::whiten`] does, with L from the covariance of displacements and forces, and the most
-    /// likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
+    /// Whitens as [`Row::whiten`] does, with L from the covariance of displacements and forces, and
+    /// the most likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
     pub(super) fn whiten_both(
         &mut self,
         measured: DVectorView<'_, Complex<f64>>,

@@ -36,7 +36,7 @@ impl Linearised {
     ) -> Option<Self> {
         let covariance = |row: usize| noise.covariance(row).clone();
         let Whitened { mut residual, mut sensitivity } =
-            Whitened::of(closed, unknowns, entries, covariance)?;
+            Whitened::new(closed, unknowns, entries, covariance)?;
         let responses = match data.transient().ncols() > 0 {
             true => Some(ForceResponses::new(data, unknowns, entries, noise)?),
             false => None,

@@ -56,7 +56,7 @@ impl<'a> PartsOfFit<'a> {
         if 2 * data.dof() * data.len() * unknowns.independent() * PARTS > MAX_SENSITIVITIES {
             return None;
         }
-        let relations = Relations::of(unknowns);
+        let relations = Relations::from_unknowns(unknowns);
         let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
         let mut values = match &relations {
             None => DVector::from_vec(entries),
