@@ -21,11 +21,12 @@ pub struct DelayedForce<'a> {
     groups: Vec<Group>,
 }
 
-/// Equations that are fitted by the same columns, or all of them together where entries are related.
+/// Equations that are fitted by the same columns, or all of them together where entries are
+/// related.
 struct Group {
     equations: Vec<usize>,
-    /// Orthonormal columns that span the motions with unknown entries, and their transpose; of equations
-    /// that are fitted together, one below the other.
+    /// Orthonormal columns that span the motions with unknown entries, and their transpose; of
+    /// equations that are fitted together, one below the other.
     q: DMatrix<f64>,
     q_transposed: DMatrix<f64>,
     /// Force that the known entries account for, rows × equations.
@@ -33,8 +34,8 @@ struct Group {
 }
 
 impl<'a> DelayedForce<'a> {
-    /// `None` if the data leave an entry open, as they do with any delay. A force acts on the degrees of
-    /// freedom `driven`, counted from 0.
+    /// `None` if the data leave an entry open, as they do with any delay. A force acts on the
+    /// degrees of freedom `driven`, counted from 0.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
         Self::weighted(data, late_weight(data), unknowns, driven)
     }
@@ -70,9 +71,9 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Residual power of the driven equations, each over the power of its right-hand side, with the force
-    /// `delay` (s) later; of related equations that of all of them, times the number of forces. `None` if it
-    /// is not finite.
+    /// Residual power of the driven equations, each over the power of its right-hand side, with the
+    /// force `delay` (s) later; of related equations that of all of them, times the number of
+    /// forces. `None` if it is not finite.
     ///
     /// # Source
     /// Ours.
@@ -144,7 +145,8 @@ mod tests {
 
     use super::*;
 
-    /// The power is that of a solution of the equations, whatever is known and how late the force is.
+    /// The power is that of a solution of the equations, whatever is known and how late the force
+    /// is.
     #[test]
     fn the_power_is_that_of_a_fit_with_the_delay() {
         let lines = 12;

@@ -37,9 +37,9 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 /// ```
 ///
 /// # Errors
-/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries force, [`EstimateError::OnlyRatios`]
-/// if an equation of motion has neither force nor a known entry, and what
-/// [`EquationOfMotion::solve`] refuses.
+/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries
+/// force, [`EstimateError::OnlyRatios`] if an equation of motion has neither force nor a known
+/// entry, and what [`EquationOfMotion::solve`] refuses.
 ///
 /// # Source
 /// Dissertation eqs. (4.6.12) and (4.6.31).
@@ -54,7 +54,8 @@ pub fn equation_error(
 /// for several sets of unknowns.
 ///
 /// # Errors
-/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries force.
+/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries
+/// force.
 pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateError> {
     weighted_rows(data, 0.0, |_| 1.0)
 }
@@ -84,8 +85,8 @@ pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     }
 }
 
-/// Returns for each row the inverse of what the stated noise puts into it; 0 if that is more than `clear` of
-/// its power.
+/// Returns for each row the inverse of what the stated noise puts into it; 0 if that is more than
+/// `clear` of its power.
 fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f64> {
     let noise = data.noise()?;
     let n = data.dof();
@@ -124,8 +125,8 @@ pub(super) fn weighted_rows(
     Ok(rows)
 }
 
-/// Acceleration, velocity and displacement of every degree of freedom, side by side, with a weight on each
-/// line.
+/// Acceleration, velocity and displacement of every degree of freedom, side by side, with a weight
+/// on each line.
 pub(super) fn motions(data: &FrequencyData, weight: &[f64]) -> DMatrix<f64> {
     let (n, x) = (data.dof(), data.displacement());
     let s = |row: usize| Complex::new(0.0, data.omega()[row]);

@@ -20,13 +20,13 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// [`output_error`](super::output_error). Forces may be noisy too.
 ///
 /// `first` and `second` must come from different periods (see
-/// [`RepeatedPeriods::halves`](mechid_spectra::RepeatedPeriods::halves)). The standard errors allow for
-/// an equation error of unequal size over the lines.
+/// [`RepeatedPeriods::halves`](mechid_spectra::RepeatedPeriods::halves)). The standard errors allow
+/// for an equation error of unequal size over the lines.
 ///
 /// # Errors
-/// [`SpectraError::FrequencyMismatch`](mechid_spectra::SpectraError::FrequencyMismatch) or [`NumericsError::Size`] if the two are not alike,
-/// [`EstimateError::Undetermined`] if the data leave a parameter open, and what
-/// [`equation_error`](super::equation_error) refuses.
+/// [`SpectraError::FrequencyMismatch`](mechid_spectra::SpectraError::FrequencyMismatch) or
+/// [`NumericsError::Size`] if the two are not alike, [`EstimateError::Undetermined`] if the data
+/// leave a parameter open, and what [`equation_error`](super::equation_error) refuses.
 ///
 /// # Source
 /// Söderström & Stoica, *System Identification* (1989), chapter 8; White (1980), Econometrica 48,

@@ -18,15 +18,15 @@ pub struct LikelihoodRatio {
 }
 
 /// Compares fits of the same data by two models, a pair (larger, smaller) for each of several
-/// independent sets of data; the smaller model has `restrictions` (a pure number) parameters less, all
-/// sets together. `None` where a noise level is not known beforehand.
+/// independent sets of data; the smaller model has `restrictions` (a pure number) parameters less,
+/// all sets together. `None` where a noise level is not known beforehand.
 ///
 /// With weights from repeated periods the statistic over `restrictions` follows Fisher's F.
 ///
 /// # Source
 /// Wilks (1938), Annals of Mathematical Statistics 9, 60–62; with sampled weights: Pintelon &
-/// Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on the sample maximum
-/// likelihood.
+/// Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on the sample
+/// maximum likelihood.
 pub fn likelihood_ratio(
     fits: &[(&OutputErrorFit, &OutputErrorFit)],
     restrictions: usize,

@@ -1,7 +1,9 @@
 //! Estimators that work line by line on the spectra of whole periods.
 //!
-//! Forces and motions are read at chosen [`Lines`](mechid_spectra::Lines) into [`FrequencyData`](mechid_spectra::FrequencyData), of one record or of
-//! [`RepeatedPeriods`](mechid_spectra::RepeatedPeriods), whose scatter shows the noise. Then there are three estimators:
+//! Forces and motions are read at chosen [`Lines`](mechid_spectra::Lines) into
+//! [`FrequencyData`](mechid_spectra::FrequencyData), of one record or of
+//! [`RepeatedPeriods`](mechid_spectra::RepeatedPeriods), whose scatter shows the noise. Then there
+//! are three estimators:
 //!
 //! | Estimator | Noise | Cost |
 //! |---|---|---|

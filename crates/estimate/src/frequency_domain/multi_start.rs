@@ -33,17 +33,17 @@ pub(super) struct GlobalMinimum {
 
 /// Searches from one start after the other; `problem` is left at the best minimum.
 ///
-/// The search ends when all of the first few starts have led to one minimum. Otherwise it goes on from
-/// the best ends: a few steps in the data with every line weighted at random, then a search in the data
-/// themselves, until several restarts in a row have found nothing better. Minima due to the noise are
-/// others in resampled data; the global one is always near.
+/// The search ends when all of the first few starts have led to one minimum. Otherwise it goes on
+/// from the best ends: a few steps in the data with every line weighted at random, then a search in
+/// the data themselves, until several restarts in a row have found nothing better. Minima due to
+/// the noise are others in resampled data; the global one is always near.
 ///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.
 ///
 /// # Source
-/// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights, more unequal than those of a
-/// bootstrap, lead out of minima that it does not.
+/// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights, more unequal than those
+/// of a bootstrap, lead out of minima that it does not.
 pub(super) fn search(
     problem: &mut impl Restartable,
     starts: &InitialEstimates<'_>,
@@ -91,9 +91,9 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     }
 }
 
-/// The best of some rounds of linear least squares, each with the weights of the one before: they cross
-/// wide regions in which a search would have to go in small steps. No rounds from where the noise
-/// explains the data already; `None` where the sum of squares does not exist.
+/// The best of some rounds of linear least squares, each with the weights of the one before: they
+/// cross wide regions in which a search would have to go in small steps. No rounds from where the
+/// noise explains the data already; `None` where the sum of squares does not exist.
 ///
 /// # Source
 /// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.
@@ -207,8 +207,8 @@ impl GlobalMinimum {
     }
 }
 
-/// The best of each family: first that of the first family, then the others in the order of their sums
-/// of squares, those like another one last.
+/// The best of each family: first that of the first family, then the others in the order of their
+/// sums of squares, those like another one last.
 fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {

@@ -18,8 +18,8 @@ use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_LINES, GRAM_RIDGE};
 pub(super) struct Layout {
     dof: usize,
     unknowns: usize,
-    /// Columns of [M C K] that are unknown in at least one equation; beyond them those of the ends of open
-    /// records.
+    /// Columns of [M C K] that are unknown in at least one equation; beyond them those of the ends
+    /// of open records.
     columns: Vec<(Matrix, usize)>,
     equations: Vec<Equation>,
 }
@@ -35,15 +35,16 @@ struct Equation {
 }
 
 /// Coordinates u = T θ, equation by equation, in which the regressors are orthonormal, scaled to a
-/// Gram matrix of unit diagonal. Where entries are related, coordinates of the independent unknowns among
-/// these.
+/// Gram matrix of unit diagonal. Where entries are related, coordinates of the independent unknowns
+/// among these.
 pub(super) struct Coordinates {
     blocks: Vec<Block>,
     scale: DVector<f64>,
     related: Option<Related>,
 }
 
-/// Independent unknowns p of related entries, dθ = S dp: Qᵀ and the triangle R of T S = Q R, scaled.
+/// Independent unknowns p of related entries, dθ = S dp: Qᵀ and the triangle R of T S = Q R,
+/// scaled.
 struct Related {
     transposed: DMatrix<f64>,
     triangle: DMatrix<f64>,
@@ -115,8 +116,8 @@ impl Layout {
     /// The normal equations; turns the regressors into orthonormal ones. `None` if these are
     /// dependent, or values overflow.
     ///
-    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: one product of a
-    /// matrix of pairs (a, b) and one of pairs (i, j), in a fraction 1/dof of the operations that
+    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: one product of
+    /// a matrix of pairs (a, b) and one of pairs (i, j), in a fraction 1/dof of the operations that
     /// the rows of J take. The Gram matrix has the square of the condition number of J; with
     /// regressors that are orthonormal over the lines weighted by ‖W_l‖ that is harmless, and a
     /// rounded Gram matrix slows the search but does not move its end, where Jᵀr = 0.
@@ -125,7 +126,8 @@ impl Layout {
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
     /// Kronecker products).
     ///
-    /// With a `tangent` S, entries and loads of ends × unknowns, they are those of the independent unknowns.
+    /// With a `tangent` S, entries and loads of ends × unknowns, they are those of the independent
+    /// unknowns.
     pub(super) fn normal_equations(
         &self,
         factors: &mut Factors,
@@ -154,9 +156,9 @@ impl Layout {
         finite.then_some(NormalEquations { gram, gradient, coordinates })
     }
 
-    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ. Dependent ones are
-    /// no obstacle where entries are `related`: without a force on a degree of freedom they are dependent,
-    /// but its relations to others determine its entries.
+    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ. Dependent
+    /// ones are no obstacle where entries are `related`: without a force on a degree of freedom
+    /// they are dependent, but its relations to others determine its entries.
     fn orthonormalise(&self, factors: &mut Factors, related: bool) -> Option<DMatrix<f64>> {
         let lines = factors.weights.nrows() / 2;
         let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
@@ -291,8 +293,8 @@ impl NormalEquations {
 /// The largest eigenvalue of a symmetric positive definite matrix, given by its products.
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1 (Lanczos), with all vectors
-/// kept orthogonal.
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1 (Lanczos), with all
+/// vectors kept orthogonal.
 fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     let mut projected = DMatrix::zeros(GRAM_LANCZOS.min(size), GRAM_LANCZOS.min(size));
@@ -324,8 +326,8 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
 }
 
 impl Coordinates {
-    /// Passes from entries to the independent unknowns behind them; returns their Gram matrix, of unit
-    /// diagonal. `None` if rounding leaves unknowns without an influence.
+    /// Passes from entries to the independent unknowns behind them; returns their Gram matrix, of
+    /// unit diagonal. `None` if rounding leaves unknowns without an influence.
     fn relate(&mut self, tangent: &DMatrix<f64>, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut moved = DMatrix::zeros(self.scale.len(), tangent.ncols());
         for (mut to, column) in moved.column_iter_mut().zip(tangent.column_iter()) {

@@ -55,12 +55,13 @@ impl<'a> SampledResponse<'a> {
     }
 }
 
-/// Returns the data with the band-limited force (N) that has the same response of `system`, at samples `dt` (s) apart, as
-/// the force of the data if that is held or linear between its samples. `None` for Euler's rule, and where a response
-/// does not exist.
+/// Returns the data with the band-limited force (N) that has the same response of `system`, at
+/// samples `dt` (s) apart, as the force of the data if that is held or linear between its samples.
+/// `None` for Euler's rule, and where a response does not exist.
 ///
 /// # Source
-/// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (sampling of a continuous system).
+/// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (sampling of a
+/// continuous system).
 pub fn equivalent_force(
     data: &FrequencyData,
     system: &SecondOrderSystem,

@@ -8,12 +8,12 @@ use super::normal_equations::NormalEquations;
 
 /// Sum of squares of maximum likelihood, which has linear steps and can be resampled.
 pub(super) trait Restartable: SumOfSquares<Linearisation = NormalEquations> {
-    /// Returns the step to the least-squares solution of the equation of motion with the weights that belong
-    /// to the parameters last accepted.
+    /// Returns the step to the least-squares solution of the equation of motion with the weights
+    /// that belong to the parameters last accepted.
     fn linear_step(&mut self) -> Option<DVector<f64>>;
 
-    /// Weighs every spectral line by a share drawn at random, of mean 1 and standard deviation √5, or all of
-    /// them alike. What was accepted before has to be tried again.
+    /// Weighs every spectral line by a share drawn at random, of mean 1 and standard deviation √5,
+    /// or all of them alike. What was accepted before has to be tried again.
     fn resample(&mut self, seed: Option<u64>);
 }
 

@@ -17,13 +17,13 @@ pub struct StructuralDamping {
     pub displacement: DMatrix<Complex<f64>>,
 }
 
-/// Fits structural damping with the `unknowns` of an equation of motion, those of C being those of D in N/m, by
-/// least squares weighted by the receptance of the round before. `None` if an entry of C is known and not zero, or if
-/// the data leave an entry open.
+/// Fits structural damping with the `unknowns` of an equation of motion, those of C being those of
+/// D in N/m, by least squares weighted by the receptance of the round before. `None` if an entry of
+/// C is known and not zero, or if the data leave an entry open.
 ///
 /// # Source
-/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.4 (structural damping); Sanathanan & Koerner (1963), IEEE Trans.
-/// Automatic Control 8, 56–58, for the weights.
+/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.4 (structural damping); Sanathanan & Koerner
+/// (1963), IEEE Trans. Automatic Control 8, 56–58, for the weights.
 pub fn structural_damping(data: &FrequencyData, unknowns: &Unknowns) -> Option<StructuralDamping> {
     let n = unknowns.dof();
     let known = |row, column| unknowns.fixed(Matrix::Damping, row, column).unwrap_or(0.0);
@@ -80,7 +80,8 @@ mod tests {
 
     use super::*;
 
-    /// Exact responses of two masses whose springs have one loss factor give it back, whatever was measured.
+    /// Exact responses of two masses whose springs have one loss factor give it back, whatever was
+    /// measured.
     #[test]
     fn exact_responses_give_the_loss_factor() {
         let mass = DMatrix::from_row_slice(2, 2, &[3.0, 0.0, 0.0, 5.0]);

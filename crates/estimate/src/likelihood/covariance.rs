@@ -31,7 +31,8 @@ pub(super) struct Information {
 const PART: f64 = 1e-6;
 
 impl Information {
-    /// Decomposes the derivative at a minimum; `inflation` is the covariance over the inverse information.
+    /// Decomposes the derivative at a minimum; `inflation` is the covariance over the inverse
+    /// information.
     pub(super) fn new<M: ResponseModel>(
         residual: &Residual<'_, M>,
         minimum: &Minimum,
@@ -85,8 +86,8 @@ impl Information {
         }
     }
 
-    /// Groups of parameters that only combinations of are determined: parameters, and the gradients of the
-    /// combinations, each with the coefficient of its largest part 1.
+    /// Groups of parameters that only combinations of are determined: parameters, and the gradients
+    /// of the combinations, each with the coefficient of its largest part 1.
     pub(super) fn combinations(&self) -> Vec<(Vec<usize>, Vec<Vec<f64>>)> {
         let null = self.directions.columns_range(self.rank..);
         let takes_part = |at: usize, column: usize| null[(at, column)].abs() > PART;

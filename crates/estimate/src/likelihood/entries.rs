@@ -1,4 +1,5 @@
-//! Free entries of M, C and K as the parameters of a model, with sensors and forces at any degree of freedom.
+//! Free entries of M, C and K as the parameters of a model, with sensors and forces at any degree
+//! of freedom.
 
 use std::collections::BTreeMap;
 
@@ -25,16 +26,16 @@ pub struct Channels {
     pub forces: Vec<usize>,
 }
 
-/// Identifies the free entries of M, C and K, or the fewer unknowns behind related ones, from sensors and
-/// forces at some of the degrees of freedom. The search starts at the system `near`.
+/// Identifies the free entries of M, C and K, or the fewer unknowns behind related ones, from
+/// sensors and forces at some of the degrees of freedom. The search starts at the system `near`.
 ///
-/// The parameters have the names of their entries (`m11`, `k12`; of symmetric ones the upper), and `alpha`
-/// and `beta` of proportional damping.
+/// The parameters have the names of their entries (`m11`, `k12`; of symmetric ones the upper), and
+/// `alpha` and `beta` of proportional damping.
 ///
 /// # Errors
 /// [`LikelihoodError::Size`] if `near` has another number of degrees of freedom than `unknowns`,
-/// [`LikelihoodError::Machine`] for a channel at a degree of freedom that does not exist, and what else keeps
-/// the data from leading to an estimate.
+/// [`LikelihoodError::Machine`] for a channel at a degree of freedom that does not exist, and what
+/// else keeps the data from leading to an estimate.
 ///
 /// # Source
 /// That of [`identify_machine`](super::machine::identify_machine).

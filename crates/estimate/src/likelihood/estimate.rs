@@ -36,8 +36,8 @@ pub struct PriorReport {
     pub standard_deviation: f64,
     /// Share of the information on the parameter that comes from its prior, 0 to 1.
     pub share: f64,
-    /// Probability of an estimate so far from the mean if prior and data agree; `None` where the data say
-    /// nothing of their own.
+    /// Probability of an estimate so far from the mean if prior and data agree; `None` where the
+    /// data say nothing of their own.
     pub p_value: Option<f64>,
 }
 
@@ -100,7 +100,8 @@ impl fmt::Display for Combination {
 }
 
 impl Combination {
-    /// Whether nothing but a factor of all values is open: every combination is one of their ratios.
+    /// Whether nothing but a factor of all values is open: every combination is one of their
+    /// ratios.
     fn has_common_factor(&self) -> bool {
         let is_ratio = |coefficients: &Vec<f64>| {
             let terms = || coefficients.iter().zip(&self.values).map(|(c, value)| c * value);
@@ -159,13 +160,13 @@ pub struct LikelihoodEstimate {
     pub covariance: DMatrix<f64>,
     /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
-    /// Sum of squares in units of the noise over its expectation: 1 for a right model; `None` where the
-    /// noise comes from the residual.
+    /// Sum of squares in units of the noise over its expectation: 1 for a right model; `None` where
+    /// the noise comes from the residual.
     pub misfit_ratio: Option<f64>,
     /// Probability of a larger misfit if model and noise are right; `None` where it is unknown.
     pub misfit_p_value: Option<f64>,
-    /// Factor by which standard errors and intervals are larger than the noise alone makes them, because model
-    /// and data disagree beyond it; 1 where they do not.
+    /// Factor by which standard errors and intervals are larger than the noise alone makes them,
+    /// because model and data disagree beyond it; 1 where they do not.
     pub error_scale: f64,
     /// `true` if the noise of all outputs was found white; `None` where it is stated.
     pub white_noise: Option<bool>,
@@ -283,8 +284,8 @@ fn interval<M: ResponseModel>(
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 
-/// Share of a prior and its test: with the prior's variance s² and the posterior's v, the difference of the
-/// estimate from the mean has the variance s² − v if data and prior agree.
+/// Share of a prior and its test: with the prior's variance s² and the posterior's v, the
+/// difference of the estimate from the mean has the variance s² − v if data and prior agree.
 fn prior<M: ResponseModel>(
     fit: &Fit<'_, M>,
     at: usize,

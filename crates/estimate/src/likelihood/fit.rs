@@ -37,7 +37,8 @@ pub(super) struct Fit<'a, M> {
     pub(super) information: Information,
     /// Degrees of freedom of the level of the noise; ∞ for known noise.
     pub(super) degrees_of_freedom: f64,
-    /// Sum of squares of the data over its expectation; `None` if the noise comes from the residual.
+    /// Sum of squares of the data over its expectation; `None` if the noise comes from the
+    /// residual.
     pub(super) misfit_ratio: Option<f64>,
     /// Probability of a larger misfit under a right model.
     pub(super) misfit_p_value: Option<f64>,
@@ -144,11 +145,13 @@ struct Expected {
 }
 
 impl Expected {
-    /// For covariances of `freedom` deviations each and `total` together, with `spare` real numbers that
-    /// no parameter explains. Rows with a common covariance make one statistic, Hotelling's T².
+    /// For covariances of `freedom` deviations each and `total` together, with `spare` real numbers
+    /// that no parameter explains. Rows with a common covariance make one statistic, Hotelling's
+    /// T².
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapter 9.
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+    /// chapter 9.
     fn new([freedom, total]: [f64; 2], outputs: usize, lines: usize, spare: usize) -> Self {
         let (p, lines) = (outputs as f64, lines as f64);
         let share = spare.max(1) as f64 / (2.0 * p * lines);
@@ -230,8 +233,9 @@ fn searched<M: ResponseModel>(
     multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)
 }
 
-/// Covariance of an estimate over the inverse of the Fisher information, and mean of a squared residual, for
-/// weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of freedom: ν²/((ν − p)² − 1) and ν/(ν − p).
+/// Covariance of an estimate over the inverse of the Fisher information, and mean of a squared
+/// residual, for weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of freedom: ν²/((ν − p)² − 1)
+/// and ν/(ν − p).
 fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodError> {
     if freedom.is_infinite() {
         return Ok([1.0, 1.0]);
@@ -254,8 +258,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the misfit is
-    /// too large for the noise, otherwise 1.
+    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the
+    /// misfit is too large for the noise, otherwise 1.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -274,8 +278,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))
     }
 
-    /// Logarithm of the likelihood: −½ Σ r² − Σ ln det(π S) over the lines, the errors of the inputs
-    /// averaged out.
+    /// Logarithm of the likelihood: −½ Σ r² − Σ ln det(π S) over the lines, the errors of the
+    /// inputs averaged out.
     pub(super) fn log_likelihood(&self) -> Option<f64> {
         let p = self.data.outputs().ncols() as f64;
         let mut log_determinant = 0.0;

@@ -22,8 +22,8 @@ pub(super) struct Minima {
     pub(super) searches: usize,
 }
 
-/// First values of every search: the given ones, then each times a log-normal factor, within the bounds; one
-/// that may have either sign between two bounds is anywhere between them.
+/// First values of every search: the given ones, then each times a log-normal factor, within the
+/// bounds; one that may have either sign between two bounds is anywhere between them.
 pub(super) fn starts(
     given: &[f64],
     bounds: &Bounds,
@@ -51,9 +51,9 @@ pub(super) fn starts(
     starts
 }
 
-/// Searches from one start after the other, first with weights relative to the response, then with those of
-/// the noise. It ends early when `agreeing` searches have ended at the lowest minimum, a number that depends on its sum
-/// of squares.
+/// Searches from one start after the other, first with weights relative to the response, then with
+/// those of the noise. It ends early when `agreeing` searches have ended at the lowest minimum, a
+/// number that depends on its sum of squares.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search ends at a minimum.

@@ -12,9 +12,9 @@ const HALVINGS: usize = 20;
 /// Relative deviation of the rise of the sum of squares at which the end of an interval is found.
 const TOLERANCE: f64 = 1e-3;
 
-/// End of an interval of a parameter below (`direction` −1) or above (+1) its estimate: where the sum of
-/// squares, minimised over all other parameters, has risen by `rise`. The bound, if that comes first;
-/// infinite if the sum never rises so far.
+/// End of an interval of a parameter below (`direction` −1) or above (+1) its estimate: where the
+/// sum of squares, minimised over all other parameters, has risen by `rise`. The bound, if that
+/// comes first; infinite if the sum never rises so far.
 ///
 /// # Source
 /// Venzon & Moolgavkar (1988), Applied Statistics 37, 87–94; Raue et al. (2009), Bioinformatics 25,

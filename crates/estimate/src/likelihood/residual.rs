@@ -22,16 +22,17 @@ pub(super) struct PriorRow {
 /// e = y − G u − G_own − A τ for every line, divided by its standard deviation: √2·L⁻¹e with
 /// L Lᴴ = E[e eᴴ], real and imaginary parts apart, has unit variance and no correlation.
 ///
-/// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters; the sum
-/// of squares is what remains of the likelihood once the true inputs and outputs of each line have been
-/// eliminated. The derivative is taken at the most likely input û: because û minimises, Jᵀr is half the
-/// gradient of the sum of squares, and JᵀJ is the Fisher information. The transient τ of each open record is
-/// eliminated, too: residual and derivative are projected off its columns A.
+/// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters;
+/// the sum of squares is what remains of the likelihood once the true inputs and outputs of each
+/// line have been eliminated. The derivative is taken at the most likely input û: because û
+/// minimises, Jᵀr is half the gradient of the sum of squares, and JᵀJ is the Fisher information.
+/// The transient τ of each open record is eliminated, too: residual and derivative are projected
+/// off its columns A.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapter 9
-/// (errors in variables) and section 6.3 (transients); Kaufman (1975), BIT 15, 49–57 (derivative of a
-/// projected residual).
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapter 9 (errors in variables) and section 6.3 (transients); Kaufman (1975), BIT 15, 49–57
+/// (derivative of a projected residual).
 pub(super) struct Residual<'a, M> {
     pub(super) model: &'a M,
     pub(super) data: &'a LineData,
@@ -41,7 +42,8 @@ pub(super) struct Residual<'a, M> {
 
 /// Residual and derivative at one set of parameters.
 pub(super) struct Linearisation {
-    /// √2·L⁻¹e: row 2(p·line + output) is a real part, the next one the imaginary part; then the priors.
+    /// √2·L⁻¹e: row 2(p·line + output) is a real part, the next one the imaginary part; then the
+    /// priors.
     pub(super) residual: DVector<f64>,
     /// Derivative of the residual, one column per parameter.
     pub(super) jacobian: DMatrix<f64>,
@@ -197,7 +199,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(Linearisation { residual, jacobian })
     }
 
-    /// Errors and receptances of every line at `parameters`; `None` where the response does not exist.
+    /// Errors and receptances of every line at `parameters`; `None` where the response does not
+    /// exist.
     pub(super) fn errors(&self, parameters: &[f64]) -> Option<LineErrors> {
         let p = self.outputs();
         let mut errors = DMatrix::zeros(self.data.len(), p);

@@ -11,8 +11,8 @@ pub struct Dimensions {
     pub inputs: usize,
     /// Parameters.
     pub parameters: usize,
-    /// Loads by which a difference between the initial and the final state of an open record acts on the
-    /// model; 0 if the model cannot tell.
+    /// Loads by which a difference between the initial and the final state of an open record acts
+    /// on the model; 0 if the model cannot tell.
     pub states: usize,
 }
 
@@ -61,8 +61,8 @@ pub trait LineResponse {
     /// Returns the response to a unit of each state load, p × states.
     fn state_response(&self) -> Option<&DMatrix<Complex<f64>>>;
 
-    /// Writes the derivative of the response to `input` (q), to the model's own loads and to `states`
-    /// (amplitudes of the state loads, which may be empty) with respect to each parameter,
+    /// Writes the derivative of the response to `input` (q), to the model's own loads and to
+    /// `states` (amplitudes of the state loads, which may be empty) with respect to each parameter,
     /// p × parameters, in units of the outputs per unit of the parameters.
     fn sensitivity(
         &self,

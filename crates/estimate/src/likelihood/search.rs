@@ -44,10 +44,11 @@ pub(super) struct Minimum {
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Promised decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard errors.
+/// Promised decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard
+/// errors.
 const COST_TOLERANCE: f64 = 1e-12;
-/// Length of a step relative to the parameters, both in units of their columns, that ends it, too, for data
-/// without noise.
+/// Length of a step relative to the parameters, both in units of their columns, that ends it, too,
+/// for data without noise.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// First damping, against a Gram matrix of unit diagonal.
 const FIRST_DAMPING: f64 = 1e-8;
@@ -119,16 +120,17 @@ impl<'a> Local<'a> {
     }
 }
 
-/// Local minimum within `bounds` reached from `start` in at most `max_steps`; `None` where the residual does
-/// not exist.
+/// Local minimum within `bounds` reached from `start` in at most `max_steps`; `None` where the
+/// residual does not exist.
 ///
-/// A step v and its correction a for the curvature r″ of the residual along v solve
-/// (JᵀJ + λI) v = −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) in the parameters that no bound blocks; the step is
-/// projected onto the bounds.
+/// A step v and its correction a for the curvature r″ of the residual along v solve (JᵀJ + λI) v =
+/// −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) in the parameters that no bound blocks; the step is projected
+/// onto the bounds.
 ///
 /// # Source
-/// Nocedal & Wright, *Numerical Optimization*, 2nd ed. (2006), sections 10.3 and 16.7 (projected steps);
-/// Nielsen (1999), IMM-REP-1999-05 (damping); Transtrum & Sethna (2012), arXiv:1201.5885 (correction).
+/// Nocedal & Wright, *Numerical Optimization*, 2nd ed. (2006), sections 10.3 and 16.7 (projected
+/// steps); Nielsen (1999), IMM-REP-1999-05 (damping); Transtrum & Sethna (2012), arXiv:1201.5885
+/// (correction).
 pub(super) fn minimise(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
@@ -171,7 +173,8 @@ fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
     Minimum { parameters: parameters.to_vec(), cost, steps: 0, converged: false, at_bound }
 }
 
-/// The last step, too small to matter for the sum of squares, is still taken if it does not raise it.
+/// The last step, too small to matter for the sum of squares, is still taken if it does not raise
+/// it.
 fn polished(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,

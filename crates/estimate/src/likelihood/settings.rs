@@ -25,8 +25,8 @@ pub struct Settings {
     pub noise: NoiseSource,
     /// Maximum number of searches: one from the given values, the others from random ones.
     pub starts: usize,
-    /// Factor by which random first values differ from the given ones, as a standard deviation of their
-    /// logarithm.
+    /// Factor by which random first values differ from the given ones, as a standard deviation of
+    /// their logarithm.
     pub spread: f64,
     /// Seed of the random first values.
     pub seed: u64,

@@ -21,8 +21,9 @@ pub(super) fn reference(data: &LineData, rows: std::ops::Range<usize>) -> f64 {
     data.omega()[rows].iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Columns of the transient at a line, p × unknowns: the response to the state loads in powers of s/ω₀,
-/// then a polynomial in s/ω₀ of every output, which describes what the samples fold back into the band.
+/// Columns of the transient at a line, p × unknowns: the response to the state loads in powers of
+/// s/ω₀, then a polynomial in s/ω₀ of every output, which describes what the samples fold back into
+/// the band.
 pub(super) fn columns(
     omega: f64,
     reference: f64,
@@ -61,7 +62,8 @@ pub(super) fn state_loads(
     })
 }
 
-/// Orthonormal columns that span weighted columns, and the coefficients that a residual has along them.
+/// Orthonormal columns that span weighted columns, and the coefficients that a residual has along
+/// them.
 pub(super) struct Eliminated {
     pub(super) basis: DMatrix<f64>,
     /// Unknowns of the transient that fit the residual.
@@ -69,7 +71,8 @@ pub(super) struct Eliminated {
 }
 
 impl Eliminated {
-    /// Fits weighted columns to a weighted residual; dependent columns share what they have in common.
+    /// Fits weighted columns to a weighted residual; dependent columns share what they have in
+    /// common.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM J. Numerical Analysis 10, 413–432 (variable projection).

@@ -1,5 +1,5 @@
-//! Noise of the outputs that is known from the residual alone: levels, then spectra, in turn with the
-//! parameters.
+//! Noise of the outputs that is known from the residual alone: levels, then spectra, in turn with
+//! the parameters.
 
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
@@ -55,8 +55,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         minimise(&residual, self.bounds, from, STEPS).filter(|minimum| minimum.converged)
     }
 
-    /// White noise of the levels that make the residual most likely, in turn with the parameters. A level is
-    /// larger than the root mean square of its residual by what the fit took up.
+    /// White noise of the levels that make the residual most likely, in turn with the parameters. A
+    /// level is larger than the root mean square of its residual by what the fit took up.
     ///
     /// # Errors
     /// [`LikelihoodError::NotConverged`].
@@ -113,8 +113,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok(levels.into_iter().enumerate().map(floor).collect())
     }
 
-    /// Noise with the smooth spectra that the residual shows, one of each output and record; `None` where
-    /// all of them are white.
+    /// Noise with the smooth spectra that the residual shows, one of each output and record; `None`
+    /// where all of them are white.
     ///
     /// # Errors
     /// [`LikelihoodError::NoResponse`].

@@ -1,4 +1,5 @@
-//! Uncertainty of an estimate that follows from that of the smooth noise spectra by which it is weighted.
+//! Uncertainty of an estimate that follows from that of the smooth noise spectra by which it is
+//! weighted.
 
 use mechid_spectra::LineData;
 use nalgebra::{DMatrix, DVector};
@@ -6,13 +7,15 @@ use nalgebra::{DMatrix, DVector};
 use super::covariance::Information;
 
 impl Information {
-    /// Adds to the covariance what the errors of noise spectra make of the estimate, and returns the degrees
-    /// of freedom of the variance of the parameter that has the fewest. `jacobian` is the derivative of the
-    /// residual, and `bases` the functions that the log powers of each record were fitted with.
+    /// Adds to the covariance what the errors of noise spectra make of the estimate, and returns
+    /// the degrees of freedom of the variance of the parameter that has the fewest. `jacobian` is
+    /// the derivative of the residual, and `bases` the functions that the log powers of each record
+    /// were fitted with.
     ///
-    /// With log powers B β of unit information, orthonormal sensitivities Q and P_i = Σ b_li Q_lᵀQ_l, the
-    /// estimate scatters more by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of the Fisher information is
-    /// too small by as much. `None`, and nothing added, where some parameter is not determined.
+    /// With log powers B β of unit information, orthonormal sensitivities Q and P_i = Σ b_li
+    /// Q_lᵀQ_l, the estimate scatters more by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of the
+    /// Fisher information is too small by as much. `None`, and nothing added, where some parameter
+    /// is not determined.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),

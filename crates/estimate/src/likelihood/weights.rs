@@ -31,7 +31,8 @@ impl Weights {
         Self { covariance, outputs, inputs_are_exact }
     }
 
-    /// Covariance of the outputs alone, diagonal, lines × p, beside that of the inputs which the data state.
+    /// Covariance of the outputs alone, diagonal, lines × p, beside that of the inputs which the
+    /// data state.
     pub(super) fn from_variances(data: &LineData, variance: &DMatrix<f64>) -> Self {
         let (outputs, inputs) = (data.outputs().ncols(), data.inputs().ncols());
         let all = outputs + inputs;
@@ -117,7 +118,8 @@ impl Weights {
 }
 
 impl WeightedLine {
-    /// Input û = u − Q (L Lᴴ)⁻¹ e that, within its noise, agrees best with the outputs; `white` is L⁻¹e.
+    /// Input û = u − Q (L Lᴴ)⁻¹ e that, within its noise, agrees best with the outputs; `white` is
+    /// L⁻¹e.
     pub(super) fn likely_input(
         &self,
         input: DVector<Complex<f64>>,
