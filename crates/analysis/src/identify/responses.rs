@@ -117,7 +117,7 @@ fn agreement(
         let each: Vec<FrequencyData> = each.collect::<Result<_, _>>()?;
         splits.push((Split::Rows(rows_of(&each)), RowParts::Records));
     }
-    let parts = PartsOfFit::of_responses(data, &records, estimate);
+    let parts = PartsOfFit::from_responses(data, &records, estimate);
     Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
 }
 

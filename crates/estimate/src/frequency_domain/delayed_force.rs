@@ -1,4 +1,4 @@
-//! The equations of motion of spectra with the force some time later.
+//! Equations of motion of spectra with a delayed force.
 
 use mechid_model::Matrix;
 use mechid_spectra::FrequencyData;
@@ -9,9 +9,10 @@ use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};
 use crate::relations::Relations;
 
-/// Fit of the equation of motion to the lines of spectra as a function of the delay of the force.
+/// Fit of the equation of motion to spectral lines as a function of the delay of the force.
 ///
-/// A delay turns the forces alone: the motions with unknown entries are factored once.
+/// A delay changes only the forces, so the regressors (motions of unknown entries) are factored
+/// once.
 pub struct DelayedForce<'a> {
     data: &'a FrequencyData,
     /// Weight of each line.
@@ -21,27 +22,24 @@ pub struct DelayedForce<'a> {
     groups: Vec<Group>,
 }
 
-/// Equations that are fitted by the same columns, or all of them together where entries are
-/// related.
+/// Equations with the same regressors, or all equations together if entries are related.
 struct Group {
     equations: Vec<usize>,
-    /// Orthonormal columns that span the motions with unknown entries, and their transpose; of
-    /// equations that are fitted together, one below the other.
+    /// Orthonormal basis of the regressors; equations that are fitted together are stacked.
     q: DMatrix<f64>,
     q_transposed: DMatrix<f64>,
-    /// Force that the known entries account for, rows × equations.
+    /// Forces of the known entries, rows × equations.
     known: DMatrix<f64>,
 }
 
 impl<'a> DelayedForce<'a> {
-    /// `None` if the data leave an entry open, as they do with any delay. A force acts on the
-    /// degrees of freedom `driven`, counted from 0.
+    /// Prepares the fit for forces on the degrees of freedom `driven`, counted from 0. `None` if
+    /// the data do not determine an entry, which does not depend on the delay.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
         Self::weighted(data, late_weight(data), unknowns, driven)
     }
 
-    /// The same with a weight on each line.
-    /// Weights are a pure number for each line.
+    /// Prepares the fit with given weights, a pure number for each line.
     ///
     /// # Source
     /// Ours.
@@ -62,7 +60,9 @@ impl<'a> DelayedForce<'a> {
                 let shared = equations_by_columns(unknowns, &unknowns.free()).into_iter();
                 let group = |(columns, mut equations): (Columns, Vec<usize>)| {
                     equations.retain(|equation| driven.contains(equation));
-                    let q = || motions.select_columns(&places(unknowns.dof(), &columns)).qr().q();
+                    let q = || {
+                        motions.select_columns(&column_indices(unknowns.dof(), &columns)).qr().q()
+                    };
                     (!equations.is_empty()).then(|| Group::new(q(), &motions, unknowns, equations))
                 };
                 shared.filter_map(group).collect()
@@ -71,9 +71,9 @@ impl<'a> DelayedForce<'a> {
         Some(Self { data, weight, driven: driven.len(), groups })
     }
 
-    /// Residual power of the driven equations, each over the power of its right-hand side, with the
-    /// force `delay` (s) later; of related equations that of all of them, times the number of
-    /// forces. `None` if it is not finite.
+    /// Returns the sum over the driven equations of the ratio of residual power to the power of the
+    /// right-hand side, with the force `delay` (s) later. For related equations it is the ratio of
+    /// all equations together, times the number of forces. `None` if it is not finite.
     ///
     /// # Source
     /// Ours.
@@ -85,8 +85,8 @@ impl<'a> DelayedForce<'a> {
     }
 }
 
-/// Columns of the motions, by matrix and degree of freedom.
-fn places(dof: usize, columns: &Columns) -> Vec<usize> {
+/// Returns the indices of columns of the motions from their matrix and degree of freedom.
+fn column_indices(dof: usize, columns: &Columns) -> Vec<usize> {
     columns.iter().map(|(matrix, column)| *matrix as usize * dof + column).collect()
 }
 
@@ -102,17 +102,17 @@ impl Group {
             || Matrix::ALL.into_iter().flat_map(|matrix| (0..dof).map(move |j| (matrix, j)));
         let mut known = DMatrix::zeros(motions.nrows(), equations.len());
         for (mut sum, equation) in known.column_iter_mut().zip(&equations) {
-            for (place, (matrix, column)) in entries().enumerate() {
+            for (index, (matrix, column)) in entries().enumerate() {
                 let value = unknowns.fixed(matrix, *equation, column).unwrap_or(0.0);
                 if value != 0.0 {
-                    sum.axpy(value, &motions.column(place), 1.0);
+                    sum.axpy(value, &motions.column(index), 1.0);
                 }
             }
         }
         Self { equations, q_transposed: q.transpose(), q, known }
     }
 
-    /// All equations, with entries that are the same unknown.
+    /// Stacks all equations; entries that are the same unknown share a column.
     fn together(motions: &DMatrix<f64>, unknowns: &Unknowns, relations: &Relations) -> Self {
         let (dof, rows) = (unknowns.dof(), motions.nrows());
         let mut regressors = DMatrix::zeros(rows * dof, relations.count());

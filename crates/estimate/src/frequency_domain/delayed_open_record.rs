@@ -1,4 +1,4 @@
-//! Open records with the force some time later.
+//! Open records with a delayed force.
 
 use mechid_numerics::gauss_newton::minimise;
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
@@ -14,19 +14,19 @@ use crate::Unknowns;
 use crate::limits::DELAY_STEPS;
 use crate::relations::Relations;
 
-/// Maximum likelihood for the lines of open records with the force some time later, the loads of
-/// their ends being found anew with each delay.
+/// Maximum likelihood for the lines of open records with a delayed force; each delay has its own
+/// estimate of the transients.
 pub struct DelayedOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
-    /// Noise that the residual without a delay shows.
+    /// Noise estimated from the residual without a delay.
     noise: NoiseSpectrum,
-    /// Parameters found last, from which the next are looked for.
+    /// Estimate for the last delay, the initial estimate for the next one.
     theta: DVector<f64>,
 }
 
 impl<'a> DelayedOpenRecord<'a> {
-    /// Begins with the result of a `fit` to the same data.
+    /// Starts at the result of a `fit` to the same data; `None` if that has no transient.
     pub fn from_fit(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,
@@ -43,28 +43,29 @@ impl<'a> DelayedOpenRecord<'a> {
         Some(Self { data, unknowns, noise, theta })
     }
 
-    /// Number of real equations less that of the unknowns.
+    /// Number of real equations minus the number of unknowns.
     pub fn spare(&self) -> usize {
         spare(self.data, self.unknowns)
     }
 
-    /// Looks for the parameters with the force `delay` (s) later from all starts.
+    /// Estimates the parameters with the force `delay` (s) later, from all initial estimates.
     pub fn search(&mut self, delay: f64) -> Option<()> {
         let late = self.data.with_later_force(delay);
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
         let starts = InitialEstimates::new(&late, self.unknowns, &self.noise);
         let spare = self.spare() as f64;
-        let found = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
-        self.theta = found.minimum.parameters;
+        let global = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
+        self.theta = global.minimum.parameters;
         Some(())
     }
 
-    /// Sum of squares with the force `delay` (s) later, near the parameters found last.
+    /// Returns the sum of squares with the force `delay` (s) later, minimised from the last
+    /// estimate.
     pub fn cost(&mut self, delay: f64) -> Option<f64> {
         let late = self.data.with_later_force(delay);
         let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
-        let found = minimise(&mut misfit, self.theta.clone(), DELAY_STEPS)?;
-        self.theta = found.parameters;
-        Some(found.cost)
+        let minimum = minimise(&mut misfit, self.theta.clone(), DELAY_STEPS)?;
+        self.theta = minimum.parameters;
+        Some(minimum.cost)
     }
 }

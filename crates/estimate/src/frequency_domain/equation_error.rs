@@ -7,14 +7,15 @@ use nalgebra::{Complex, DMatrix};
 use crate::limits::WEIGHTING_CLEAR;
 use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 
-/// Least squares on −ω²M X + iωC X + K X = F at every row, real and imaginary parts apart.
+/// Estimates M, C and K by least squares on −ω²M X + iωC X + K X = F at every row, with separate
+/// real and imaginary parts.
 ///
-/// Exact on exact spectra, and fast: no iteration, no start values. Noise on the motion
-/// stands among the regressors, multiplied by ω and ω², and biases the answer; the standard
-/// errors do not show that bias. Use it where noise is negligible, and as the start of
-/// [`output_error`](super::output_error).
+/// It is exact for exact spectra, and fast: it needs no iteration and no initial estimate. Noise on
+/// the motion is part of the regressors, multiplied by ω and ω², and biases the estimate; the
+/// standard errors do not include this bias. Use it if the noise is negligible, and as the initial
+/// estimate of [`output_error`](super::output_error).
 ///
-/// Parameters the lines do not excite are reported in [`Estimate::undetermined`].
+/// Parameters that the lines do not determine are listed in [`Estimate::undetermined`].
 ///
 /// ```
 /// use mechid_model::ResponseQuantity;
@@ -31,15 +32,15 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 ///     force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w)
 /// });
 /// let data = FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)?;
-/// let found = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
-/// assert!((found.stiffness()[(0, 0)] - 5000.0).abs() < 1e-9);
+/// let estimate = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
+/// assert!((estimate.stiffness()[(0, 0)] - 5000.0).abs() < 1e-9);
 /// # Ok::<(), mechid_estimate::EstimateError>(())
 /// ```
 ///
 /// # Errors
 /// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries
 /// force, [`EstimateError::OnlyRatios`] if an equation of motion has neither force nor a known
-/// entry, and what [`EquationOfMotion::solve`] refuses.
+/// entry, and the errors of [`EquationOfMotion::solve`].
 ///
 /// # Source
 /// Dissertation eqs. (4.6.12) and (4.6.31).
@@ -50,8 +51,8 @@ pub fn equation_error(
     equation_rows(data)?.solve(unknowns)
 }
 
-/// The rows of [`equation_error`], to be merged with those of other data or to be solved
-/// for several sets of unknowns.
+/// Returns the rows of [`equation_error`], to merge with the rows of other data or to solve for
+/// several sets of unknowns.
 ///
 /// # Errors
 /// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries
@@ -60,12 +61,12 @@ pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateE
     weighted_rows(data, 0.0, |_| 1.0)
 }
 
-/// [`equation_error`] with every row divided by what the stated noise puts into its equation, by
-/// the measured receptance: of frequency responses the weight is the coherence over what it lacks
-/// of 1, so that lines which only noise has reached do not decide. Once of all lines, and once of
-/// those alone that are clear: an unclear line with next to no force shows a machine far too soft.
+/// Returns estimates of [`equation_error`] with every row divided by the standard deviation of its
+/// equation error, from the stated noise and the measured receptance, so that lines of noise have
+/// little weight. The first one uses all lines, the second one only lines with little noise: a
+/// noisy line with hardly any force would give a far too soft system.
 ///
-/// Nothing if no noise is stated, or none at some row, or if it leaves a parameter open.
+/// There is no estimate if no noise is stated, or if the lines do not determine a parameter.
 pub(super) fn weighted_equation_errors<'a>(
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
@@ -77,7 +78,8 @@ pub(super) fn weighted_equation_errors<'a>(
     })
 }
 
-/// A weight for each row of a search for a delay: where noise is stated, that of clear lines by it.
+/// Returns a weight for each row of a search for a delay: by the stated noise for lines with little
+/// noise, or 1 if no noise is stated.
 pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, WEIGHTING_CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
@@ -85,8 +87,8 @@ pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     }
 }
 
-/// Returns for each row the inverse of what the stated noise puts into it; 0 if that is more than
-/// `clear` of its power.
+/// Returns for each row the inverse standard deviation of its equation error by the stated noise; 0
+/// if the noise is more than the share `clear` of the power of the row.
 fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f64> {
     let noise = data.noise()?;
     let n = data.dof();
@@ -102,7 +104,8 @@ fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f6
     })
 }
 
-/// The rows of [`equation_error`] with the force `delay` seconds later and a weight on each line.
+/// Returns the rows of [`equation_error`] with the force `delay` seconds later and a weight on each
+/// line.
 pub(super) fn weighted_rows(
     data: &FrequencyData,
     delay: f64,
@@ -125,8 +128,8 @@ pub(super) fn weighted_rows(
     Ok(rows)
 }
 
-/// Acceleration, velocity and displacement of every degree of freedom, side by side, with a weight
-/// on each line.
+/// Returns acceleration, velocity and displacement of every degree of freedom, side by side, with a
+/// weight on each line.
 pub(super) fn motions(data: &FrequencyData, weight: &[f64]) -> DMatrix<f64> {
     let (n, x) = (data.dof(), data.displacement());
     let s = |row: usize| Complex::new(0.0, data.omega()[row]);
@@ -138,7 +141,7 @@ pub(super) fn motions(data: &FrequencyData, weight: &[f64]) -> DMatrix<f64> {
     motions
 }
 
-/// The real parts of all rows, then the imaginary parts.
+/// Returns the real parts of all rows, then the imaginary parts.
 pub(super) fn real_rows(
     amplitudes: &DMatrix<Complex<f64>>,
     factor: impl Fn(usize, Complex<f64>) -> Complex<f64>,

@@ -1,4 +1,4 @@
-//! InitialEstimates of the search for the maximum of the likelihood: linear estimates of the
+//! Initial estimates for the search for the maximum of the likelihood: linear estimates of the
 //! equation of motion, with weights and corrections for noise.
 
 use std::borrow::Cow;
@@ -16,24 +16,24 @@ use crate::limits::INITIAL_ROUNDS;
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
 
-/// Exponents e of the weights ω^−e that stand in for a noise that is white in the displacement,
-/// whose part in the equation of motion grows with ω² where mass decides.
+/// Exponents e of the weights ω^e, for noise that is white in the displacement: its equation error
+/// grows with ω² where the mass dominates.
 const EXPONENTS: [i32; 3] = [0, -2, -3];
-/// Linear estimates from spectra, each equation of motion by itself.
+/// Linear estimates from spectra, one equation of motion after another.
 pub(super) struct InitialEstimates<'a> {
-    /// Data as measured; of open records those under a window that leaves little of their ends.
+    /// Data as measured; for open records under a Hann window, which reduces their transients.
     data: Cow<'a, FrequencyData>,
-    /// Number of unknown loads of these ends, which start at zero.
+    /// Number of unknown transient loads; their initial estimates are zero.
     ends: usize,
     unknowns: &'a Unknowns,
     noise: &'a NoiseSpectrum,
     equations: Vec<Equation>,
-    /// Linear relations between entries, by which all equations are solved together.
+    /// Linear relations between entries; with relations all equations are solved together.
     linear: Option<Relations>,
     nominal: Option<DVector<f64>>,
 }
 
-/// The unknowns of one equation of motion and their places among all.
+/// Unknowns of one equation of motion, each with its index among all unknowns.
 struct Equation {
     row: usize,
     parameters: Vec<(usize, Parameter)>,
@@ -42,9 +42,9 @@ struct Equation {
 /// Treatment of noise on the regressors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// Taken for none: ordinary least squares.
+    /// Ordinary least squares: the noise of the regressors is neglected.
     Ordinary,
-    /// Least squares in the metric of the noise of regressors and force: consistent.
+    /// Total least squares in the metric of the noise of regressors and force: consistent.
     Total,
 }
 
@@ -79,7 +79,7 @@ impl<'a> InitialEstimates<'a> {
         }
     }
 
-    /// The same, with the entries of a machine expected to be near.
+    /// Adds the entries of a nominal system as an initial estimate.
     pub(super) fn with_nominal(mut self, nominal: Option<&SecondOrderSystem>) -> Self {
         let entry = |system: &SecondOrderSystem, p: &Parameter| {
             system.matrix(p.matrix())[(p.row(), p.column())]
@@ -91,9 +91,10 @@ impl<'a> InitialEstimates<'a> {
         self
     }
 
-    /// Every start, those that are rounds of one iteration together, the most trusted first: total
-    /// least squares and ordinary ones weighted by the dynamic stiffness found before, then the
-    /// machine expected and ordinary least squares with weights ω^−e and with those of the noise.
+    /// Returns all initial estimates, the rounds of one iteration as one family, the most reliable
+    /// first: total and ordinary least squares weighted by the dynamic stiffness of the round
+    /// before; then the nominal system, and ordinary least squares with the weights ω^e and with
+    /// the weights of the noise.
     pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
         let powers =
             EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));
@@ -104,7 +105,8 @@ impl<'a> InitialEstimates<'a> {
         let single = self.estimate(Kind::Total, &self.powers(0)).into_iter();
         let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
         let single = single.chain(weighted.map(|solution| values(&solution)));
-        let all = std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start]));
+        let families = std::iter::once(total).chain(ordinary);
+        let families = families.chain(single.map(|start| vec![start]));
         let relations = Relations::from_unknowns(self.unknowns);
         let with_ends = |start: DVector<f64>| {
             let independent = match &relations {
@@ -114,10 +116,10 @@ impl<'a> InitialEstimates<'a> {
             let len = independent.len() + self.ends;
             independent.resize_vertically(len, 0.0)
         };
-        all.map(|family| family.into_iter().map(with_ends).collect()).collect()
+        families.map(|family| family.into_iter().map(with_ends).collect()).collect()
     }
 
-    /// The estimates of every round of weighting, from `start` on.
+    /// Returns the estimates of every round of weighting, beginning with the weights of `start`.
     fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
         let mut rounds: Vec<DVector<f64>> = Vec::new();
         for _ in 0..INITIAL_ROUNDS {
@@ -136,7 +138,7 @@ impl<'a> InitialEstimates<'a> {
         })
     }
 
-    /// One over the standard deviation of D ΔX − ΔF, by the dynamic stiffness D of `theta`.
+    /// Returns the inverse standard deviation of D ΔX − ΔF for the dynamic stiffness D of `theta`.
     fn weights(&self, theta: &DVector<f64>) -> Option<Weights> {
         let matrices = self.unknowns.assemble(theta.as_slice());
         let n = self.data.dof();
@@ -159,8 +161,8 @@ impl<'a> InitialEstimates<'a> {
         weights.iter().all(|w| w.is_finite()).then_some(weights)
     }
 
-    /// The free entries, of each equation of motion by itself or, where they are related, of all
-    /// together.
+    /// Estimates the free entries of each equation of motion or, if entries are related, of all
+    /// equations together.
     fn estimate(&self, kind: Kind, weights: &Weights) -> Option<DVector<f64>> {
         let theta = match &self.linear {
             Some(linear) => self.estimate_together(kind, weights, linear)?,
@@ -172,8 +174,8 @@ impl<'a> InitialEstimates<'a> {
                     let triangle = self.triangle(equation, &weights)?;
                     let noise = || self.noise_gram(equation, &weights);
                     let values = solve(kind, triangle, noise)?;
-                    for ((place, _), value) in equation.parameters.iter().zip(values.iter()) {
-                        theta[*place] = *value;
+                    for ((index, _), value) in equation.parameters.iter().zip(values.iter()) {
+                        theta[*index] = *value;
                     }
                 }
                 theta
@@ -193,18 +195,18 @@ impl<'a> InitialEstimates<'a> {
         let mut noise = DMatrix::zeros(count + 1, count + 1);
         for equation in &self.equations {
             let weights: Vec<f64> = weights.column(equation.row).iter().copied().collect();
-            // Unknowns of the equation and, last, its force, among those of all.
-            let unknowns = equation.parameters.iter().map(|(place, _)| linear.shared(*place));
+            // Columns of the unknowns of this equation and, last, of its force.
+            let unknowns = equation.parameters.iter().map(|(index, _)| linear.shared(*index));
             let places: Vec<usize> = unknowns.chain([count]).collect();
-            let own = self.triangle(equation, &weights)?;
-            let mut triangle = DMatrix::zeros(own.nrows(), count + 1);
-            for (column, at) in own.column_iter().zip(&places) {
+            let of_equation = self.triangle(equation, &weights)?;
+            let mut triangle = DMatrix::zeros(of_equation.nrows(), count + 1);
+            for (column, at) in of_equation.column_iter().zip(&places) {
                 triangle.column_mut(*at).axpy(1.0, &column, 1.0);
             }
             factor.push(&[triangle.as_view()]).then_some(())?;
             if kind == Kind::Total {
-                let own = self.noise_gram(equation, &weights);
-                for (column, to) in own.column_iter().zip(&places) {
+                let gram = self.noise_gram(equation, &weights);
+                for (column, to) in gram.column_iter().zip(&places) {
                     for (value, at) in column.iter().zip(&places) {
                         noise[(*at, *to)] += value;
                     }
@@ -215,7 +217,8 @@ impl<'a> InitialEstimates<'a> {
         Some(linear.entries(values.as_slice()))
     }
 
-    /// R of the weighted regressors and, last, the force less what known entries account for.
+    /// Returns the triangular factor R of the weighted regressors and, as last column, the force
+    /// minus the forces of the known entries.
     fn triangle(&self, equation: &Equation, weights: &[f64]) -> Option<DMatrix<f64>> {
         let (lines, last) = (self.data.len(), equation.parameters.len());
         let (x, force) = (self.data.displacement(), self.data.force());
@@ -239,12 +242,12 @@ impl<'a> InitialEstimates<'a> {
         factor.push(&[rows.as_view()]).then(|| factor.r().clone())
     }
 
-    /// E of the Gram matrix of the columns of [`InitialEstimates::triangle`] that noise alone would
-    /// have.
+    /// Returns the expected Gram matrix of the noise in the columns of
+    /// [`InitialEstimates::triangle`].
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
         let mut gram = DMatrix::zeros(last + 1, last + 1);
-        // How the noise of displacements and forces enters each column.
+        // Coefficients of the noise of displacements and forces in each column.
         let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); last + 1];
         for (line, &omega) in self.data.omega().iter().enumerate() {
             let powers = powers(omega).map(|power| power * weights[line]);
@@ -259,7 +262,7 @@ impl<'a> InitialEstimates<'a> {
                 for a in 0..=b {
                     for (i, left) in &enters[a] {
                         for (j, right) in &enters[b] {
-                            // E[Δz̄_i Δz_j] is the conjugate of what the covariance has.
+                            // E[Δz̄_i Δz_j] is the conjugate of the entry (i, j) of the covariance.
                             gram[(a, b)] += (left.conj() * right * covariance[(*j, *i)]).re;
                         }
                     }
@@ -270,7 +273,7 @@ impl<'a> InitialEstimates<'a> {
         gram
     }
 
-    /// The entries of an equation of motion that are known and not zero.
+    /// Returns the known nonzero entries of an equation of motion.
     fn known(&self, row: usize) -> impl Iterator<Item = (Matrix, usize, f64)> + '_ {
         let entries = Matrix::ALL
             .into_iter()
@@ -282,8 +285,8 @@ impl<'a> InitialEstimates<'a> {
     }
 }
 
-/// The unknowns of a triangle whose last column is the force; `noise` gives the Gram matrix of its
-/// columns that noise alone would have.
+/// Solves for the unknowns of a triangular factor whose last column is the force; `noise` returns
+/// the expected Gram matrix of the noise in its columns.
 fn solve(
     kind: Kind,
     mut triangle: DMatrix<f64>,
@@ -315,7 +318,7 @@ fn values(estimate: &Estimate) -> DVector<f64> {
     DVector::from_iterator(parameters.len(), parameters.map(|p| p.value))
 }
 
-/// θ for which |R [θ; −1]|² is least against [θ; −1]ᵀ N [θ; −1].
+/// Returns the θ that minimises the ratio of |R [θ; −1]|² to [θ; −1]ᵀ N [θ; −1].
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 6.3; Pintelon & Schoukens,

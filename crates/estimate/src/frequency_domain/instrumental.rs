@@ -1,4 +1,5 @@
-//! Instrumental variables: another measurement of the same motion rids least squares of its bias.
+//! Instrumental variables: a second measurement of the same motion removes the bias of least
+//! squares.
 
 use mechid_model::{Matrix, Parameter};
 use mechid_numerics::NumericsError;
@@ -11,22 +12,23 @@ use super::equation_error::{equation_rows, real_rows};
 use crate::estimate::EstimateParts;
 use crate::{Estimate, EstimateError, Unknowns};
 
-/// The equation of motion solved with two measurements of the same experiment, each the
-/// instrument of the other.
+/// Solves the equation of motion with two measurements of the same experiment, each the instrument
+/// of the other.
 ///
-/// The normal equations ΦᵀΦ θ = Φᵀy of least squares are biased because Φ carries its noise
-/// twice; in ZᵀΦ θ = Zᵀy, with Z the same regressors from other periods, the two noises are
-/// independent. The answer is consistent, its scatter is larger than that of
-/// [`output_error`](super::output_error). Forces may be noisy too.
+/// The normal equations ΦᵀΦ θ = Φᵀy of least squares are biased because the noise of Φ is squared;
+/// in ZᵀΦ θ = Zᵀy, with the same regressors Z from other periods, the two noises are independent.
+/// The estimate is consistent, with more scatter than [`output_error`](super::output_error). Forces
+/// may be noisy, too.
 ///
 /// `first` and `second` must come from different periods (see
 /// [`RepeatedPeriods::halves`](mechid_spectra::RepeatedPeriods::halves)). The standard errors allow
-/// for an equation error of unequal size over the lines.
+/// for an equation error whose variance differs from line to line.
 ///
 /// # Errors
 /// [`SpectraError::FrequencyMismatch`](mechid_spectra::SpectraError::FrequencyMismatch) or
-/// [`NumericsError::Size`] if the two are not alike, [`EstimateError::Undetermined`] if the data
-/// leave a parameter open, and what [`equation_error`](super::equation_error) refuses.
+/// [`NumericsError::Size`]if the sizes or frequencies differ,
+/// [`EstimateError::Undetermined`] if the data do not determine a parameter, and the errors of
+/// [`equation_error`](super::equation_error).
 ///
 /// # Source
 /// Söderström & Stoica, *System Identification* (1989), chapter 8; White (1980), Econometrica 48,
@@ -42,11 +44,11 @@ pub fn instrumental_variables(
         return Err(NumericsError::Size { what, expected: first.dof(), got: second.dof() }.into());
     }
     unknowns.check_unrelated("an estimator with instrumental variables")?;
-    // Least squares finds out what can be determined, and refuses what it must.
+    // Least squares checks that the data determine every parameter.
     let mut rows = equation_rows(first)?;
     rows.merge(&equation_rows(second)?)?;
     rows.solve(unknowns)?.check_determined()?;
-    let both = [Terms::of(first), Terms::of(second)];
+    let both = [Terms::new(first), Terms::new(second)];
     let free = unknowns.free();
     let mut equations = Vec::new();
     for dof in 0..first.dof() {
@@ -63,7 +65,7 @@ struct Terms {
 }
 
 impl Terms {
-    fn of(data: &FrequencyData) -> Self {
+    fn new(data: &FrequencyData) -> Self {
         let s = |row: usize| Complex::new(0.0, data.omega()[row]);
         let x = data.displacement();
         Self {
@@ -84,7 +86,7 @@ impl Terms {
         regressors
     }
 
-    /// The force less what known entries account for.
+    /// Returns the force minus the forces of the known entries.
     fn target(&self, unknowns: &Unknowns, dof: usize) -> DVector<f64> {
         let mut target = self.force.column(dof).into_owned();
         for matrix in [Matrix::Mass, Matrix::Damping, Matrix::Stiffness] {
@@ -98,12 +100,12 @@ impl Terms {
     }
 }
 
-/// One equation of motion, solved.
+/// Solution of one equation of motion.
 struct Equation {
     parameters: Vec<Parameter>,
     values: DVector<f64>,
-    /// Change of the values per change of the right-hand side, times the residual: one
-    /// column per row of the equations.
+    /// Derivative of the values with respect to the right-hand side, times the residual: one column
+    /// per row of the equations.
     scores: DMatrix<f64>,
     rows: usize,
     residual_nrmse: f64,
@@ -141,13 +143,13 @@ impl Equation {
         })
     }
 
-    /// The two measurements together have as many independent rows, less the unknowns.
+    /// Number of independent rows of both measurements minus the number of unknowns.
     fn degrees_of_freedom(&self) -> usize {
         self.rows.saturating_sub(self.parameters.len())
     }
 }
 
-/// (ZᵀΦ)⁻¹Zᵀ, unknowns × rows, and the condition number of its scaled projection.
+/// Returns (ZᵀΦ)⁻¹Zᵀ, unknowns × rows, and the condition number of the scaled QᵀΦ with Z = QR.
 fn influence(
     regressors: &DMatrix<f64>,
     mut instruments: DMatrix<f64>,
@@ -157,7 +159,7 @@ fn influence(
     }
     let scale: Vec<f64> = regressors.column_iter().map(|c| c.norm()).collect();
     instruments.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
-    // Zᵀ = RᵀQᵀ, and R drops out of ZᵀΦ θ = Zᵀy: no product of ill-scaled matrices.
+    // Zᵀ = RᵀQᵀ, and R cancels in ZᵀΦ θ = Zᵀy, which avoids a product of ill-scaled matrices.
     let q = instruments.qr().q();
     let mut projected = q.tr_mul(regressors);
     projected.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);

@@ -1,15 +1,15 @@
 //! Estimators that work line by line on the spectra of whole periods.
 //!
-//! Forces and motions are read at chosen [`Lines`](mechid_spectra::Lines) into
-//! [`FrequencyData`](mechid_spectra::FrequencyData), of one record or of
-//! [`RepeatedPeriods`](mechid_spectra::RepeatedPeriods), whose scatter shows the noise. Then there
-//! are three estimators:
+//! [`FrequencyData`](mechid_spectra::FrequencyData) has the forces and motions at chosen
+//! [`Lines`](mechid_spectra::Lines), from one record or from
+//! [`RepeatedPeriods`](mechid_spectra::RepeatedPeriods), whose scatter shows the noise. There are
+//! three estimators:
 //!
 //! | Estimator | Noise | Cost |
 //! |---|---|---|
 //! | [`equation_error`] | biases it | one small least-squares problem |
-//! | [`instrumental_variables`] | no bias, but scatter | the same, twice |
-//! | [`output_error`] | no bias, the least scatter, intervals that hold | some Gauss–Newton steps |
+//! | [`instrumental_variables`] | no bias, but more scatter | two such problems |
+//! | [`output_error`] | no bias, least scatter, valid intervals | some Gauss–Newton steps |
 //!
 //! ```
 //! use mechid_model::ResponseQuantity;

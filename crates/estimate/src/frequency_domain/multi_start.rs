@@ -1,4 +1,4 @@
-//! The least of the minima that searches from several starts lead to.
+//! Global minimum from searches with several initial estimates.
 
 use mechid_numerics::gauss_newton::{Minimum, minimise};
 use nalgebra::DVector;
@@ -12,16 +12,16 @@ use crate::limits::{
     SEARCH_STEPS, STEPS_MORE, STEPS_RESAMPLED,
 };
 
-/// Sums of squares that noise explains.
+/// Range of sums of squares that the noise explains.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plausible {
-    /// That of a right model; `None` if the level of the noise is not known.
+    /// Expected value for a correct model; `None` if the level of the noise is not known.
     pub expected: Option<f64>,
-    /// Factor by which one may be larger by chance.
+    /// Maximum ratio to the expected value by chance.
     pub factor: f64,
 }
 
-/// The best minimum of several searches.
+/// Best minimum of several searches.
 #[derive(Debug, Clone)]
 pub(super) struct GlobalMinimum {
     pub minimum: Minimum,
@@ -31,19 +31,19 @@ pub(super) struct GlobalMinimum {
     pub agreeing: usize,
 }
 
-/// Searches from one start after the other; `problem` is left at the best minimum.
+/// Searches from one initial estimate after another; afterwards `problem` is at the best minimum.
 ///
-/// The search ends when all of the first few starts have led to one minimum. Otherwise it goes on
-/// from the best ends: a few steps in the data with every line weighted at random, then a search in
-/// the data themselves, until several restarts in a row have found nothing better. Minima due to
-/// the noise are others in resampled data; the global one is always near.
+/// The search ends when the first few initial estimates have led to the same minimum. Otherwise it
+/// restarts from the best minima: a few steps with a random weight for every line, then a search in
+/// the original data, until several successive restarts have not found a better minimum. Local
+/// minima due to the noise change with the weights; the global one hardly moves.
 ///
 /// # Errors
 /// [`EstimateError::NotConverged`] if no search ends at a minimum.
 ///
 /// # Source
-/// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights, more unequal than those
-/// of a bootstrap, lead out of minima that it does not.
+/// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights vary more than those of
+/// a bootstrap and escape from minima where a bootstrap does not.
 pub(super) fn search(
     problem: &mut impl Restartable,
     starts: &InitialEstimates<'_>,
@@ -73,7 +73,7 @@ pub(super) fn search(
     Ok(GlobalMinimum { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
 }
 
-/// Searches again from the best ends so far, moved by resampled data.
+/// Restarts the search from the best minima so far, moved by a few steps in resampled data.
 fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     let mut without_gain = 0;
     for seed in 0..MAX_RESTARTS {
@@ -91,9 +91,9 @@ fn restart(problem: &mut impl Restartable, ends: &mut Ends) {
     }
 }
 
-/// The best of some rounds of linear least squares, each with the weights of the one before: they
-/// cross wide regions in which a search would have to go in small steps. No rounds from where the
-/// noise explains the data already; `None` where the sum of squares does not exist.
+/// Returns the best of some rounds of linear least squares, each with the weights of the round
+/// before: they cross wide regions in which a search would need many small steps. There are no
+/// rounds if the noise already explains the data; `None` if the sum of squares does not exist.
 ///
 /// # Source
 /// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.
@@ -129,18 +129,19 @@ impl Plausible {
 struct Ends {
     plausible: Plausible,
     searches: usize,
-    /// Ends of different sums of squares, the least first; converged or not.
+    /// Ends with different sums of squares, the smallest first, including those not converged.
     distinct: Vec<End>,
 }
 
-/// One end of one or more searches.
+/// Common end of one or more searches.
 struct End {
     minimum: Minimum,
     count: usize,
 }
 
 impl Ends {
-    /// Counts a search and where it ended, if anywhere; whether that is better than any other.
+    /// Counts a search with its end, if it has one, and returns whether this is the best end so
+    /// far.
     fn push(&mut self, ended: Option<Minimum>) -> bool {
         self.searches += 1;
         let Some(minimum) = ended else { return false };
@@ -155,9 +156,9 @@ impl Ends {
             }
             return false;
         }
-        let place = self.distinct.partition_point(|end| end.minimum.cost < minimum.cost);
-        self.distinct.insert(place, End { minimum, count: 1 });
-        place == 0
+        let rank = self.distinct.partition_point(|end| end.minimum.cost < minimum.cost);
+        self.distinct.insert(rank, End { minimum, count: 1 });
+        rank == 0
     }
 
     /// Returns whether the noise explains the best end.
@@ -170,7 +171,7 @@ impl Ends {
         matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
     }
 
-    /// Returns whether noise may decide between several ends, or the best is no minimum.
+    /// Returns whether the noise explains several ends, or the best one has not converged.
     fn many(&self) -> bool {
         let Some(best) = self.distinct.first() else { return true };
         let bound = best.minimum.cost * self.plausible.factor;
@@ -178,13 +179,13 @@ impl Ends {
         close || !best.minimum.converged
     }
 
-    /// The best end where it is no minimum.
+    /// Returns the best end if it has not converged.
     fn open(&self) -> Option<DVector<f64>> {
         let best = &self.distinct.first()?.minimum;
         (!best.converged).then(|| best.parameters.clone())
     }
 
-    /// One of the best ends.
+    /// Returns one of the best ends, in turn.
     fn turn(&self, at: usize) -> Option<DVector<f64>> {
         let count = if self.many() { RESTART_RESTARTED.min(self.distinct.len()) } else { 1 };
         let end = self.distinct.get(at.checked_rem(count)?)?;
@@ -193,7 +194,7 @@ impl Ends {
 }
 
 impl GlobalMinimum {
-    /// The minimum that this one has become for another weighting of the same residuals.
+    /// Returns the minimum near this one for other weights of the same residuals.
     ///
     /// # Errors
     /// [`EstimateError::NotConverged`].
@@ -207,8 +208,8 @@ impl GlobalMinimum {
     }
 }
 
-/// The best of each family: first that of the first family, then the others in the order of their
-/// sums of squares, those like another one last.
+/// Returns the best member of each family: that of the first family, then the others by rising sum
+/// of squares; members with the same sum of squares as another one come last.
 fn in_order(problem: &mut impl Restartable, families: Vec<Vec<DVector<f64>>>) -> Vec<DVector<f64>> {
     let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
     for (family, members) in families.into_iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Normal equations of a Jacobian whose rows are Kronecker products, in coordinates that keep
-//! their condition number small.
+//! Normal equations of a Jacobian with Kronecker products as rows, in coordinates with a small
+//! condition number.
 
 use std::rc::Rc;
 
@@ -13,13 +13,13 @@ use nalgebra::{DMatrix, DVector};
 use crate::Unknowns;
 use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_LINES, GRAM_RIDGE};
 
-/// Places of the unknowns in the equations of motion.
+/// Indices of the unknowns in the equations of motion.
 #[derive(Debug)]
 pub(super) struct Layout {
     dof: usize,
     unknowns: usize,
-    /// Columns of [M C K] that are unknown in at least one equation; beyond them those of the ends
-    /// of open records.
+    /// Columns of [M C K] that are unknown in at least one equation; then the columns of
+    /// transients.
     columns: Vec<(Matrix, usize)>,
     equations: Vec<Equation>,
 }
@@ -28,23 +28,22 @@ pub(super) struct Layout {
 #[derive(Debug)]
 struct Equation {
     row: usize,
-    /// Places of its unknowns among all.
+    /// Indices of its unknowns among all unknowns.
     places: Vec<usize>,
-    /// Places of their columns in [`Layout::columns`].
+    /// Indices of their columns in [`Layout::columns`].
     columns: Vec<usize>,
 }
 
 /// Coordinates u = T θ, equation by equation, in which the regressors are orthonormal, scaled to a
-/// Gram matrix of unit diagonal. Where entries are related, coordinates of the independent unknowns
-/// among these.
+/// Gram matrix of unit diagonal. For related entries they are coordinates of the independent
+/// unknowns.
 pub(super) struct Coordinates {
     blocks: Vec<Block>,
     scale: DVector<f64>,
     related: Option<Related>,
 }
 
-/// Independent unknowns p of related entries, dθ = S dp: Qᵀ and the triangle R of T S = Q R,
-/// scaled.
+/// Scaled factors Qᵀ and R of T S = Q R, for independent unknowns p of related entries, dθ = S dp.
 struct Related {
     transposed: DMatrix<f64>,
     triangle: DMatrix<f64>,
@@ -53,13 +52,13 @@ struct Related {
 struct Block {
     row: usize,
     places: Vec<usize>,
-    /// Orthonormal span of the unknown columns, for an equation that does not have all of them.
+    /// Orthonormal basis of the unknown columns, for an equation without some of the columns.
     basis: Option<Rc<DMatrix<f64>>>,
-    /// T, upper triangular.
+    /// Upper triangular matrix T.
     triangle: Rc<DMatrix<f64>>,
 }
 
-/// JᵀJ v = −Jᵀr for a step v.
+/// Normal equations JᵀJ v = −Jᵀr for a step v.
 pub(super) struct NormalEquations {
     /// JᵀJ, of unit diagonal.
     pub gram: DMatrix<f64>,
@@ -90,16 +89,16 @@ impl Layout {
         columns.dedup();
         let equation = |row: usize| {
             let of_row = free.iter().enumerate().filter(move |(_, p)| p.row() == row);
-            let place = |column: &(Matrix, usize)| {
+            let index = |column: &(Matrix, usize)| {
                 columns.iter().position(|c| c == column).expect("a column of some equation")
             };
-            let of_row = of_row.map(|(at, p)| (at, place(&(p.matrix(), p.column()))));
+            let of_row = of_row.map(|(at, p)| (at, index(&(p.matrix(), p.column()))));
             let of_ends = ends.iter().map(|column| {
                 let at = transient::index(n, column.1 - n, column.0, row);
-                (free.len() + at, place(column))
+                (free.len() + at, index(column))
             });
             let mut both: Vec<(usize, usize)> = of_row.chain(of_ends).collect();
-            // In the order of all columns, which an equation with all of them shares.
+            // The order of `columns`, so that an equation with all columns can use them directly.
             both.sort_unstable_by_key(|(_, column)| *column);
             let (places, columns) = both.into_iter().unzip();
             Equation { row, places, columns }
@@ -113,21 +112,19 @@ impl Layout {
         &self.columns
     }
 
-    /// The normal equations; turns the regressors into orthonormal ones. `None` if these are
-    /// dependent, or values overflow.
+    /// Returns the normal equations and makes the regressors orthonormal. `None` if these are
+    /// linearly dependent, or if values overflow.
     ///
-    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: one product of
-    /// a matrix of pairs (a, b) and one of pairs (i, j), in a fraction 1/dof of the operations that
-    /// the rows of J take. The Gram matrix has the square of the condition number of J; with
-    /// regressors that are orthonormal over the lines weighted by ‖W_l‖ that is harmless, and a
-    /// rounded Gram matrix slows the search but does not move its end, where Jᵀr = 0.
+    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: the product of
+    /// a matrix of pairs (a, b) and a matrix of pairs (i, j), with 1/dof of the operations for the
+    /// rows of J. The condition number of the Gram matrix is the square of that of J. This is
+    /// harmless for regressors that are orthonormal over the lines weighted by ‖W_l‖; rounding of
+    /// the Gram matrix slows the search but does not change the minimum, where Jᵀr = 0.
     ///
     /// # Source
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
-    /// Kronecker products).
-    ///
-    /// With a `tangent` S, entries and loads of ends × unknowns, they are those of the independent
-    /// unknowns.
+    /// Kronecker products). With a `tangent` S (entries and transient loads × unknowns), the
+    /// unknowns are the independent ones.
     pub(super) fn normal_equations(
         &self,
         factors: &mut Factors,
@@ -156,9 +153,10 @@ impl Layout {
         finite.then_some(NormalEquations { gram, gradient, coordinates })
     }
 
-    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ. Dependent
-    /// ones are no obstacle where entries are `related`: without a force on a degree of freedom
-    /// they are dependent, but its relations to others determine its entries.
+    /// Returns the triangular factor R of the regressors φ, with each line weighted by the size of
+    /// its W, and replaces them by R⁻ᵀφ. Dependent regressors are allowed for `related` entries: a
+    /// degree of freedom without force has dependent regressors, but its relations determine its
+    /// entries.
     fn orthonormalise(&self, factors: &mut Factors, related: bool) -> Option<DMatrix<f64>> {
         let lines = factors.weights.nrows() / 2;
         let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
@@ -206,7 +204,7 @@ impl Layout {
         blocks
     }
 
-    /// 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
+    /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
     fn products(&self, factors: &Factors) -> DMatrix<f64> {
         let (q, lines) = (self.columns.len(), factors.weights.nrows() / 2);
         let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
@@ -220,9 +218,10 @@ impl Layout {
                     let mut next = column.iter_mut();
                     for b in 0..q {
                         for (a, to) in (0..=b).zip(&mut next) {
-                            *to = match imaginary {
-                                false => 2.0 * (re[a] * re[b] + im[a] * im[b]),
-                                true => 2.0 * (im[a] * re[b] - re[a] * im[b]),
+                            *to = if imaginary {
+                                2.0 * (im[a] * re[b] - re[a] * im[b])
+                            } else {
+                                2.0 * (re[a] * re[b] + im[a] * im[b])
                             };
                         }
                     }
@@ -269,17 +268,17 @@ impl Layout {
 }
 
 impl NormalEquations {
-    /// (JᵀJ)⁻¹ of the unknowns, and the condition number of J with columns of unit length.
+    /// Returns (JᵀJ)⁻¹ of the unknowns, and the condition number of J with columns of unit length.
     ///
     /// `None` if JᵀJ is singular to rounding.
     pub(super) fn covariance(&self) -> Option<(DMatrix<f64>, f64)> {
         let inverse = Cholesky::new(&self.gram, 0.0)?.inverse_of_lower();
-        // Rows T⁻¹D⁻¹L⁻ᵀ of the unknowns, whose products are the covariances.
+        // The covariance is R Rᵀ with the rows R = T⁻¹D⁻¹L⁻ᵀ of the unknowns.
         let roots = self.coordinates.unknowns_of_columns(&inverse.transpose());
         let covariance = &roots * roots.transpose();
         let lengths = self.coordinates.lengths(&self.gram);
         let gram = |x: &DVector<f64>| {
-            let inner = &self.gram * self.coordinates.of(&x.component_div(&lengths));
+            let inner = &self.gram * self.coordinates.transform(&x.component_div(&lengths));
             self.coordinates.transposed(&inner).component_div(&lengths)
         };
         let inverse =
@@ -290,15 +289,16 @@ impl NormalEquations {
     }
 }
 
-/// The largest eigenvalue of a symmetric positive definite matrix, given by its products.
+/// Returns the largest eigenvalue of a symmetric positive definite matrix, given by its product
+/// with a vector.
 ///
 /// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1 (Lanczos), with all
-/// vectors kept orthogonal.
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1 (Lanczos), with full
+/// reorthogonalisation.
 fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     let mut projected = DMatrix::zeros(GRAM_LANCZOS.min(size), GRAM_LANCZOS.min(size));
-    // Anything that is orthogonal to no eigenvector.
+    // An arbitrary vector that is not orthogonal to the eigenvectors.
     let mut next = DVector::from_fn(size, |at, _| 1.0 + (0.7 * (at * at) as f64).sin());
     for at in 0..projected.nrows() {
         let norm = next.norm();
@@ -326,12 +326,12 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
 }
 
 impl Coordinates {
-    /// Passes from entries to the independent unknowns behind them; returns their Gram matrix, of
-    /// unit diagonal. `None` if rounding leaves unknowns without an influence.
+    /// Changes from entries to the independent unknowns and returns their Gram matrix, of unit
+    /// diagonal. `None` if unknowns are dependent to rounding.
     fn relate(&mut self, tangent: &DMatrix<f64>, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut moved = DMatrix::zeros(self.scale.len(), tangent.ncols());
         for (mut to, column) in moved.column_iter_mut().zip(tangent.column_iter()) {
-            to.copy_from(&self.of(&column.into_owned()));
+            to.copy_from(&self.transform(&column.into_owned()));
         }
         let count = moved.ncols();
         let mut factor = TriangularFactor::new(count);
@@ -346,7 +346,7 @@ impl Coordinates {
         }
         let inverse = triangle.solve_upper_triangular(&DMatrix::identity(count, count))?;
         let columns = moved * inverse;
-        // Products of whole matrices: nalgebra's `tr_mul` takes dot products.
+        // An explicit transpose is faster: the `tr_mul` of nalgebra computes dot products.
         let mut transposed = columns.transpose();
         let mut gram = &transposed * (gram * columns);
         let scale = gram.diagonal().map(f64::sqrt);
@@ -363,16 +363,17 @@ impl Coordinates {
         Some(gram)
     }
 
-    /// 2 Re Σ φ̄ y for every unknown: Jᵀ of what W_lᴴ has made y of, 2 lines × dof.
+    /// Returns 2 Re Σ φ̄ y for every unknown: Jᵀ applied to values whose W_lᴴ-weighted form is y, 2
+    /// lines × dof.
     pub(super) fn project(
         &self,
         regressors: &DMatrix<f64>,
         weighted: &DMatrix<f64>,
     ) -> DVector<f64> {
-        let all = (regressors * weighted) * 2.0;
+        let products = (regressors * weighted) * 2.0;
         let mut projected = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
-            let column = all.column(block.row);
+            let column = products.column(block.row);
             let mut to = projected.rows_mut(start, block.places.len());
             match &block.basis {
                 None => to.copy_from(&column),
@@ -386,13 +387,13 @@ impl Coordinates {
         }
     }
 
-    /// Unknowns θ at coordinates v.
+    /// Returns the unknowns θ at coordinates v.
     pub(super) fn unknowns(&self, coordinates: &DVector<f64>) -> DVector<f64> {
         let columns = DMatrix::from_column_slice(coordinates.len(), 1, coordinates.as_slice());
         self.unknowns_of_columns(&columns).column(0).into_owned()
     }
 
-    /// Unknowns θ at the coordinates v in each column.
+    /// Returns the unknowns θ at the coordinates v in each column.
     fn unknowns_of_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
         if let Some(Related { triangle, .. }) = &self.related {
             let mut unknowns = coordinates.clone();
@@ -418,8 +419,8 @@ impl Coordinates {
         unknowns
     }
 
-    /// Coordinates v of unknowns θ.
-    pub(super) fn of(&self, unknowns: &DVector<f64>) -> DVector<f64> {
+    /// Returns the coordinates v of unknowns θ.
+    pub(super) fn transform(&self, unknowns: &DVector<f64>) -> DVector<f64> {
         if let Some(Related { triangle, .. }) = &self.related {
             return triangle * unknowns;
         }
@@ -433,7 +434,7 @@ impl Coordinates {
         coordinates
     }
 
-    /// The transpose of what makes coordinates of unknowns.
+    /// Applies the transpose of the map from unknowns to coordinates.
     fn transposed(&self, coordinates: &DVector<f64>) -> DVector<f64> {
         if let Some(Related { triangle, .. }) = &self.related {
             return triangle.tr_mul(coordinates);
@@ -447,7 +448,8 @@ impl Coordinates {
         unknowns
     }
 
-    /// Lengths of the columns of J, of the unknowns, from the Gram matrix of the coordinates.
+    /// Returns the lengths of the columns of J for the unknowns, from the Gram matrix of the
+    /// coordinates.
     fn lengths(&self, gram: &DMatrix<f64>) -> DVector<f64> {
         if let Some(Related { triangle, .. }) = &self.related {
             let inner = gram * triangle;

@@ -18,27 +18,26 @@ use super::unknown_noise::with_unknown_noise;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
-/// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
+/// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements. It
+/// minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
+/// from several initial estimates: [`equation_error`] with several weights, and total least squares
+/// weighted by the dynamic stiffness of the round before. If they lead to different minima, the
+/// search is repeated from the best ones after a few steps in resampled data, and the best minimum
+/// is the result. To first order in the noise the estimate is unbiased and has the least scatter.
+/// The weights come from [`FrequencyData::noise`]:
 ///
-/// Minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
-/// from several starts: [`equation_error`] with several weights, and total least squares weighted
-/// by the dynamic stiffness found before. Where they do not lead to one minimum, the search is
-/// repeated from the best ones after a few steps in resampled data; the best is kept. Unbiased and
-/// of least scatter to first order in the noise. The weights come from [`FrequencyData::noise`]:
+/// - noise on displacement alone (exact force): the output-error estimator;
+/// - noise on force, too: errors in variables, with the true force eliminated row by row;
+/// - no noise stated: the noise of each channel is estimated from the residual, white in the
+///   measured quantity or with a smooth spectrum ([`Pooling::Automatic`]); the force is exact.
 ///
-/// - noise on displacement alone (force exact): the output-error estimator;
-/// - noise on force too: errors in variables, the true force being eliminated row by row;
-/// - no noise stated: the noise of each channel found from the residual, white in the quantity
-///   measured or of a smooth spectrum ([`Pooling::Automatic`]), the force exact.
-///
-/// Weights from few repeated periods are themselves uncertain; the covariance allows for that.
+/// Weights from few repeated periods are uncertain; the covariance allows for that.
 ///
 /// # Errors
-/// What [`equation_error`] refuses, [`EstimateError::Undetermined`] if the data leave a parameter
-/// open, [`EstimateError::SingularNoise`] if a stated noise covariance cannot be inverted,
+/// The errors of [`equation_error`], [`EstimateError::Undetermined`] if the data do not determine a
+/// parameter, [`EstimateError::SingularNoise`] if a stated noise covariance cannot be inverted,
 /// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if it comes from
-/// too few periods to weight with, and [`EstimateError::NotConverged`] if no start leads to a
-/// minimum.
+/// too few periods for a weight, and [`EstimateError::NotConverged`] if no search converges.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
@@ -50,15 +49,15 @@ pub fn output_error(
     search_near(data, unknowns, None, Pooling::Automatic)
 }
 
-/// [`output_error`] that also starts its search from a machine that is expected to be near, such as
-/// a finite element model.
+/// Estimates as [`output_error`], with a nominal system, such as a finite element model, as an
+/// additional initial estimate.
 ///
 /// # Errors
 /// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the
 /// machine has another number of degrees of freedom.
 ///
 /// # Source
-/// That of [`output_error`].
+/// As [`output_error`].
 pub fn output_error_near(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -70,7 +69,8 @@ pub fn output_error_near(
     search_near(data, unknowns, nominal, Pooling::Automatic)
 }
 
-/// [`output_error`] with a given way to find the noise from the residual where the data state none.
+/// Estimates as [`output_error`], with a given pooling of the residual for the noise spectrum if
+/// the data state no noise.
 ///
 /// # Errors
 /// As [`output_error`];
@@ -78,7 +78,7 @@ pub fn output_error_near(
 /// [`Pooling::PerLine`] where the data state no noise: the residual is one sample of each line.
 ///
 /// # Source
-/// That of [`output_error`].
+/// As [`output_error`].
 pub fn output_error_pooling(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -93,7 +93,7 @@ fn search_near(
     nominal: Option<&SecondOrderSystem>,
     residual: Pooling,
 ) -> Result<OutputErrorFit, EstimateError> {
-    // Refuses what no estimator can determine.
+    // Checks that the data determine every parameter.
     equation_error(data, unknowns)?.check_determined()?;
     match data.noise() {
         Some(noise) => with_known_noise(data, unknowns, noise, nominal),
@@ -111,7 +111,7 @@ fn with_known_noise(
     let mut misfit = Misfit::new(data, unknowns, noise)?;
     let starts = InitialEstimates::new(data, unknowns, noise).with_nominal(nominal);
     let spare = spare(data, unknowns) as f64;
-    // A sampled covariance makes the weights too large by ν/(ν − n) on average.
+    // With a sampled covariance the weights are on average too large by the factor ν/(ν − n).
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let best = search(&mut misfit, &starts, plausible)?;
@@ -130,8 +130,8 @@ fn with_known_noise(
 }
 
 /// Returns the residual of the displacement, rows × n, in units of the stated noise: independent
-/// numbers with E|r|² = 1 if the machine and the noise are as stated. Nothing if the noise is not
-/// stated, or some of it is none at all.
+/// numbers with E|r|² = 1 if the system and the noise are correct. `None` if no noise is stated, or
+/// if some noise is zero.
 pub fn in_units_of_noise(
     data: &FrequencyData,
     estimate: &Estimate,
@@ -141,8 +141,8 @@ pub fn in_units_of_noise(
         theta = relations.unknowns(theta.as_slice());
     }
     let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;
-    let all = theta.len() + transient::len(data);
-    misfit.try_at(&theta.resize_vertically(all, 0.0))?;
+    let len = theta.len() + transient::len(data);
+    misfit.try_at(&theta.resize_vertically(len, 0.0))?;
     misfit.accept();
     Some(misfit.white())
 }

@@ -1,4 +1,4 @@
-//! The result of maximum likelihood, made of the minimum that its search found.
+//! Result of maximum likelihood, from the minimum of its search.
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::gauss_newton::SumOfSquares;
@@ -18,50 +18,49 @@ use crate::limits::FIT_PLAUSIBLE;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
-/// An [`Estimate`] by maximum likelihood, with what its search tells.
+/// An [`Estimate`] by maximum likelihood, with the results of its search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputErrorFit {
-    /// M̂, Ĉ, K̂ with the covariance that the Fisher information gives.
+    /// M̂, Ĉ, K̂ with the covariance from the Fisher information.
     pub estimate: Estimate,
-    /// Weighted residual power over its expectation: 1 within a few √(2/degrees of freedom)
-    /// if the model is right and the noise is as stated; much more if the machine is not
-    /// what the model says (nonlinear, more degrees of freedom). 1 by construction where the
-    /// noise is estimated from the residual.
+    /// Ratio of the weighted residual power to its expectation: 1 within a few √(2/degrees of
+    /// freedom) if model and noise are correct; much more if the model is wrong (a nonlinearity,
+    /// missing degrees of freedom). It is 1 by definition if the noise is estimated from the
+    /// residual.
     pub misfit_ratio: f64,
-    /// Twice the negative logarithm of the likelihood, up to a constant and allowing for sampled
-    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits
-    /// of the same data differ by is a [`likelihood_ratio`].
+    /// Twice the negative log-likelihood, up to a constant and corrected for sampled weights, a
+    /// pure number; `None` if the noise is estimated from the residual. The difference between two
+    /// fits of the same data gives a [`likelihood_ratio`].
     ///
     /// [`likelihood_ratio`]: super::likelihood_ratio()
     pub deviance: Option<f64>,
-    /// Gauss–Newton steps from the best start to the minimum.
+    /// Number of Gauss–Newton steps from the best initial estimate to the minimum.
     pub steps: usize,
-    /// Number of searches, each from another start.
+    /// Number of searches, each from another initial estimate.
     pub searches: usize,
-    /// Number of searches that ended at this minimum; of two or more it is the global one as far as
-    /// searches can tell.
+    /// Number of searches that ended at this minimum; if two or more agree, it is probably the
+    /// global minimum.
     pub agreeing: usize,
-    /// Noise spectra by which it was weighted where they were estimated: one of each experiment
-    /// from its periods, or one from the residual; none where the noise is known beforehand.
+    /// Estimated noise spectra of the weights: one of each experiment from its periods, or one from
+    /// the residual; empty if the noise is known beforehand.
     pub noise: Vec<NoiseModel>,
-    /// Noise by which the lines were weighted: stated, or found from the residual up to its common
-    /// level.
+    /// Noise spectrum of the weights: stated, or estimated from the residual up to a common level.
     pub spectrum: NoiseSpectrum,
-    /// Loads of the ends of open records, `None` where all rows belong to periods.
+    /// Transient loads of open records, `None` if all rows belong to periods.
     pub ends: Option<EndLoads>,
-    /// Sinusoids of each open record that were found beside the response to the forces and taken
-    /// off it; none where the noise is stated.
+    /// Sinusoids that are not a response to the forces and are subtracted from each open record;
+    /// empty if the noise is stated.
     pub sinusoids: Vec<Vec<Sinusoid>>,
 }
 
-/// Loads of the ends of open records, as [`FrequencyData::of_open_record`] describes them.
+/// Transient loads of open records, as defined at [`FrequencyData::of_open_record`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLoads {
     tau: Vec<f64>,
-    /// τᵀ Cov(τ)⁻¹ τ: its χ² distribution has as many degrees of freedom as there are loads, if the
-    /// records are periods.
+    /// Statistic τᵀ Cov(τ)⁻¹ τ: for records of whole periods it is χ² distributed with one degree
+    /// of freedom per load.
     pub statistic: f64,
-    /// Power of the loads on the lines over that of the forces, a ratio.
+    /// Ratio of the power of the loads on the lines to the power of the forces.
     pub share: f64,
 }
 
@@ -72,20 +71,20 @@ impl EndLoads {
         self.tau.len()
     }
 
-    /// The unknown loads, in the order of [`TransientLoad`].
+    /// Estimated loads, in the order of [`TransientLoad`].
     pub(super) fn loads(&self) -> &[f64] {
         &self.tau
     }
 
-    /// Probability that periods show loads like these: the tail of the χ² distribution beyond the
-    /// statistic.
+    /// Returns the probability that records of whole periods give a larger statistic: the upper
+    /// tail of the χ² distribution.
     pub fn p_value(&self) -> f64 {
         let chi_squared = ChiSquared::new(self.tau.len() as f64);
         chi_squared.map_or(f64::NAN, |chi_squared| chi_squared.sf(self.statistic))
     }
 
-    /// The records that were fitted, each with its loads taken off the force (N): as if it were a
-    /// period.
+    /// Returns the fitted records, each with its transient loads subtracted from the force (N), as
+    /// if it were a period.
     ///
     /// # Errors
     /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
@@ -93,19 +92,20 @@ impl EndLoads {
         &self,
         records: &[FrequencyData],
     ) -> Result<Vec<FrequencyData>, EstimateError> {
-        let all = records.iter().map(transient::len).sum();
-        check_size("loads of open ends", all, self.tau.len())?;
-        let mut rest = &self.tau[..];
+        let len = records.iter().map(transient::len).sum();
+        check_size("loads of open ends", len, self.tau.len())?;
+        let mut loads = &self.tau[..];
         let closed = records.iter().map(|record| {
-            let (tau, others) = rest.split_at(transient::len(record));
-            rest = others;
+            let (tau, following) = loads.split_at(transient::len(record));
+            loads = following;
             record.without_transient(tau)
         });
         Ok(closed.collect())
     }
 
-    /// The records that were fitted, each as the response to its force alone: what the loads of its
-    /// ends make of `system` is taken off the displacement (m), where its receptance exists.
+    /// Returns the fitted records, each as the response to its force alone: the response of
+    /// `system` to the transient loads is subtracted from the displacement (m), where its
+    /// receptance exists.
     ///
     /// # Errors
     /// As [`EndLoads::taken_off`], and [`NumericsError::Size`] for another number of degrees of
@@ -116,14 +116,14 @@ impl EndLoads {
         system: &SecondOrderSystem,
     ) -> Result<Vec<FrequencyData>, EstimateError> {
         let closed = self.taken_off(records)?;
-        let each = records.iter().zip(&closed).map(|(record, closed)| {
+        let responses = records.iter().zip(&closed).map(|(record, closed)| {
             check_size("degrees of freedom", record.dof(), system.dof())?;
             Ok(record.without_response_to_transient(closed.force(), system))
         });
-        each.collect()
+        responses.collect()
     }
 
-    fn of(data: &FrequencyData, tau: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+    fn new(data: &FrequencyData, tau: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         if tau.is_empty() {
             return None;
         }
@@ -141,7 +141,8 @@ impl EndLoads {
     }
 }
 
-/// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
+/// Returns the plausible range of a sum of `spare` squares, weighted by a variance of `known`
+/// degrees of freedom.
 pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
     Plausible { expected, factor: 1.0 + FIT_PLAUSIBLE * spread }
@@ -149,13 +150,12 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
 
 /// Scale of the covariance relative to the inverse of the Fisher information.
 pub(super) struct Scale {
-    /// Power of the noise over that of the weights.
+    /// Ratio of the noise power to the power assumed by the weights.
     pub(super) level: f64,
-    /// Factor by which the covariance is larger for weights that are uncertain, where nothing
-    /// better is known.
+    /// Factor of the covariance for sampled weights, used without a [`WeightUncertainty`].
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
-    /// Matrix that lines which err together add to the inverse of the Fisher information.
+    /// Matrix that correlated errors of the lines add to the inverse of the Fisher information.
     pub(super) pulses: Option<DMatrix<f64>>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,
@@ -165,7 +165,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Returns the covariance of the independent unknowns, over the level of the noise, and its
+    /// Returns the covariance of the independent unknowns divided by the noise level, and its
     /// degrees of freedom, from the inverse of the Fisher information.
     fn covariance(&self, inverse: DMatrix<f64>) -> (DMatrix<f64>, usize) {
         let (covariance, degrees_of_freedom) = match &self.weights {
@@ -182,9 +182,9 @@ impl Scale {
     }
 }
 
-/// Returns the free entries of M, C and K and their covariance, from those of the independent
-/// unknowns.
-fn of_entries(
+/// Returns the free entries of M, C and K with their covariance, from the independent unknowns with
+/// theirs.
+fn entries_with_covariance(
     unknowns: &Unknowns,
     independent: &[f64],
     covariance: DMatrix<f64>,
@@ -211,10 +211,10 @@ pub(super) fn finish(
     let (independent, tau) = parts(data, &best.minimum.parameters);
     let count = independent.len();
     let of_ends = covariance.view((count, count), (tau.len(), tau.len()));
-    let ends = EndLoads::of(data, tau, of_ends * scale.level);
+    let ends = EndLoads::new(data, tau, of_ends * scale.level);
     let covariance = covariance.view((0, 0), (count, count)).into_owned();
     let (covariance, degrees_of_freedom) = scale.covariance(covariance);
-    let (entries, covariance) = of_entries(unknowns, independent, covariance);
+    let (entries, covariance) = entries_with_covariance(unknowns, independent, covariance);
     let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors
@@ -245,7 +245,7 @@ pub(super) fn finish(
     })
 }
 
-/// Finds the uncertainty of weights that were estimated, the loads of open ends taken as known.
+/// Returns the uncertainty of estimated weights; the transient loads count as known.
 pub(super) fn uncertain_weights(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -255,12 +255,12 @@ pub(super) fn uncertain_weights(
     let (independent, tau) = parts(data, theta);
     let entries = entries(unknowns, independent);
     match tau {
-        [] => WeightUncertainty::of(data, unknowns, &entries, noise),
-        _ => WeightUncertainty::of(&data.without_transient(tau), unknowns, &entries, noise),
+        [] => WeightUncertainty::new(data, unknowns, &entries, noise),
+        _ => WeightUncertainty::new(&data.without_transient(tau), unknowns, &entries, noise),
     }
 }
 
-/// The free entries of M, C and K.
+/// Returns the free entries of M, C and K from the independent unknowns.
 pub(super) fn entries(unknowns: &Unknowns, independent: &[f64]) -> DVector<f64> {
     match Relations::from_unknowns(unknowns) {
         None => DVector::from_column_slice(independent),
@@ -268,28 +268,29 @@ pub(super) fn entries(unknowns: &Unknowns, independent: &[f64]) -> DVector<f64> 
     }
 }
 
-/// The independent unknowns of M, C and K among the parameters of a search, and the loads of open
-/// ends.
+/// Splits the parameters of a search into the independent unknowns of M, C and K and the transient
+/// loads.
 pub(super) fn parts<'a>(data: &FrequencyData, theta: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
     theta.as_slice().split_at(theta.len() - transient::len(data))
 }
 
-/// Real equations less unknowns.
+/// Returns the number of real equations minus unknowns.
 pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
     let unknowns = unknowns.independent() + transient::len(data);
     (2 * data.dof() * data.len()).saturating_sub(unknowns)
 }
 
-/// Covariance over the inverse of the Fisher information computed with sampled weights.
+/// Returns the ratio of the covariance to the inverse of the Fisher information for sampled
+/// weights.
 ///
-/// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and
-/// true covariance S: E[W] = ν/(ν−n)·S⁻¹, E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹, so that the
-/// covariance of the estimate is E[WSW]/E[W]² times the best one, and ν²/((ν−n)²−1) times the
-/// one computed.
+/// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and the
+/// true covariance S, E[W] = ν/(ν−n)·S⁻¹ and E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹. The covariance of
+/// the estimate is therefore E[WSW]/E[W]² times the best one, and ν²/((ν−n)²−1) times the computed
+/// one.
 ///
 /// # Errors
-/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) where it does not
-/// exist.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if this
+/// covariance does not exist.
 pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
     if nu.is_infinite() {
         return Ok(1.0);

@@ -1,4 +1,4 @@
-//! Covariance by the noise of forces that act for a few samples only, whose lines err together.
+//! Covariance due to the noise of forces that act for a few samples only: it correlates all lines.
 
 use std::ops::Range;
 
@@ -11,15 +11,16 @@ use super::output_error_fit::{entries, parts};
 use crate::Unknowns;
 use crate::limits::MAX_SENSITIVITIES;
 
-/// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the
-/// lines to err one by one; `None` without such noise and for large fits.
+/// Returns the matrix that the noise of pulses adds to the inverse of the Fisher information, which
+/// assumes independent lines; `None` without such noise and for large fits.
 ///
-/// The estimate errs by (JᵀJ)⁻¹ Jᵀ r, with sensitivities J less what the loads of the ends explain,
-/// and the weighted response r to each sample of a pulse in turn.
+/// The error of the estimate is the sum of (JᵀJ)⁻¹ Jᵀ r over the samples of a pulse, where r is the
+/// weighted response to the noise of a sample and J are the sensitivities without their part that
+/// the transients explain.
 ///
 /// # Source
-/// White (1980), Econometrica 48, 817–838, for the covariance of a weighted fit whose errors have
-/// another one.
+/// White (1980), Econometrica 48, 817–838, for the covariance of a weighted fit with errors of
+/// another covariance.
 pub(super) fn excess(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -46,7 +47,7 @@ pub(super) fn excess(
     Some(&root * scatter(data, &responses, &q) * root.transpose())
 }
 
-/// Weighted responses to a force on each degree of freedom, 1 N on every line.
+/// Weighted responses to a force of 1 N on every line, one for each degree of freedom.
 pub(super) struct ForceResponses(Vec<DVector<f64>>);
 
 impl ForceResponses {
@@ -65,7 +66,7 @@ impl ForceResponses {
         (0..data.dof()).map(to_force).collect::<Option<_>>().map(Self)
     }
 
-    /// Returns the weighted response of some rows to a force of this amplitude on degree of freedom
+    /// Returns the weighted response of `rows` to a force of this amplitude on degree of freedom
     /// `dof`.
     fn to(
         &self,
@@ -88,8 +89,8 @@ impl ForceResponses {
     }
 }
 
-/// Returns the residuals of an open record and orthonormal columns that span what the loads of its
-/// transient explain of them.
+/// Returns the range of the residuals of an open record, and an orthonormal basis of the responses
+/// to its transient loads.
 pub(super) fn transient_basis(
     data: &FrequencyData,
     record: usize,
@@ -109,7 +110,8 @@ pub(super) fn transient_basis(
     Some((2 * n * rows.start..2 * n * rows.end, q))
 }
 
-/// Returns Q and R⁻¹ of the sensitivities J = Q R, `None` if J has dependent columns.
+/// Returns Q and R⁻¹ of the sensitivities J = Q R; `None` if the columns of J are linearly
+/// dependent.
 pub(super) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let lengths: Vec<f64> = sensitivity.column_iter().map(|column| column.norm()).collect();
     for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
@@ -124,8 +126,8 @@ pub(super) fn orthonormal(mut sensitivity: DMatrix<f64>) -> Option<(DMatrix<f64>
     Some((q, root))
 }
 
-/// Returns the covariance of Qᵀr by the noise of all pulses, less what independent lines would
-/// have.
+/// Returns the covariance of Qᵀr by the noise of all pulses, minus the covariance for independent
+/// lines.
 pub(super) fn scatter(
     data: &FrequencyData,
     responses: &ForceResponses,

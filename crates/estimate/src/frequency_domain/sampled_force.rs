@@ -27,7 +27,7 @@ impl<'a> SampledResponse<'a> {
         Some(Self { system, step, inverse_mass, dt, dof: system.dof() })
     }
 
-    /// Returns the response at the samples, in the quantity given, to a force (N) at ω (rad/s).
+    /// Returns the sampled response, in the given quantity, to a force (N) at ω (rad/s).
     fn at(
         &self,
         omega: f64,
@@ -55,9 +55,9 @@ impl<'a> SampledResponse<'a> {
     }
 }
 
-/// Returns the data with the band-limited force (N) that has the same response of `system`, at
-/// samples `dt` (s) apart, as the force of the data if that is held or linear between its samples.
-/// `None` for Euler's rule, and where a response does not exist.
+/// Returns the data with an equivalent band-limited force (N): `system` has the same response to
+/// it, at samples `dt` (s) apart, as to the force of the data held or linear between its samples.
+/// `None` for Euler's rule, and if a response does not exist.
 ///
 /// # Source
 /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (sampling of a

@@ -1,4 +1,4 @@
-//! Sums of squares whose search can be restarted.
+//! Sums of squares for a search with restarts.
 
 use mechid_numerics::cholesky::Cholesky;
 use mechid_numerics::gauss_newton::{Linearisation, SumOfSquares};
@@ -6,14 +6,14 @@ use nalgebra::DVector;
 
 use super::normal_equations::NormalEquations;
 
-/// Sum of squares of maximum likelihood, which has linear steps and can be resampled.
+/// Sum of squares of maximum likelihood that offers linear steps and random weights.
 pub(super) trait Restartable: SumOfSquares<Linearisation = NormalEquations> {
-    /// Returns the step to the least-squares solution of the equation of motion with the weights
-    /// that belong to the parameters last accepted.
+    /// Returns the step to the least-squares solution of the equation of motion with the weights of
+    /// the last accepted parameters.
     fn linear_step(&mut self) -> Option<DVector<f64>>;
 
-    /// Weighs every spectral line by a share drawn at random, of mean 1 and standard deviation √5,
-    /// or all of them alike. What was accepted before has to be tried again.
+    /// Gives every spectral line a random weight of mean 1 and standard deviation √5, or the weight
+    /// 1 without a seed. Parameters accepted before must be tried again.
     fn resample(&mut self, seed: Option<u64>);
 }
 
@@ -37,7 +37,7 @@ impl Linearisation for NormalEquations {
     }
 
     fn coordinates(&self, parameters: &DVector<f64>) -> DVector<f64> {
-        self.coordinates.of(parameters)
+        self.coordinates.transform(parameters)
     }
 
     fn parameters(&self, coordinates: &DVector<f64>) -> DVector<f64> {

@@ -8,7 +8,7 @@ use super::equation_error::{motions, real_rows};
 use crate::limits::INITIAL_ROUNDS;
 use crate::{EquationOfMotion, Estimate, Unknowns};
 
-/// Fit of −ω²M X + iD X + K X = F, in which D does not grow with the frequency.
+/// Fit of −ω²M X + iD X + K X = F, with a damping D that does not depend on the frequency.
 #[derive(Debug, Clone)]
 pub struct StructuralDamping {
     /// Loss factor: projection of D on K, a ratio.
@@ -17,9 +17,9 @@ pub struct StructuralDamping {
     pub displacement: DMatrix<Complex<f64>>,
 }
 
-/// Fits structural damping with the `unknowns` of an equation of motion, those of C being those of
-/// D in N/m, by least squares weighted by the receptance of the round before. `None` if an entry of
-/// C is known and not zero, or if the data leave an entry open.
+/// Fits structural damping with the `unknowns` of an equation of motion, where D (N/m) has the
+/// unknowns of C. The least squares are weighted by the receptance of the round before. `None` if a
+/// known entry of C is not zero, or if the data do not determine an entry.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.4 (structural damping); Sanathanan & Koerner
@@ -50,7 +50,7 @@ pub fn structural_damping(data: &FrequencyData, unknowns: &Unknowns) -> Option<S
     is_finite.then_some(StructuralDamping { loss_factor, displacement })
 }
 
-/// Least squares with a weight on each line.
+/// Solves the least squares with a weight on each line.
 fn solve(data: &FrequencyData, weight: &[f64], unknowns: &Unknowns) -> Option<Estimate> {
     if weight.iter().any(|weight| !weight.is_finite()) {
         return None;

@@ -1,4 +1,4 @@
-//! Maximum likelihood where the noise is known from the residual alone.
+//! Maximum likelihood with noise that is estimated from the residual.
 
 use std::borrow::Cow;
 
@@ -27,14 +27,14 @@ use crate::limits::{
 };
 use crate::{EstimateError, Unknowns};
 
-/// A fit and the noise by which it was weighted.
+/// A fit and the noise of its weights.
 struct Weighted {
     fit: GlobalMinimum,
     noise: NoiseSpectrum,
 }
 
-/// Noise of unknown level of each channel of the motion, white or of the spectrum that the residual
-/// shows, found in turn with the parameters; the forces have the noise that the data state of them.
+/// Estimates the parameters and, in alternation, the noise of each channel of the motion: white of
+/// unknown level, or with a spectrum from the residual. The noise of the forces is the stated one.
 pub(super) fn with_unknown_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -45,11 +45,12 @@ pub(super) fn with_unknown_noise(
         return Err(SpectraError::TooFewAverages { got: 1, needed: 2 }.into());
     }
     let (white, is_rounding) = with_white_noise(data, unknowns, nominal, None)?;
-    let mut beside = BesideSinusoids { data: Cow::Borrowed(data), sinusoids: Vec::new(), white };
+    let mut with_sinusoids =
+        FitWithSinusoids { data: Cow::Borrowed(data), sinusoids: Vec::new(), white };
     if !is_rounding {
-        beside.find(data, unknowns, nominal)?;
+        with_sinusoids.find(data, unknowns, nominal)?;
     }
-    let BesideSinusoids { data, sinusoids, white } = beside;
+    let FitWithSinusoids { data, sinusoids, white } = with_sinusoids;
     let data = data.as_ref();
     let coloured = match pooling {
         Pooling::AllLines => None,
@@ -64,9 +65,10 @@ pub(super) fn with_unknown_noise(
     let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let free = spare(data, unknowns).saturating_sub(of_sinusoids);
     let level = fit.minimum.cost / free.max(1) as f64;
-    let inflation = match is_white {
-        true => 1.0,
-        false => sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?,
+    let inflation = if is_white {
+        1.0
+    } else {
+        sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?
     };
     let scale = Scale {
         level,
@@ -82,16 +84,17 @@ pub(super) fn with_unknown_noise(
     Ok(OutputErrorFit { sinusoids, ..finish(data, unknowns, &mut misfit, &fit, scale)? })
 }
 
-/// A fit in white noise to what is left of open records without the sinusoids that stand out of its
-/// residual.
-struct BesideSinusoids<'a> {
+/// A fit in white noise to open records without the sinusoids that its residual shows.
+struct FitWithSinusoids<'a> {
+    /// Data without the sinusoids.
     data: Cow<'a, FrequencyData>,
     sinusoids: Vec<Vec<Sinusoid>>,
     white: Weighted,
 }
 
-impl<'a> BesideSinusoids<'a> {
-    /// Finds sinusoids in the open records of `data`, and fits what is left without them, in turn.
+impl<'a> FitWithSinusoids<'a> {
+    /// Alternates between the sinusoids in the open records of `data` and a fit to the data without
+    /// them.
     fn find(
         &mut self,
         data: &'a FrequencyData,
@@ -108,16 +111,16 @@ impl<'a> BesideSinusoids<'a> {
             let (independent, _) = parts(data, &self.white.fit.minimum.parameters);
             let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
             let system = SecondOrderSystem::new(m, c, k).ok();
-            let found = sinusoids::find(data, &residual, system.as_ref(), &self.sinusoids);
-            if found.iter().all(Vec::is_empty) && self.sinusoids.is_empty() {
+            let sinusoids = sinusoids::find(data, &residual, system.as_ref(), &self.sinusoids);
+            if sinusoids.iter().all(Vec::is_empty) && self.sinusoids.is_empty() {
                 break;
             }
-            let less = data.without_sinusoids(&found);
-            let change = (less.displacement() - self.data.displacement()).norm();
-            // The first of them can have led the search astray.
+            let reduced = data.without_sinusoids(&sinusoids);
+            let change = (reduced.displacement() - self.data.displacement()).norm();
+            // The first fit included the sinusoids and may have ended at a wrong minimum.
             let from = (round > 0).then(|| self.white.fit.clone());
-            self.white = with_white_noise(&less, unknowns, nominal, from)?.0;
-            (self.data, self.sinusoids) = (Cow::Owned(less), found);
+            self.white = with_white_noise(&reduced, unknowns, nominal, from)?.0;
+            (self.data, self.sinusoids) = (Cow::Owned(reduced), sinusoids);
             if change <= SINUSOID_TOLERANCE * residual.norm() {
                 break;
             }
@@ -126,8 +129,9 @@ impl<'a> BesideSinusoids<'a> {
     }
 }
 
-/// White noise of unknown level per channel, and whether the residual is only rounding; searched
-/// near a minimum `from` of nearly the same data, or from all starts.
+/// Fits with white noise of unknown level per channel, and returns whether the residual is only
+/// rounding. The search begins at a minimum `from` of nearly the same data, or at all initial
+/// estimates.
 fn with_white_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -150,12 +154,12 @@ fn with_white_noise(
             Some(before) => before.followed(&mut misfit)?,
         };
         let sizes = levels_of(data, &misfit);
-        // With an exact force only the ratios between the channels weigh; the common level is the
-        // residual's.
+        // With an exact force only the ratios between the channels matter: the residual gives the
+        // common level.
         let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
-        // Rounding has no level that could settle.
+        // The level of rounding errors does not converge.
         let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= RESIDUAL_ROUNDING * x);
         if settled || exact || (known_force && data.dof() == 1) {
             drop(misfit);
@@ -170,7 +174,8 @@ fn with_white_noise(
     Err(EstimateError::NotConverged { searches, steps })
 }
 
-/// Fits weighted by the spectrum of the residual of the one before; `None` where that is white.
+/// Fits with the spectrum of the residual of the fit before as noise; `None` if the residual is
+/// white.
 fn with_coloured_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -187,16 +192,16 @@ fn with_coloured_noise(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         match before.fit.clone().followed(&mut misfit) {
             Ok(fit) => last = Some(Weighted { fit, noise }),
-            // The fit before stands, with its own weights.
+            // The fit before is the result, with its weights.
             Err(_) => break,
         }
     }
     Ok(last)
 }
 
-/// The noise that a residual shows, of each channel by itself, or of unmeasured forces: at each
-/// line as much more than that of the round before as the residual is more than its noise. What the
-/// noise of the force accounts for is not counted twice.
+/// Estimates the noise spectrum from the residual, separately for each channel or for unmeasured
+/// forces. At each line the noise of the round before is scaled by the ratio of the residual power
+/// to its expected value; the part due to the stated noise of the force is subtracted.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -213,12 +218,14 @@ fn spectrum_of_residual(
         let scale = data.measured().per_displacement(*omega).norm_sqr();
         let mut covariance = DMatrix::zeros(2 * n, 2 * n);
         for channel in 0..n {
-            let own = before.noise.covariance(row)[(channel, channel)].re;
-            let share = own / (own + by_force[(row, channel)]);
-            // No residual at all would take all the weight.
-            let power = scale * (share * errors[(row, channel)].norm_sqr()).max(NOISE_LEAST * own);
-            let kept = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(NOISE_KEPT));
-            covariance[(channel, channel)] = Complex::from(power / kept);
+            let variance = before.noise.covariance(row)[(channel, channel)].re;
+            let share = variance / (variance + by_force[(row, channel)]);
+            let squared_error = share * errors[(row, channel)].norm_sqr();
+            // A line without residual would have an unbounded weight.
+            let power = scale * squared_error.max(NOISE_LEAST * variance);
+            let residual_share =
+                leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(NOISE_KEPT));
+            covariance[(channel, channel)] = Complex::from(power / residual_share);
         }
         covariance
     });
@@ -232,8 +239,8 @@ fn spectrum_of_residual(
     Ok(noise.with_force_variance(data.force_variance()))
 }
 
-/// Share of the noise at each row and channel that the parameters take up, rows × n; `None` of
-/// large fits, where it is small.
+/// Returns the leverage of each row and channel, the share of its noise that the parameters fit,
+/// rows × n; `None` for large fits, where it is small.
 fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
     let (n, rows) = (data.dof(), data.len());
     if 2 * n * rows * unknowns.free().len() > MAX_LEVERAGES {
@@ -257,7 +264,7 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
     }))
 }
 
-/// Root mean square of displacement amplitudes, per channel, in the quantity measured.
+/// Returns the root mean square of displacement amplitudes, per channel, in the measured quantity.
 fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Vec<f64> {
     let power = |column: usize| {
         let terms = amplitudes
@@ -270,8 +277,8 @@ fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Ve
     (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
 }
 
-/// White noise of the levels that the residual of a fit with the parameters `theta` shows, one for
-/// each channel.
+/// Returns white noise with the level of each channel estimated from the residual at the parameters
+/// `theta`.
 pub(super) fn white_noise_at(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -284,17 +291,19 @@ pub(super) fn white_noise_at(
     white_noise(data, &levels_of(data, &misfit))
 }
 
-/// Standard deviation of the noise of each channel, in the quantity measured.
+/// Estimates the standard deviation of the noise of each channel, in the measured quantity.
 fn levels_of(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
-    match data.force_variance().iter().all(|variance| *variance == 0.0) {
-        true => measured_size(data, &misfit.errors()),
-        false => levels_beside_force(data, misfit),
+    let exact_force = data.force_variance().iter().all(|variance| *variance == 0.0);
+    if exact_force {
+        measured_size(data, &misfit.errors())
+    } else {
+        levels_with_force_noise(data, misfit)
     }
 }
 
-/// Standard deviation of the noise of each channel, in the quantity measured, beside which that of
-/// the forces makes the residual most likely.
-fn levels_beside_force(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
+/// Estimates the standard deviation of the noise of each channel, in the measured quantity, by
+/// maximum likelihood with the stated noise of the forces.
+fn levels_with_force_noise(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
     let (errors, by_force) = (misfit.errors(), misfit.variance_by_force());
     let level = |channel: usize| {
         let scale = |row: usize| data.measured().per_displacement(data.omega()[row]).norm_sqr();
@@ -305,7 +314,8 @@ fn levels_beside_force(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
     (0..data.dof()).map(level).collect()
 }
 
-/// White noise of the given levels of the quantity measured beside that of the forces.
+/// Returns white noise with the given levels of the measured quantity, and the stated noise of the
+/// forces.
 fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, EstimateError> {
     let n = data.dof();
     let covariance = data.omega().iter().map(|w| {

@@ -1,5 +1,4 @@
-//! Uncertainty of an estimate that follows from that of the smooth noise spectrum by which it is
-//! weighted.
+//! Uncertainty of an estimate due to the estimated noise spectrum of its weights.
 
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{DMatrix, DVector};
@@ -8,26 +7,27 @@ use super::Whitened;
 use crate::Unknowns;
 use crate::limits::MAX_LEVERAGES;
 
-/// Correction of the covariance of an estimate, and how well that covariance itself is known.
+/// Correction of the covariance of an estimate, and the degrees of freedom of this covariance.
 pub(super) struct WeightUncertainty {
-    /// Added to the inverse of the Fisher information.
+    /// Matrix to add to the inverse of the Fisher information.
     pub(super) excess: DMatrix<f64>,
-    /// Degrees of freedom of the variance of the parameter that has the fewest.
+    /// Fewest degrees of freedom of the variance of a parameter.
     pub(super) degrees_of_freedom: f64,
 }
 
 impl WeightUncertainty {
-    /// Judges an estimate at the entries `values`, weighted by `noise`; `None` where the noise is
-    /// no smooth spectrum or the fit is a large one.
+    /// Computes the correction for an estimate at the entries `values`, weighted by `noise`; `None`
+    /// if the noise is not a smooth spectrum, or for large fits.
     ///
-    /// With log powers B β of unit information times ν, orthonormal sensitivities Q and P_i = Σ
-    /// b_li Q_lᵀQ_l, the estimate scatters more by Λ = (Σ h_l Q_lᵀQ_l − Σ P_i P_i)/ν, and the
-    /// inverse of the Fisher information is too small by as much.
+    /// The log powers are B β, where β has ν times the unit information. With orthonormal
+    /// sensitivities Q and P_i = Σ b_li Q_lᵀQ_l, the covariance of the estimate grows by Λ = (Σ h_l
+    /// Q_lᵀQ_l − Σ P_i P_i)/ν, and the inverse of the Fisher information is too small by the same
+    /// matrix.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),
     /// Biometrics Bulletin 2, 110–114.
-    pub(super) fn of(
+    pub(super) fn new(
         data: &FrequencyData,
         unknowns: &Unknowns,
         values: &DVector<f64>,
@@ -73,8 +73,8 @@ impl WeightUncertainty {
             }
             first += part.basis.nrows();
         }
-        let each = root.row_iter().zip(spread.iter());
-        let freedom = each.map(|(c, spread)| 2.0 * c.norm_squared().powi(2) / spread);
+        let variances = root.row_iter().zip(spread.iter());
+        let freedom = variances.map(|(c, spread)| 2.0 * c.norm_squared().powi(2) / spread);
         Some(Self {
             excess: &root * excess * root.transpose() * 2.0,
             degrees_of_freedom: freedom.fold(f64::INFINITY, f64::min),

@@ -9,27 +9,28 @@ use crate::relations::Relations;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// Residual of a machine on spectra, with its sensitivity to the free parameters, both weighted by
-/// the covariance L Lᴴ of the residual that follows from the noise on displacement and force.
+/// Residual of a system on spectra, with its sensitivity to the free parameters, both weighted by
+/// the covariance L Lᴴ of the residual from the noise on displacement and force.
 ///
 /// Real and imaginary parts are separate: row 2(n·line + channel) is the real part of a line and
-/// channel, the next one its imaginary part.
+/// channel, the next row its imaginary part.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
 /// maximum likelihood in errors-in-variables.
 pub struct Whitened {
-    /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
-    /// One entry for each real and imaginary part of each line and channel.
+    /// Residual √2·L⁻¹(X − G F): independent numbers of unit variance for the true system and
+    /// noise. One entry for each real and imaginary part of each line and channel.
     pub residual: DVector<f64>,
-    /// Derivative of −`residual` with respect to the free parameters, the independent ones where
-    /// they are related, at the most likely force. Residuals × parameters, in inverse SI units.
+    /// Derivative of −`residual` with respect to the free parameters (the independent ones if they
+    /// are related) at the most likely force. Residuals × parameters, in inverse SI units.
     pub sensitivity: DMatrix<f64>,
 }
 
 impl Whitened {
-    /// `covariance` is that of displacement and force (2n×2n) at each row of the data. `None` if
-    /// the covariance of a residual is singular, or if there is no receptance at a line.
+    /// Computes residual and sensitivity; `covariance` returns the covariance of displacement and
+    /// force (2n×2n) at each row of the data. `None` if the covariance of a residual is singular,
+    /// or if the receptance does not exist at a line.
     pub fn new(
         data: &FrequencyData,
         unknowns: &Unknowns,
@@ -45,7 +46,8 @@ impl Whitened {
         Some(whitened)
     }
 
-    /// The same without any sensitivity, which takes residuals × parameters numbers.
+    /// Computes the residual without its sensitivity, which needs memory for residuals × parameters
+    /// numbers.
     pub fn residual_of(
         data: &FrequencyData,
         unknowns: &Unknowns,
@@ -68,7 +70,7 @@ impl Whitened {
         let mut residual = DVector::zeros(2 * n * data.len());
         let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());
         for (row, &omega) in data.omega().iter().enumerate() {
-            let mut line = Line::of(&system, data, row, &covariance(row))?;
+            let mut line = Line::new(&system, data, row, &covariance(row))?;
             let at = 2 * n * row..2 * n * (row + 1);
             write_real(&line.residual, &mut residual.as_mut_slice()[at.clone()]);
             if parameters.is_empty() {
@@ -85,20 +87,20 @@ impl Whitened {
     }
 }
 
-/// One line.
+/// Weighted residual and receptance of one line.
 struct Line {
-    /// L.
+    /// Lower triangular factor L of the covariance.
     lower: ComplexMatrix,
-    /// L⁻¹(X − G F).
+    /// Weighted residual L⁻¹(X − G F).
     residual: DVector<Complex<f64>>,
-    /// G and, once it is whitened, L⁻¹G.
+    /// Receptance G or, after whitening, L⁻¹G.
     receptance: ComplexMatrix,
-    /// G F̂ with the force F̂ that, within its noise, agrees best with the displacement.
+    /// Displacement G F̂ under the most likely force F̂, given its noise and the displacement.
     likely_displacement: DVector<Complex<f64>>,
 }
 
 impl Line {
-    fn of(
+    fn new(
         system: &SecondOrderSystem,
         data: &FrequencyData,
         row: usize,
@@ -110,7 +112,7 @@ impl Line {
         let force = data.force().row(row).transpose();
         let modelled = &receptance * &force;
         let mut residual = data.displacement().row(row).transpose() - &modelled;
-        // A force without noise is its own most likely one.
+        // An exact force is the most likely one.
         let is_exact = covariance.columns(n, n).iter().all(|entry| *entry == Complex::ZERO);
         if is_exact {
             let lower = cholesky(block(0, 0).into_owned())?;
@@ -133,7 +135,8 @@ impl Line {
         self.lower.solve_lower_triangular_mut(&mut self.receptance).then_some(())
     }
 
-    /// Derivative of −L⁻¹(X − G F̂): −L⁻¹G E_ij X̂ (iω)^p.
+    /// Returns the derivative −L⁻¹G E_ij X̂ (iω)^p of −L⁻¹(X − G F̂) with respect to an entry (i,
+    /// j).
     fn derivative(&self, parameter: &Parameter, omega: f64) -> DVector<Complex<f64>> {
         let power = -Complex::new(0.0, omega).powu(2 - parameter.matrix() as u32);
         let factor = power * self.likely_displacement[parameter.column()];
@@ -141,9 +144,9 @@ impl Line {
     }
 }
 
-/// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
+/// Returns L of a Hermitian positive definite matrix L Lᴴ, `None` for any other matrix.
 fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
-    // nalgebra takes complex roots of negative pivots.
+    // nalgebra does not reject negative pivots but computes their complex roots.
     let lower = matrix.cholesky()?.unpack();
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
     lower.diagonal().iter().all(positive).then_some(lower)

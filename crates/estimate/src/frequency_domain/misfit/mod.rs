@@ -1,4 +1,4 @@
-//! Measured against modelled displacement, in units of the noise.
+//! Difference of measured and modelled displacement, in units of the noise.
 
 mod row;
 #[cfg(test)]
@@ -22,23 +22,23 @@ type ComplexVector = DVector<Complex<f64>>;
 
 /// Covariance of the noise of each row.
 enum Noise<'a> {
-    /// The force is exact; L of the displacement's covariance L Lᴴ.
+    /// Exact force; the factor L of the covariance L Lᴴ of the displacement.
     Output(Vec<ComplexMatrix>),
-    /// Force and displacement are noisy.
+    /// Noisy force and displacement.
     Both(&'a NoiseSpectrum),
 }
 
-/// e = X − G(ω) F for every row, G = (K + iωC − ω²M)⁻¹, divided by its own standard
-/// deviation: √2·L⁻¹e with L Lᴴ = E[e eᴴ], real and imaginary parts apart, has unit variance
-/// and no correlation.
+/// Sum of squares of the weighted errors e = X − G(ω) F of every row, with G = (K + iωC − ω²M)⁻¹:
+/// the real and imaginary parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no
+/// correlation.
 ///
-/// With a noisy force the covariance [I −G] E[z zᴴ] [I −G]ᴴ depends on the parameters;
-/// its sum of squares is what is left of the likelihood once the true force and
-/// displacement of each row have been eliminated.
+/// With a noisy force the covariance [I −G] E[z zᴴ] [I −G]ᴴ depends on the parameters; the sum of
+/// squares is the likelihood after the true force and displacement of each row have been
+/// eliminated.
 ///
-/// The Jacobian of row l is W_l E_ij X̂_l s^p with W = L⁻¹G, a Kronecker product. X̂ is the
-/// displacement under the most likely force F̂: because F̂ minimises, the gradient Jᵀr is that of
-/// the sum of squares, and JᵀJ is the Fisher information.
+/// The Jacobian of row l is the Kronecker product W_l E_ij X̂_l s^p with W = L⁻¹G. X̂ is the
+/// displacement under the most likely force F̂. Because F̂ is a minimum, Jᵀr is the gradient of the
+/// sum of squares, and JᵀJ is the Fisher information.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the
@@ -49,34 +49,37 @@ pub(super) struct Misfit<'a> {
     relations: Option<Relations>,
     layout: Layout,
     noise: Noise<'a>,
-    /// n × rows, so that the forces of one row are contiguous; less the load of the ends of open
-    /// records at the parameters last tried.
+    /// Forces, n × rows so that the forces of one row are contiguous, minus the transient loads of
+    /// the last trial parameters.
     force: ComplexMatrix,
     displacement: ComplexMatrix,
-    /// Independent unknowns last accepted, and those last tried.
+    /// Independent unknowns last accepted.
     at: DVector<f64>,
+    /// Independent unknowns of the last trial.
     tried_at: DVector<f64>,
-    /// All rows at the parameters last accepted, and at those last tried.
+    /// All rows at the parameters last accepted.
     rows: Vec<Row>,
+    /// All rows at the parameters of the last trial.
     tried: Vec<Row>,
-    /// The regressors X̂ s^p at the parameters last accepted, orthonormal.
+    /// Orthonormal regressors X̂ s^p at the parameters last accepted.
     regressors: DMatrix<f64>,
-    /// Weight of each row; 1 but in a search's restarts.
+    /// Weight of each row; 1 except in the restarts of a search.
     shares: Vec<f64>,
 }
 
 impl<'a> Misfit<'a> {
     /// # Errors
-    /// [`EstimateError::SingularNoise`] where the force is exact and a displacement has no noise at
-    /// all, or two of them the same.
+    /// [`EstimateError::SingularNoise`] if the force is exact and a displacement has no noise, or
+    /// two displacements have the same noise.
     pub(super) fn new(
         data: &'a FrequencyData,
         unknowns: &'a Unknowns,
         noise: &'a NoiseSpectrum,
     ) -> Result<Self, EstimateError> {
-        let noise = match noise.has_force() {
-            true => Noise::Both(noise),
-            false => Noise::Output(output_weights(noise)?),
+        let noise = if noise.has_force() {
+            Noise::Both(noise)
+        } else {
+            Noise::Output(output_weights(noise)?)
         };
         let rows = vec![Row::new(data.dof()); data.len()];
         Ok(Self {
@@ -96,7 +99,7 @@ impl<'a> Misfit<'a> {
         })
     }
 
-    /// X − G F, rows × n, at the parameters last accepted.
+    /// Returns X − G F, rows × n, at the parameters last accepted.
     pub(super) fn errors(&self) -> ComplexMatrix {
         let mut errors = self.displacement.clone();
         for (mut error, row) in errors.column_iter_mut().zip(&self.rows) {
@@ -105,9 +108,8 @@ impl<'a> Misfit<'a> {
         errors.transpose()
     }
 
-    /// Variance that the noise of the forces, where that of the displacement is not known, makes of
-    /// the displacement, rows × n, in m²: the diagonal of G S_FF Gᴴ at the parameters last
-    /// accepted.
+    /// Returns the variance of the displacement due to the stated noise of the forces, rows × n, in
+    /// m²: the diagonal of G S_FF Gᴴ at the parameters last accepted.
     pub(super) fn variance_by_force(&self) -> DMatrix<f64> {
         let of_force = self.data.force_variance();
         DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
@@ -116,30 +118,30 @@ impl<'a> Misfit<'a> {
         })
     }
 
-    /// Σ |G|² of each channel over the forces, rows × n, in (m/N)²: the power that its displacement
-    /// has where all forces have the same, at the parameters last accepted.
+    /// Returns Σ |G|² of each channel over the forces, rows × n, in (m/N)², at the parameters last
+    /// accepted: the power of the displacement under independent forces of equal power.
     pub(super) fn gain(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
             self.rows[row].receptance().row(channel).iter().map(|g| g.norm_sqr()).sum()
         })
     }
 
-    /// L⁻¹(X − G F), rows × n, at the parameters last accepted.
+    /// Returns L⁻¹(X − G F), rows × n, at the parameters last accepted.
     pub(super) fn white(&self) -> ComplexMatrix {
         let rows: Vec<_> = self.rows.iter().map(|row| row.white().transpose()).collect();
         DMatrix::from_rows(&rows)
     }
 
-    /// Derivative of entries and loads of ends with respect to the independent unknowns last
-    /// accepted, where the entries are related.
+    /// Returns the derivative of entries and transient loads with respect to the independent
+    /// unknowns last accepted, for related entries.
     fn tangent(&self) -> Option<DMatrix<f64>> {
         let relations = self.relations.as_ref()?;
         let ends = transient::len(self.data);
         let tangent = relations.tangent(self.at.rows(0, self.at.len() - ends).as_slice());
         let (entries, unknowns) = tangent.shape();
-        let mut all = tangent.resize(entries + ends, unknowns + ends, 0.0);
-        all.view_mut((entries, unknowns), (ends, ends)).fill_with_identity();
-        Some(all)
+        let mut extended = tangent.resize(entries + ends, unknowns + ends, 0.0);
+        extended.view_mut((entries, unknowns), (ends, ends)).fill_with_identity();
+        Some(extended)
     }
 
     fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
@@ -174,8 +176,8 @@ impl<'a> Misfit<'a> {
         cost.is_finite().then_some(cost)
     }
 
-    /// The regressors φ of a displacement, given by row and channel, the weights WᴴW and the
-    /// weighted residuals Wᴴr.
+    /// Returns the regressors φ of a displacement, given by row and channel, the weights WᴴW and
+    /// the weighted residuals Wᴴr.
     fn factors(&self, displacement: impl Fn(usize, usize) -> Complex<f64>) -> Factors {
         let (lines, n) = (self.rows.len(), self.data.dof());
         let columns = self.layout.columns();
@@ -196,8 +198,8 @@ impl<'a> Misfit<'a> {
             for j in 0..n {
                 for i in 0..=j {
                     let z = white.column(i).dotc(&white.column(j));
-                    for (place, im) in [(i + n * j, z.im), (j + n * i, -z.im)] {
-                        (weights[(at, place)], weights[(lines + at, place)]) = (z.re, im);
+                    for (column, im) in [(i + n * j, z.im), (j + n * i, -z.im)] {
+                        (weights[(at, column)], weights[(lines + at, column)]) = (z.re, im);
                     }
                 }
             }
@@ -206,7 +208,7 @@ impl<'a> Misfit<'a> {
         Factors { regressors, weights, residuals }
     }
 
-    /// Wᴴy of one row.
+    /// Writes Wᴴy of one row.
     fn write_weighted(&self, at: usize, y: &ComplexVector, to: &mut DMatrix<f64>) {
         let white = self.rows[at].white_receptance();
         for (i, column) in white.column_iter().enumerate() {
@@ -236,8 +238,9 @@ impl SumOfSquares for Misfit<'_> {
         equations
     }
 
-    /// r″ = −2 W dD G dD X̂ along dD, the change of the dynamic stiffness; that of the spread, with
-    /// a noisy force, is left out, and that of proportional damping, whose entries are products.
+    /// Returns Jᵀr″ with r″ = −2 W dD G dD X̂ along the change dD of the dynamic stiffness. It
+    /// neglects the curvature of the weights of a noisy force, and of the entries of proportional
+    /// damping.
     fn curvature(
         &self,
         linearisation: &NormalEquations,
@@ -268,7 +271,7 @@ impl SumOfSquares for Misfit<'_> {
 
 impl Restartable for Misfit<'_> {
     /// Returns the step to the minimum of |W (D X − F)|² for fixed W: the Gauss–Newton equations
-    /// with the measured X in place of X̂.
+    /// with the measured X instead of X̂.
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
         let NormalEquations { gram, gradient, coordinates } =
@@ -291,15 +294,15 @@ impl Restartable for Misfit<'_> {
     }
 }
 
-/// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
+/// Returns L of a Hermitian positive definite matrix L Lᴴ, `None` for any other matrix.
 fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
-    // nalgebra takes complex roots of negative pivots, so they have to be looked for.
+    // nalgebra does not reject negative pivots but computes their complex roots.
     let lower = matrix.cholesky()?.unpack();
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
     lower.diagonal().iter().all(positive).then_some(lower)
 }
 
-/// L of the displacement part of every covariance.
+/// Returns the factor L of the displacement part of every covariance.
 fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateError> {
     let n = noise.dof();
     noise

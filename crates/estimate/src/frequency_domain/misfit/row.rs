@@ -1,4 +1,4 @@
-//! One spectral line at one set of parameters, in buffers that are reused.
+//! One spectral line at one set of parameters, in reusable buffers.
 
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 
@@ -7,17 +7,17 @@ use super::{ComplexMatrix, ComplexVector, cholesky};
 /// One row of the data at one set of parameters.
 #[derive(Clone)]
 pub(super) struct Row {
-    /// K + iωC − ω²M, eliminated.
+    /// Dynamic stiffness K + iωC − ω²M, overwritten by its elimination.
     dynamic: ComplexMatrix,
-    /// G = (K + iωC − ω²M)⁻¹.
+    /// Receptance G = (K + iωC − ω²M)⁻¹.
     receptance: ComplexMatrix,
-    /// G F.
+    /// Modelled displacement G F.
     displacement: ComplexVector,
-    /// G F̂ with the most likely force F̂; of an exact force G F.
+    /// Displacement G F̂ under the most likely force F̂; G F for an exact force.
     likely: ComplexVector,
-    /// L⁻¹ G.
+    /// Weighted receptance L⁻¹ G.
     white_receptance: ComplexMatrix,
-    /// L⁻¹ e.
+    /// Weighted error L⁻¹ e.
     white: ComplexVector,
 }
 
@@ -38,7 +38,7 @@ impl Row {
         &self.displacement
     }
 
-    /// Displacement under the force that, within its noise, agrees best with what was measured.
+    /// Displacement under the most likely force, given its noise and the measured displacement.
     pub(super) fn likely_displacement(&self) -> &ComplexVector {
         &self.likely
     }
@@ -51,7 +51,7 @@ impl Row {
         &self.white_receptance
     }
 
-    /// Scales L⁻¹, as if the noise were smaller.
+    /// Scales L⁻¹, which gives the row another weight.
     pub(super) fn scale(&mut self, by: f64) {
         self.white.scale_mut(by);
         self.white_receptance.scale_mut(by);
@@ -61,7 +61,7 @@ impl Row {
         &self.white
     }
 
-    /// G and G F; `false` if G does not exist.
+    /// Computes G and G F; returns `false` if G does not exist.
     pub(super) fn model(
         &mut self,
         [m, c, k]: &[DMatrix<f64>; 3],
@@ -81,7 +81,7 @@ impl Row {
         self.displacement.iter().all(|z| z.is_finite())
     }
 
-    /// L⁻¹e and L⁻¹G for a given L; `false` if L cannot be inverted.
+    /// Computes L⁻¹e and L⁻¹G for a given L; returns `false` if L is singular.
     pub(super) fn whiten(
         &mut self,
         measured: DVectorView<'_, Complex<f64>>,
@@ -94,8 +94,8 @@ impl Row {
             && lower.solve_lower_triangular_mut(&mut self.white_receptance)
     }
 
-    /// Whitens as [`Row::whiten`] does, with L from the covariance of displacements and forces, and
-    /// the most likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
+    /// Whitens like [`Row::whiten`], with L from the covariance of displacements and forces, and
+    /// computes the most likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
     pub(super) fn whiten_both(
         &mut self,
         measured: DVectorView<'_, Complex<f64>>,
@@ -118,10 +118,11 @@ impl Row {
     }
 }
 
-/// B ← A⁻¹B by elimination with row exchanges; A is used up. `false` for a singular A.
+/// Replaces B by A⁻¹B by elimination with row exchanges and overwrites A; returns `false` for a
+/// singular A.
 ///
-/// The same operations as a library's LU, without its allocation: this runs once per line
-/// and step, and the matrices are tiny.
+/// The operations are those of an LU decomposition in a library, but without allocation: this runs
+/// once per line and step, and the matrices are tiny.
 fn solve_in_place(a: &mut ComplexMatrix, b: &mut ComplexMatrix) -> bool {
     let n = a.nrows();
     for j in 0..n {
@@ -153,7 +154,7 @@ fn solve_in_place(a: &mut ComplexMatrix, b: &mut ComplexMatrix) -> bool {
     true
 }
 
-/// y ← y − x·factor.
+/// Replaces y by y − x·factor.
 fn subtract(y: &mut [Complex<f64>], x: &[Complex<f64>], factor: Complex<f64>) {
     for (y, x) in y.iter_mut().zip(x) {
         *y -= x * factor;

@@ -72,7 +72,9 @@ fn residuals(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> DVector<f64> {
 /// dv/dθ, a column for every unknown.
 fn transformation(coordinates: &Coordinates, unknowns: usize) -> DMatrix<f64> {
     let unit = |at| DVector::from_fn(unknowns, |i, _| f64::from(u8::from(i == at)));
-    DMatrix::from_columns(&(0..unknowns).map(|at| coordinates.of(&unit(at))).collect::<Vec<_>>())
+    DMatrix::from_columns(
+        &(0..unknowns).map(|at| coordinates.transform(&unit(at))).collect::<Vec<_>>(),
+    )
 }
 
 #[test]
@@ -137,7 +139,7 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
         assert!((condition / expected - 1.0).abs() < 1e-6, "{condition} {expected}");
 
         // There and back.
-        let back = equations.coordinates.unknowns(&equations.coordinates.of(&theta));
+        let back = equations.coordinates.unknowns(&equations.coordinates.transform(&theta));
         assert!((back - &theta).norm() < 1e-12 * theta.norm());
     }
 }

@@ -1,4 +1,4 @@
-//! Test that the parts of the data say the same about the parameters.
+//! Test whether the parts of the data agree about the parameters.
 
 use mechid_model::Parameter;
 use mechid_numerics::linear_algebra::hermitian_eigen;
@@ -16,14 +16,15 @@ use crate::limits::PART_INFORMS;
 pub struct PartsComparison {
     /// Number of parts.
     pub parts: usize,
-    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by that alone.
+    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by
+    /// noise alone.
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
     /// Probability that noise alone makes the parts differ as much.
     pub p_value: f64,
-    /// Factor by which the scatter of the parts makes standard errors larger than those of the noise, for the parameter
-    /// about which they disagree most or, where that is more, for all together.
+    /// Ratio of standard errors from the scatter of the parts to those from the noise: the larger
+    /// of the ratio for the parameter with the largest disagreement and the ratio for all together.
     pub error_scale: f64,
     /// The largest difference of a part from the others in units of its standard error.
     pub largest: Option<Difference>,
@@ -36,9 +37,9 @@ pub struct Difference {
     pub part: Part,
     /// The parameter.
     pub parameter: Parameter,
-    /// Value by the part, in the unit of the parameter.
+    /// Value from the part, in the unit of the parameter.
     pub by_part: f64,
-    /// Value by the others, in the unit of the parameter.
+    /// Value from the others, in the unit of the parameter.
     pub by_others: f64,
     /// Standard error of the difference, in the unit of the parameter.
     pub standard_error: f64,
@@ -55,7 +56,7 @@ struct Scores {
 
 impl Scores {
     /// Returns the scores of a part.
-    fn of(&self, part: usize) -> DVector<f64> {
+    fn of_part(&self, part: usize) -> DVector<f64> {
         self.scores.rows(part * self.count, self.count).into_owned()
     }
 
@@ -67,15 +68,16 @@ impl Scores {
 }
 
 impl PartsOfFit<'_> {
-    /// Compares what the parts of a split say about the parameters; `None` where there are fewer than two parts or too
-    /// few residuals to know the noise by.
+    /// Compares the parameters that the parts of a split determine; `None` with fewer than two
+    /// parts or too few residuals for an estimate of the noise.
     ///
-    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d degrees of freedom and
-    /// those of the level of the noise.
+    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's F distribution with
+    /// d degrees of freedom and the degrees of freedom of the noise level.
     ///
     /// # Source
-    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40, 207–227, for the
-    /// factor; Liang & Zeger (1986), Biometrika 73, 13–22, for that of one parameter (scatter of the scores of parts).
+    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40,
+    /// 207–227, for the factor; Liang & Zeger (1986), Biometrika 73, 13–22, for that of one
+    /// parameter (scatter of the scores of parts).
     pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
         let cuts = Cuts::new(self, split)?;
         let scores = self.scores(&cuts);
@@ -107,29 +109,30 @@ impl PartsOfFit<'_> {
 
     fn scores(&self, cuts: &Cuts) -> Scores {
         let count = self.linear.basis.ncols();
-        let parts = cuts.of(self.data, &self.linear.basis);
+        let parts = cuts.columns(self.data, &self.linear.basis);
         let parts: Vec<DMatrix<f64>> =
             parts.into_iter().map(|part| self.linear.unexplained(part)).collect();
-        let mut all = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
+        let mut columns = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
         for (at, part) in parts.iter().enumerate() {
-            all.columns_mut(at * count, count).copy_from(part);
+            columns.columns_mut(at * count, count).copy_from(part);
         }
         let mut covariance = match self.responses {
-            Some(records) => covariance_of_errors(records, self.data.dof(), &all).0,
-            None => all.tr_mul(&all),
+            Some(records) => covariance_of_errors(records, self.data.dof(), &columns).0,
+            None => columns.tr_mul(&columns),
         };
         if let Some(responses) = &self.linear.responses {
-            covariance += scatter(self.data, responses, &all);
+            covariance += scatter(self.data, responses, &columns);
         }
-        Scores { scores: all.tr_mul(&self.linear.residual), covariance, count }
+        Scores { scores: columns.tr_mul(&self.linear.residual), covariance, count }
     }
 
-    /// Returns the largest factor by which the scatter of the scores makes the standard error of a parameter larger.
+    /// Returns the largest factor by which the scatter of the scores makes the standard error of a
+    /// parameter larger.
     fn largest_scatter(&self, scores: &Scores, level: f64) -> Option<f64> {
         let parts = scores.scores.len() / scores.count;
         let of_row = |row: usize| {
             let root = self.linear.root.row(row).transpose();
-            let square = |part: usize| root.dot(&scores.of(part)).powi(2);
+            let square = |part: usize| root.dot(&scores.of_part(part)).powi(2);
             let expected = |part: usize| root.dot(&(scores.covariance_of(part) * &root));
             let (squares, expected) = (
                 (0..parts).map(square).sum::<f64>(),
@@ -140,30 +143,31 @@ impl PartsOfFit<'_> {
         (0..self.linear.root.nrows()).filter_map(of_row).max_by(f64::total_cmp)
     }
 
-    /// Returns the difference of one part from the others that is largest in units of its standard error.
+    /// Returns the difference of one part from the others that is largest in units of its standard
+    /// error.
     fn largest_difference(&self, cuts: &Cuts, scores: &Scores, level: f64) -> Option<Difference> {
-        let own = cuts.of(self.data, &self.linear.basis);
+        let parts = cuts.columns(self.data, &self.linear.basis);
         let of_part = |(at, part): (usize, Part)| {
             let (inverse, _) = pseudo_inverse(&scores.covariance_of(at))?;
-            let difference = &inverse * scores.of(at);
-            let of_others = -self.linear.basis.tr_mul(&(&own[at] * &difference));
+            let difference = &inverse * scores.of_part(at);
+            let of_others = -self.linear.basis.tr_mul(&(&parts[at] * &difference));
             let one = |row: usize| {
                 let root = self.linear.root.row(row).transpose();
                 let variance = level * root.dot(&(&inverse * &root));
-                let others = self.values[row] + root.dot(&of_others);
+                let by_others = self.values[row] + root.dot(&of_others);
                 Difference {
                     part,
                     parameter: self.parameters[row],
-                    by_part: others + root.dot(&difference),
-                    by_others: others,
+                    by_part: by_others + root.dot(&difference),
+                    by_others,
                     standard_error: variance.max(0.0).sqrt(),
                 }
             };
-            let all = (0..self.linear.root.nrows()).map(one);
-            all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+            let differences = (0..self.linear.root.nrows()).map(one);
+            differences.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
         };
-        let all = cuts.parts().enumerate().filter_map(of_part);
-        all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+        let differences = cuts.parts().enumerate().filter_map(of_part);
+        differences.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
     }
 }
 
@@ -175,7 +179,7 @@ impl Difference {
     }
 }
 
-/// Returns the inverse of a covariance on the directions that it has, and their number.
+/// Returns the pseudo-inverse of a covariance, and its rank.
 fn pseudo_inverse(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
     let eigen = hermitian_eigen(covariance.clone()).ok()?;
     let least = PART_INFORMS * eigen.eigenvalues.max();

@@ -11,23 +11,24 @@ use crate::frequency_domain::pulse_covariance::{ForceResponses, orthonormal, tra
 
 /// Weighted residual and sensitivities at some values of the parameters.
 pub(super) struct Linearised {
-    /// e, without what the transients explain.
+    /// Residual e without the part that the transients explain.
     pub(super) residual: DVector<f64>,
-    /// Orthonormal columns Q that the parameters explain, without what the transients explain.
+    /// Orthonormal basis Q of the sensitivities without the part that the transients explain.
     pub(super) basis: DMatrix<f64>,
-    /// Change of every parameter by one of each column, parameters × columns.
+    /// Change of every parameter per unit of each basis column, parameters × columns.
     pub(super) root: DMatrix<f64>,
-    /// Residuals of each open record, and orthonormal columns that its transient explains of them.
+    /// Range of the residuals of each open record, and an orthonormal basis of its transient.
     pub(super) transients: Vec<(Range<usize>, DMatrix<f64>)>,
-    /// Responses to unit forces, where the noise of forces acts for some samples only.
+    /// Responses to unit forces, if the noise of forces acts for some samples only.
     pub(super) responses: Option<ForceResponses>,
-    /// Qᵀe.
+    /// Coefficients Qᵀe.
     coefficients: DVector<f64>,
 }
 
 impl Linearised {
-    /// Linearises open records, given as they are and without the loads of their ends. `None` where a receptance does
-    /// not exist, a covariance is singular, or the sensitivities are dependent.
+    /// Linearises a fit of `data`, also given without its transients (`closed`). `None` if a
+    /// receptance does not exist, a covariance is singular, or the sensitivities are linearly
+    /// dependent.
     pub(super) fn new(
         [data, closed]: [&FrequencyData; 2],
         unknowns: &Unknowns,
@@ -37,9 +38,10 @@ impl Linearised {
         let covariance = |row: usize| noise.covariance(row).clone();
         let Whitened { mut residual, mut sensitivity } =
             Whitened::new(closed, unknowns, entries, covariance)?;
-        let responses = match data.transient().ncols() > 0 {
-            true => Some(ForceResponses::new(data, unknowns, entries, noise)?),
-            false => None,
+        let responses = if data.transient().ncols() > 0 {
+            Some(ForceResponses::new(data, unknowns, entries, noise)?)
+        } else {
+            None
         };
         let mut transients = Vec::new();
         if let Some(responses) = &responses {
@@ -62,29 +64,30 @@ impl Linearised {
         self.residual.norm_squared()
     }
 
-    /// Length of the step to the most likely parameters, in standard errors by the size of the residual.
+    /// Length of the step to the most likely parameters, in standard errors from the residual.
     pub(super) fn step_in_errors(&self) -> f64 {
         let unit = self.cost() / self.residual.len() as f64;
         (self.coefficients.norm_squared() / unit).sqrt()
     }
 
-    /// Gauss–Newton step of the parameters.
+    /// Returns the Gauss–Newton step of the parameters.
     pub(super) fn step(&self) -> DVector<f64> {
         &self.root * &self.coefficients
     }
 
-    /// Removes what the parameters still explain of the residual.
+    /// Removes the part of the residual that the parameters still explain.
     pub(super) fn finish_step(&mut self) {
         self.residual -= &self.basis * &self.coefficients;
         self.coefficients.fill(0.0);
     }
 
-    /// Passes from independent unknowns to the entries that follow from them, with this derivative.
+    /// Changes from independent unknowns to the entries, whose derivative is `tangent`.
     pub(super) fn relate(&mut self, tangent: &DMatrix<f64>) {
         self.root = tangent * &self.root;
     }
 
-    /// Returns D_p Q of a part without what the parameters and the transients explain of all data together.
+    /// Returns D_p Q of a part without the components that the parameters and the transients of all
+    /// data explain.
     pub(super) fn unexplained(&self, mut part: DMatrix<f64>) -> DMatrix<f64> {
         let explained = self.basis.tr_mul(&part);
         part -= &self.basis * explained;
@@ -92,14 +95,14 @@ impl Linearised {
         part
     }
 
-    /// Number of residuals that neither the parameters nor the transients take up.
+    /// Number of residuals minus the number of parameters and transient loads.
     pub(super) fn free(&self) -> f64 {
         let transients: usize = self.transients.iter().map(|(_, columns)| columns.ncols()).sum();
         self.residual.len() as f64 - (self.basis.ncols() + transients) as f64
     }
 }
 
-/// Removes what the transients explain from columns over all residuals.
+/// Removes the components that the transients explain from columns over all residuals.
 fn remove(transients: &[(Range<usize>, DMatrix<f64>)], columns: &mut DMatrix<f64>) {
     for (rows, transient) in transients {
         let mut part = columns.rows_mut(rows.start, rows.len());

@@ -1,4 +1,4 @@
-//! Comparison of what the parts of the data say about the parameters, without fitting them one by one.
+//! Comparison of the parameters from parts of the data, without a fit to each part.
 
 mod comparison;
 mod linearised;
@@ -21,31 +21,33 @@ use linearised::Linearised;
 pub use comparison::{Difference, PartsComparison};
 pub use split::{Part, Split};
 
-/// A fit at its optimum, linearised, of which parts can be compared.
+/// A fit, linearised at its minimum, for a comparison of parts of its data.
 ///
-/// The residual e and its sensitivities Q, orthonormal, are weighted by the noise, and what the transients of open
-/// records explain is removed from both. A part p, cut out by D_p with Σ D_p = I, moves the estimate by Qᵀ D_p e: these
-/// scores have the sum zero and, if the parts differ by noise alone, the covariance of (I − QQᵀ) D_p Q.
+/// The residual e and its orthonormal sensitivities Q are weighted by the noise, without the
+/// components that the transients of open records explain. D_p selects part p, with Σ D_p = I; the
+/// part contributes the score Qᵀ D_p e to the estimate. The scores have the sum zero and, if the
+/// parts differ by noise alone, the covariance of (I − QQᵀ) D_p Q.
 pub struct PartsOfFit<'a> {
     data: &'a FrequencyData,
     parameters: Vec<Parameter>,
     /// Most likely values, in the order of the parameters.
     values: DVector<f64>,
-    /// At those values.
+    /// Linearisation at these values.
     linear: Linearised,
-    /// Averaged responses, whose errors the window ties together from line to line, if the data are such.
+    /// Averaged responses, with correlated errors of neighbouring lines, if the data come from
+    /// them.
     responses: Option<&'a [(Frf, Vec<usize>)]>,
-    /// Variance of a score over that of the noise stated, by weights that are sampled.
+    /// Ratio of the variance of a score to its value for exact weights, due to sampled weights.
     inflation: f64,
-    /// Degrees of freedom of the level of the noise; `None` where only the residual shows it.
+    /// Degrees of freedom of the noise level; `None` if it is estimated from the residual.
     known: Option<f64>,
 }
 
 impl<'a> PartsOfFit<'a> {
-    /// Linearises a fit of `data`, with the loads of the `ends` of its open records, at the most likely parameters near
-    /// the `estimate`. The noise is that which the data state; otherwise it has the form of `spectrum`, or is white, and
-    /// the residual shows its level. `None` for large fits, for data without any noise, and where the sensitivities are
-    /// dependent.
+    /// Linearises a fit of `data`, with the transient loads `ends` of its open records, at the most
+    /// likely parameters near the `estimate`. The noise is the one that the data state; otherwise
+    /// it has the shape of `spectrum`, or is white, with a level from the residual. `None` for
+    /// large fits, for data without noise, and for linearly dependent sensitivities.
     pub fn new(
         data: &'a FrequencyData,
         estimate: &Estimate,
@@ -103,9 +105,10 @@ impl<'a> PartsOfFit<'a> {
             data,
         })
     }
-    /// The same of a fit of averaged responses, each with the degrees of freedom of its forces, counted from 0; `data`
-    /// are those of all of them. `None` as for [`PartsOfFit::new`], and where the errors of the lines are not known.
-    pub fn of_responses(
+    /// Linearises a fit of averaged responses, each with the degrees of freedom of its forces,
+    /// counted from 0; `data` has all of them. `None` as for [`PartsOfFit::new`], and if the error
+    /// covariance of a response is unknown.
+    pub fn from_responses(
         data: &'a FrequencyData,
         records: &'a [(Frf, Vec<usize>)],
         estimate: &Estimate,

@@ -1,4 +1,4 @@
-//! Parts of the data: records, bands of lines, stretches of time.
+//! Parts of the data: records, bands of lines, intervals of time.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -13,18 +13,19 @@ use crate::limits::PARTS;
 /// A way to split the data into parts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Split {
-    /// Rows of each part, such as those of each record; rows of no part are one more.
+    /// Rows of each part, such as the rows of each record; the remaining rows form
+    /// an additional part.
     Rows(Vec<Vec<Range<usize>>>),
-    /// Bands of lines of all records, each with as much information about the parameters.
+    /// Bands of lines of all records, each with the same information about the parameters.
     Bands,
-    /// Stretches of time of an open record, equally long.
+    /// Equally long intervals of time of an open record.
     Time,
 }
 
 /// One part of a split.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Part {
-    /// Rows, by their index among those given.
+    /// Rows, by the index of the part in [`Split::Rows`].
     Rows {
         /// Index, counted from 0.
         index: usize,
@@ -45,13 +46,13 @@ pub enum Part {
     },
 }
 
-/// D_p of a part.
+/// Selection D_p of a part.
 enum Cut {
     Rows(Vec<Range<usize>>),
     Time(Range<usize>),
 }
 
-/// D_p Q of every part, named.
+/// Selections D_p of every part, with their names.
 pub(super) struct Cuts(Vec<(Part, Cut)>);
 
 impl Cuts {
@@ -84,7 +85,11 @@ impl Cuts {
     }
 
     /// Returns D_p Q of every part.
-    pub(super) fn of(&self, data: &FrequencyData, columns: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+    pub(super) fn columns(
+        &self,
+        data: &FrequencyData,
+        columns: &DMatrix<f64>,
+    ) -> Vec<DMatrix<f64>> {
         let n = data.dof();
         let cut = |(_, cut): &(Part, Cut)| match cut {
             Cut::Rows(ranges) => {
@@ -104,18 +109,18 @@ impl Cuts {
     }
 }
 
-/// Bands of lines with the same information: sums of the leverages of their residuals.
+/// Returns bands of lines with the same information, the sum of the leverages of their residuals.
 fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
     let (omega, n) = (fit.data.omega(), fit.data.dof());
     let mut rows: Vec<usize> = (0..omega.len()).collect();
     rows.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
     let leverage = |row: usize| fit.linear.basis.rows(2 * n * row, 2 * n).norm_squared();
-    let all = fit.linear.basis.norm_squared();
+    let total = fit.linear.basis.norm_squared();
     let mut bands: Vec<Vec<usize>> = vec![Vec::new()];
     let (mut sum, mut last) = (0.0, f64::NAN);
     for row in rows {
         // Rows of one frequency stay together.
-        let is_next = sum >= all * bands.len() as f64 / PARTS as f64 && bands.len() < PARTS;
+        let is_next = sum >= total * bands.len() as f64 / PARTS as f64 && bands.len() < PARTS;
         if is_next && omega[row] > last {
             bands.push(Vec::new());
         }
@@ -130,8 +135,8 @@ fn bands(fit: &PartsOfFit<'_>) -> Vec<(Part, Cut)> {
     bands.into_iter().filter(|rows| !rows.is_empty()).map(band).collect()
 }
 
-/// Returns what columns over the lines of a record are of these samples alone: back to samples, all others set to zero,
-/// and to the lines again.
+/// Restricts columns over the lines of a record to some of its samples: transforms them to the time
+/// domain, sets all other samples to zero, and transforms them back.
 fn stretch(
     data: &FrequencyData,
     columns: &DMatrix<f64>,
@@ -147,11 +152,12 @@ fn stretch(
     for (column, mut to) in columns.column_iter().zip(part.column_iter_mut()) {
         for channel in 0..n {
             spectrum.fill(Complex::ZERO);
-            let place = |row: usize| 2 * (n * row + channel);
+            let index = |row: usize| 2 * (n * row + channel);
             for (row, line) in lines.iter().enumerate() {
-                spectrum[*line] = Complex::new(column[place(row)], column[place(row) + 1]);
+                spectrum[*line] = Complex::new(column[index(row)], column[index(row) + 1]);
             }
-            // The lengths are those of the plans, and no line is zero or the last.
+            // The transform cannot fail: the lengths match the plan, and there is no line at DC or
+            // Nyquist.
             if inverse.process(&mut spectrum, &mut time).is_err() {
                 return part;
             }
@@ -162,7 +168,7 @@ fn stretch(
                 return part;
             }
             for (row, line) in lines.iter().enumerate() {
-                (to[place(row)], to[place(row) + 1]) = (spectrum[*line].re, spectrum[*line].im);
+                (to[index(row)], to[index(row) + 1]) = (spectrum[*line].re, spectrum[*line].im);
             }
         }
     }
