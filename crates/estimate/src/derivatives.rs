@@ -6,9 +6,9 @@
 //! | Function | Assumes | Costs |
 //! |---|---|---|
 //! | [`spectral_from_displacement`] | the record is whole periods | none; exact up to Nyquist |
-//! | [`spectral_from_acceleration`] | the same, and no interest in the mean | the static displacement |
-//! | [`SavitzkyGolay::motion`] | smooth over a window | the ends of the record, and the highest frequencies |
-//! | [`SavitzkyGolay::twice_differentiated`] | the same, of force and acceleration | as above, and noise four orders up |
+//! | [`spectral_from_acceleration`] | the same, and no interest in the mean | static displacement |
+//! | [`SavitzkyGolay::motion`] | smooth over a window | ends and highest frequencies |
+//! | [`SavitzkyGolay::twice_differentiated`] | same, with the force | same, and noise times ω² |
 
 use mechid_model::Response;
 use mechid_signal::{Record, SignalError, Spectrum};
@@ -134,7 +134,7 @@ impl SavitzkyGolay {
         let mut data = DMatrix::zeros(len, record.channels());
         for k in 0..len {
             let start = k.saturating_sub(half).min(len - window);
-            // Near the ends each sample has a kernel of its own, computed when it is needed.
+            // Near the ends each sample has another kernel, computed when it is needed.
             let end = (k - start != half).then(|| self.kernel(k - start, times, scale));
             let kernel = end.as_ref().unwrap_or(&centre);
             for channel in 0..record.channels() {

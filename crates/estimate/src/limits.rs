@@ -19,7 +19,7 @@ pub(crate) const STEPS_RESAMPLED: usize = 15;
 /// Largest relative difference of the sums of squares of two searches that count as one minimum.
 pub(crate) const RESTART_SAME: f64 = 1e-6;
 
-/// Sum of squares, in units of the noise or the response, below which it is rounding.
+/// Largest sum of squares, in units of the noise or the response, that counts as rounding.
 pub(crate) const RESTART_EXACT: f64 = 1e-16;
 
 /// Relative difference of the sums of squares of two initial estimates below which the second one
@@ -74,7 +74,7 @@ pub(crate) const MAX_SENSITIVITIES: usize = 1 << 22;
 /// Relative change of the noise levels that ends the rounds of weighting.
 pub(crate) const WEIGHT_TOLERANCE: f64 = 1e-3;
 
-/// Ratio of residual to motion below which the residual is rounding.
+/// Largest ratio of residual to motion that counts as rounding.
 pub(crate) const RESIDUAL_ROUNDING: f64 = 1e-12;
 
 /// Maximum number of rounds of weighting by noise levels; three nearly always suffice.
@@ -127,7 +127,7 @@ pub(crate) const RELATED_STEPS: usize = 100;
 /// Relative change of the unknowns that ends this search.
 pub(crate) const RELATED_SETTLED: f64 = 1e-12;
 
-/// Ratio of residual to force of an equation below which the residual is rounding.
+/// Largest ratio of residual to force of an equation that counts as rounding.
 pub(crate) const EQUATION_ROUNDING: f64 = 1e-11;
 
 /// Minimum number of rows per equation for a correlation between equations; with fewer rows their

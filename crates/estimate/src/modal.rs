@@ -75,7 +75,8 @@ impl Estimate {
     ///         force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w);
     ///     Complex::new((x.re * 1e6).round() * 1e-6, (x.im * 1e6).round() * 1e-6)
     /// });
-    /// let data = FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)?;
+    /// let quantity = ResponseQuantity::Displacement;
+    /// let data = FrequencyData::from_amplitudes(omega, force, displacement, quantity)?;
     /// let modes = equation_error(&data, &Unknowns::unknown_mass(1)?)?.modes()?;
     /// let [low, high] = modes[0].damping_ratio.interval(0.95)?;
     /// assert!(low < 0.4025 && 0.4025 < high && high - low < 0.01);
@@ -267,7 +268,7 @@ struct Value {
 }
 
 /// Returns the modulus (rad/s) and the damping ratio of a mode from the `sum` and the product
-/// (`square`) of its eigenvalue and the partner; `gradient` is that of the eigenvalue.
+/// (`square`) of its eigenvalue and the partner; `gradient` belongs to the eigenvalue.
 fn modulus_and_damping(
     mode: &Mode,
     gradient: &DVector<Complex<f64>>,
@@ -281,8 +282,8 @@ fn modulus_and_damping(
         let of_ratio = sum.gradient.zip_map(&of_modulus, |s, g| (-0.5 * s - ratio * g) / modulus);
         [Value { value: modulus, gradient: of_modulus }, Value { value: ratio, gradient: of_ratio }]
     } else {
-        // Real eigenvalues of opposite sign do not form an oscillator. The modulus is that of the
-        // eigenvalue, and its damping ratio is ±1 for any matrices.
+        // Real eigenvalues of opposite sign do not form an oscillator: the damping ratio of each is
+        // ±1 for any matrices.
         let sign = mode.eigenvalue().re.signum();
         let of_ratio = DVector::zeros(gradient.len());
         [

@@ -229,7 +229,7 @@ impl Relations {
         }
         let [[mm, mk, mc], [_, kk, kc], _] = products;
         let determinant = mm * kk - mk * mk;
-        // If αM and βK are indistinguishable, the damping is attributed to the stiffness.
+        // The damping is attributed to the stiffness if αM and βK are indistinguishable.
         if determinant > 1e-12 * mm * kk {
             [(kk * mc - mk * kc) / determinant, (mm * kc - mk * mc) / determinant]
         } else if kk > 0.0 {

@@ -31,7 +31,8 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 ///     let w = omega[row];
 ///     force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w)
 /// });
-/// let data = FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)?;
+/// let quantity = ResponseQuantity::Displacement;
+/// let data = FrequencyData::from_amplitudes(omega, force, displacement, quantity)?;
 /// let estimate = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
 /// assert!((estimate.stiffness()[(0, 0)] - 5000.0).abs() < 1e-9);
 /// # Ok::<(), mechid_estimate::EstimateError>(())

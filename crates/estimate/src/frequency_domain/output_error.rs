@@ -111,7 +111,7 @@ fn with_known_noise(
     let mut misfit = Misfit::new(data, unknowns, noise)?;
     let starts = InitialEstimates::new(data, unknowns, noise).with_nominal(nominal);
     let spare = spare(data, unknowns) as f64;
-    // With a sampled covariance the weights are on average too large by the factor ν/(ν − n).
+    // Weights from a sampled covariance are on average too large by the factor ν/(ν − n).
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let best = search(&mut misfit, &starts, plausible)?;

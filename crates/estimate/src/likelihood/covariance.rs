@@ -1,4 +1,4 @@
-//! Information of data and priors, the covariance of the parameters, and what is not determined.
+//! Information of data and priors, covariance of the parameters, and undetermined combinations.
 
 use mechid_numerics::linear_algebra::svd;
 use nalgebra::{DMatrix, DVector};
@@ -9,30 +9,30 @@ use super::residual::Residual;
 use super::response_model::ResponseModel;
 use super::search::Minimum;
 
-/// Singular values and directions of the derivative of the residual, in parameters of unit columns.
+/// Singular value decomposition of the Jacobian of the residual, with columns of unit length.
 #[derive(Debug, Clone)]
 pub(super) struct Information {
-    /// Parameters that no bound holds.
+    /// Indices of the parameters that are not at a bound.
     pub(super) free: Vec<usize>,
     /// Lengths of their columns.
     pub(super) scale: DVector<f64>,
-    /// Right singular vectors, free × free, of falling singular values.
+    /// Right singular vectors, free × free, by falling singular values.
     pub(super) directions: DMatrix<f64>,
     pub(super) singular_values: DVector<f64>,
     /// Number of directions that the data and the priors determine.
     pub(super) rank: usize,
-    /// Covariance of all parameters; 0 for those that a bound holds.
+    /// Covariance of all parameters; 0 for parameters at a bound.
     pub(super) covariance: DMatrix<f64>,
-    /// Whether each parameter is determined.
+    /// Flag of each parameter that is determined.
     pub(super) is_determined: Vec<bool>,
 }
 
-/// Part of a direction that a parameter has at least to take part in it.
+/// Minimum component of a parameter in a direction that depends on it.
 const PART: f64 = 1e-6;
 
 impl Information {
-    /// Decomposes the derivative at a minimum; `inflation` is the covariance over the inverse
-    /// information.
+    /// Decomposes the Jacobian at a minimum; `inflation` is the ratio of the covariance to the
+    /// inverse information.
     pub(super) fn new<M: ResponseModel>(
         residual: &Residual<'_, M>,
         minimum: &Minimum,
@@ -73,7 +73,7 @@ impl Information {
         Ok(Self { free, scale, directions, singular_values, rank, covariance, is_determined })
     }
 
-    /// Standard error of a parameter; `None` of one that is not determined.
+    /// Standard error of a parameter; `None` if it is not determined.
     pub(super) fn standard_error(&self, at: usize) -> Option<f64> {
         self.is_determined[at].then(|| self.covariance[(at, at)].max(0.0).sqrt())
     }
@@ -86,8 +86,8 @@ impl Information {
         }
     }
 
-    /// Groups of parameters that only combinations of are determined: parameters, and the gradients
-    /// of the combinations, each with the coefficient of its largest part 1.
+    /// Returns groups of parameters that are determined only in combinations: the parameters, and
+    /// the gradients of the combinations, each scaled to a largest coefficient of 1.
     pub(super) fn combinations(&self) -> Vec<(Vec<usize>, Vec<Vec<f64>>)> {
         let null = self.directions.columns_range(self.rank..);
         let takes_part = |at: usize, column: usize| null[(at, column)].abs() > PART;
@@ -109,7 +109,7 @@ impl Information {
         groups.into_iter().map(|group| self.combinations_of(&group)).collect()
     }
 
-    /// Combinations of one group that are orthogonal to what is not determined.
+    /// Returns the combinations of one group that are orthogonal to the undetermined directions.
     fn combinations_of(&self, group: &[usize]) -> (Vec<usize>, Vec<Vec<f64>>) {
         let null = self.directions.columns_range(self.rank..).select_rows(group);
         let projector = DMatrix::identity(group.len(), group.len()) - &null * null.transpose();

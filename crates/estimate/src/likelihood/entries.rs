@@ -1,5 +1,5 @@
-//! Free entries of M, C and K as the parameters of a model, with sensors and forces at any degree
-//! of freedom.
+//! Free entries of M, C and K as parameters of a model, with sensors and forces at any degree of
+//! freedom.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use super::search::Bounds;
 use super::{LikelihoodError, Settings};
 use crate::Unknowns;
 
-/// Degrees of freedom, counted from 0, where responses are measured and forces act.
+/// Degrees of freedom, counted from 0, with sensors and forces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channels {
     /// Degree of freedom and quantity of each output.
@@ -26,19 +26,19 @@ pub struct Channels {
     pub forces: Vec<usize>,
 }
 
-/// Identifies the free entries of M, C and K, or the fewer unknowns behind related ones, from
+/// Identifies the free entries of M, C and K (the independent unknowns of related entries) from
 /// sensors and forces at some of the degrees of freedom. The search starts at the system `near`.
 ///
-/// The parameters have the names of their entries (`m11`, `k12`; of symmetric ones the upper), and
-/// `alpha` and `beta` of proportional damping.
+/// The parameters have the names of their entries (`m11`, `k12`; the upper one of symmetric
+/// entries); those of proportional damping are `alpha` and `beta`.
 ///
 /// # Errors
 /// [`LikelihoodError::Size`] if `near` has another number of degrees of freedom than `unknowns`,
-/// [`LikelihoodError::Machine`] for a channel at a degree of freedom that does not exist, and what
-/// else keeps the data from leading to an estimate.
+/// [`LikelihoodError::Machine`] for a channel at a degree of freedom that does not exist, and the
+/// other errors of a fit.
 ///
 /// # Source
-/// That of [`identify_machine`](super::machine::identify_machine).
+/// As [`identify_machine`](super::machine::identify_machine).
 pub fn identify_entries(
     data: &LineData,
     unknowns: &Unknowns,
@@ -65,7 +65,7 @@ pub fn identify_entries(
     Ok(LikelihoodEstimate::new(&fit, &names, settings.confidence))
 }
 
-/// Unknowns by the entry that they are; related entries share one.
+/// Parameters of the entries; related entries share one.
 struct Entries<'a> {
     unknowns: &'a Unknowns,
     near: &'a SecondOrderSystem,
@@ -73,7 +73,7 @@ struct Entries<'a> {
     parameters: Vec<MachineParameter>,
 }
 
-/// An entry of M or K that proportional damping repeats, or an entry of its own.
+/// Value or parameter of an entry.
 enum Entry {
     Known(f64),
     Unknown(usize),
@@ -90,9 +90,10 @@ impl Entries<'_> {
         if let Some(value) = self.unknowns.fixed(matrix, row, column) {
             return Entry::Known(value);
         }
-        let (row, column) = match self.unknowns.is_symmetric(matrix) {
-            true => (row.min(column), row.max(column)),
-            false => (row, column),
+        let (row, column) = if self.unknowns.is_symmetric(matrix) {
+            (row.min(column), row.max(column))
+        } else {
+            (row, column)
         };
         let key = (matrix as usize, row, column);
         if let Some(at) = self.index.get(&key) {
@@ -118,13 +119,13 @@ fn assembly(
     let mut terms = Vec::new();
     let mut add =
         |row: usize, column: usize, power: Power, entry: &Entry, factor: Option<usize>| {
-            let (scale, own) = match entry {
+            let (scale, parameter) = match entry {
                 Entry::Known(value) => (*value, None),
                 Entry::Unknown(at) => (1.0, Some(*at)),
             };
             if scale != 0.0 {
                 let pattern = Pattern::Dyad { left: vec![(row, 1.0)], right: vec![(column, 1.0)] };
-                let parameters = factor.into_iter().chain(own).collect();
+                let parameters = factor.into_iter().chain(parameter).collect();
                 terms.push(Term { pattern, power, scale, parameters });
             }
         };
@@ -163,7 +164,7 @@ fn assembly(
     Ok(Assembly::from_terms(names, terms, entries.parameters, sensors, inputs)?)
 }
 
-/// α and β of the least squares of C − αM − βK over all entries.
+/// Returns α and β of the least-squares fit C ≈ αM + βK over all entries.
 fn nearest_damping(near: &SecondOrderSystem) -> [f64; 2] {
     let [m, c, k] = [near.mass(), near.damping(), near.stiffness()];
     let [mm, mk, kk] = [m.dot(m), m.dot(k), k.dot(k)];

@@ -8,20 +8,20 @@ use mechid_signal::message;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LikelihoodError {
-    /// The description of the machine does not make sense.
+    /// The description of the machine is not consistent.
     #[error(transparent)]
     Machine(#[from] MachineError),
-    /// Two things that belong together have different sizes.
+    /// Sizes of data, model or settings do not match.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// Things that were counted.
+        /// Name of the quantity with the wrong size.
         what: &'static str,
         /// Number expected.
         expected: usize,
         /// Number found.
         got: usize,
     },
-    /// A choice is out of range.
+    /// A setting is out of range.
     #[error("`{name}` must be {requirement}, got {}", message::number(*value))]
     Setting {
         /// Name of the setting.
@@ -34,25 +34,26 @@ pub enum LikelihoodError {
     /// Every coefficient is known.
     #[error("every coefficient is known: there is nothing to identify")]
     NoParameter,
-    /// The measured numbers are not more than the unknowns.
+    /// There are not more measured numbers than unknowns.
     #[error(
         "{} cannot determine {}",
         message::count(*numbers, "measured number"),
         message::count(*unknowns, "unknown")
     )]
     TooFewLines {
-        /// Real numbers measured.
+        /// Number of measured real numbers.
         numbers: usize,
-        /// Unknowns, those of transients included.
+        /// Number of unknowns, including transient loads.
         unknowns: usize,
     },
-    /// An output has no noise at all, or two have the same.
+    /// The noise covariance of the outputs is singular: an output has no noise, or two have the
+    /// same.
     #[error("the covariance of the outputs at {frequency_hz} Hz cannot be inverted")]
     SingularNoise {
         /// Frequency of the line.
         frequency_hz: f64,
     },
-    /// A sample covariance has too few degrees of freedom to weight with.
+    /// A sample covariance has too few degrees of freedom for a weight.
     #[error(
         "covariances of {degrees_of_freedom} degrees of freedom cannot weight {outputs} outputs: \
          more than {} are needed",
@@ -70,7 +71,8 @@ pub enum LikelihoodError {
         /// Place in the search.
         at: &'static str,
     },
-    /// Open records need the motion of all degrees of freedom on every line.
+    /// A machine with open records has too many degrees of freedom: its motion is needed on every
+    /// line.
     #[error("open records are supported up to {most} degrees of freedom; the machine has {dof}")]
     LargeOpen {
         /// Degrees of freedom of the machine.
@@ -78,15 +80,15 @@ pub enum LikelihoodError {
         /// Largest number supported.
         most: usize,
     },
-    /// No search ended at a minimum.
+    /// No search converged.
     #[error("no search ended at a minimum: {searches} made, {steps} steps each at most")]
     NotConverged {
         /// Number of searches.
         searches: usize,
-        /// Steps of each at most.
+        /// Maximum number of steps of each search.
         steps: usize,
     },
-    /// A matrix decomposition failed.
+    /// A matrix decomposition fails.
     #[error("numbers overflow in {what}")]
     Overflow {
         /// Quantity that was computed.

@@ -1,4 +1,4 @@
-//! Results of a fit: parameters with intervals, priors, minima, and what is not determined.
+//! Results of a fit: parameters with intervals, priors, minima and undetermined combinations.
 
 use std::fmt;
 
@@ -10,19 +10,18 @@ use super::limits::{COMMON_FACTOR, WEAK};
 use super::profile;
 use super::response_model::ResponseModel;
 
-/// Way in which an interval was found.
+/// Method of an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum IntervalKind {
     /// Value ± quantile × standard error.
     Wald,
-    /// Points where the profile of the likelihood has fallen: of a weakly determined parameter, or
-    /// near a bound.
+    /// Limits of the profile likelihood, for a weakly determined parameter or near a bound.
     Profile,
-    /// Range from the bound at which the estimate lies to the one-sided limit of the profile.
+    /// Range from the bound with the estimate to the one-sided limit of the profile likelihood.
     OneSided,
-    /// The data leave the parameter open: everything between its bounds.
+    /// Full range between the bounds, because the data do not determine the parameter.
     Open,
 }
 
@@ -34,14 +33,14 @@ pub struct PriorReport {
     pub mean: f64,
     /// Standard deviation, in the unit of the parameter.
     pub standard_deviation: f64,
-    /// Share of the information on the parameter that comes from its prior, 0 to 1.
+    /// Share of the information about the parameter that comes from its prior, 0 to 1.
     pub share: f64,
-    /// Probability of an estimate so far from the mean if prior and data agree; `None` where the
-    /// data say nothing of their own.
+    /// Probability of a larger difference of the estimate from the mean if prior and data agree;
+    /// `None` if the data have no information.
     pub p_value: Option<f64>,
 }
 
-/// An unknown that was identified.
+/// Estimate of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ParameterEstimate {
@@ -51,26 +50,28 @@ pub struct ParameterEstimate {
     pub value: f64,
     /// Standard error, in the unit of the parameter; `None` if it is at a bound or not determined.
     pub standard_error: Option<f64>,
-    /// Interval of the confidence asked for, in the unit of the parameter.
+    /// Interval at the confidence level of the settings, in the unit of the parameter.
     pub interval: [f64; 2],
-    /// Way in which the interval was found.
+    /// Method of the interval.
     pub interval_kind: IntervalKind,
-    /// `true` if the estimate lies at a bound beyond which the data would have it.
+    /// `true` if a bound limits the estimate.
     pub at_bound: bool,
     /// Prior, if there is one.
     pub prior: Option<PriorReport>,
 }
 
-/// Parameters of which the data determine combinations only.
+/// Parameters with only some combinations determined by the data.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Combination {
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Values, one for each parameter, in its unit; any that agree with the combinations.
+    /// Values, one for each parameter, in its unit: one of all sets of values with the same
+    /// combinations.
     pub values: Vec<f64>,
-    /// Coefficients of the parameters in the change of each combination that is determined, in
-    /// the unit of the parameter with the largest, which is 1, per unit of each parameter.
+    /// Coefficients of the parameters in the differential of each determined combination; the
+    /// largest one is 1. Units: that of the parameter with the largest coefficient per unit of each
+    /// parameter.
     pub determined: Vec<Vec<f64>>,
 }
 
@@ -80,28 +81,29 @@ impl fmt::Display for Combination {
             Some(parts) => parts,
             None => return Ok(()),
         };
-        let all = match first.is_empty() {
-            true => last.clone(),
-            false => format!("{} and {last}", first.join(", ")),
+        let names = if first.is_empty() {
+            last.clone()
+        } else {
+            format!("{} and {last}", first.join(", "))
         };
         if self.determined.is_empty() {
-            return write!(f, "the data do not determine {all}");
+            return write!(f, "the data do not determine {names}");
         }
         if self.has_common_factor() {
             return write!(
                 f,
-                "the data determine {all} only up to one common factor: state one of them"
+                "the data determine {names} only up to one common factor: state one of them"
             );
         }
         let sums = self.determined.iter().map(|coefficients| self.combination(coefficients));
         let sums: Vec<String> = sums.collect();
-        write!(f, "the data determine {all} only by {}", sums.join(" and "))
+        write!(f, "the data determine {names} only by {}", sums.join(" and "))
     }
 }
 
 impl Combination {
-    /// Whether nothing but a factor of all values is open: every combination is one of their
-    /// ratios.
+    /// Returns whether only a common factor of all values is undetermined: every determined
+    /// combination depends on their ratios alone.
     fn has_common_factor(&self) -> bool {
         let is_ratio = |coefficients: &Vec<f64>| {
             let terms = || coefficients.iter().zip(&self.values).map(|(c, value)| c * value);
@@ -111,7 +113,7 @@ impl Combination {
         members > 2 && self.determined.len() + 1 == members && self.determined.iter().all(is_ratio)
     }
 
-    /// The combination in words where it has a name.
+    /// Returns the combination in words: a sum, a series sum, or a list of terms.
     fn combination(&self, coefficients: &[f64]) -> String {
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * a.abs().max(b.abs());
         let inverse_squares: Vec<f64> = self.values.iter().map(|v| v.powi(-2)).collect();
@@ -133,59 +135,59 @@ impl Combination {
     }
 }
 
-/// A minimum that one or more searches ended at.
+/// Common minimum of one or more searches.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FoundMinimum {
     /// Values of the parameters, one for each, in its unit.
     pub parameters: Vec<f64>,
-    /// Sum of squares, a pure number, those of the priors included: minus twice the logarithm of
-    /// the likelihood, up to a constant.
+    /// Sum of squares including the priors, a pure number: −2 times the log-likelihood, up to a
+    /// constant.
     pub sum_of_squares: f64,
     /// Number of searches that ended here.
     pub searches: usize,
-    /// Steps of the best of them.
+    /// Number of steps of the best search.
     pub steps: usize,
 }
 
-/// Common part of the estimate of any model.
+/// Result of the likelihood for any model.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LikelihoodEstimate {
-    /// Unknowns, in the order of the model.
+    /// Parameters, in the order of the model.
     pub parameters: Vec<ParameterEstimate>,
     /// Covariance of the parameters, one row and one column for each, in the product of their
-    /// units; 0 for those at a bound, without what is not determined.
+    /// units; 0 for parameters at a bound. Undetermined directions do not contribute.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub covariance: DMatrix<f64>,
     /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
-    /// Sum of squares in units of the noise over its expectation: 1 for a right model; `None` where
-    /// the noise comes from the residual.
+    /// Ratio of the sum of squares in units of the noise to its expectation: 1 for a correct model;
+    /// `None` if the noise comes from the residual.
     pub misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit if model and noise are right; `None` where it is unknown.
+    /// Probability of a larger misfit if model and noise are correct; `None` if it is unknown.
     pub misfit_p_value: Option<f64>,
-    /// Factor by which standard errors and intervals are larger than the noise alone makes them,
-    /// because model and data disagree beyond it; 1 where they do not.
+    /// Factor on the standard errors and intervals from the noise, because model and data differ by
+    /// more than the noise; otherwise 1.
     pub error_scale: f64,
-    /// `true` if the noise of all outputs was found white; `None` where it is stated.
+    /// `true` if the noise of all outputs was estimated as white; `None` if it is stated.
     pub white_noise: Option<bool>,
-    /// Ratio of the root mean square of the residual to that of the output, per output.
+    /// Ratio of the root mean squares of residual and output, per output.
     pub relative_residual: Vec<f64>,
-    /// Minima found, the lowest first.
+    /// Minima of all searches, the lowest first.
     pub minima: Vec<FoundMinimum>,
     /// Number of searches.
     pub searches: usize,
-    /// Ratio of the best to the worst determined direction of the scaled parameters.
+    /// Condition number of the scaled parameters.
     pub condition: f64,
-    /// Parameters of which combinations alone are determined.
+    /// Parameters with only some combinations determined.
     pub combinations: Vec<Combination>,
-    /// Degrees of freedom of the level of the noise; infinite for known noise.
+    /// Degrees of freedom of the noise level; infinite for known noise.
     pub degrees_of_freedom: f64,
 }
 
 impl LikelihoodEstimate {
-    /// Returns the value of a parameter by its name.
+    /// Returns the estimate of a parameter by its name.
     pub fn parameter(&self, name: &str) -> Option<&ParameterEstimate> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
@@ -284,8 +286,8 @@ fn interval<M: ResponseModel>(
     ([end(-1.0), end(1.0)], IntervalKind::Profile)
 }
 
-/// Share of a prior and its test: with the prior's variance s² and the posterior's v, the
-/// difference of the estimate from the mean has the variance s² − v if data and prior agree.
+/// Returns the share of a prior and its test: with the prior variance s² and the posterior variance
+/// v, the difference of the estimate from the mean has the variance s² − v if data and prior agree.
 fn prior<M: ResponseModel>(
     fit: &Fit<'_, M>,
     at: usize,
@@ -295,7 +297,7 @@ fn prior<M: ResponseModel>(
     let variance = prior.deviation * prior.deviation;
     let posterior = standard_error.map_or(0.0, |error| error * error);
     let difference = variance - posterior;
-    // The share of the data is what rounding leaves of the difference.
+    // A difference of the size of rounding means that the data have no information.
     let p_value = (difference > 1e-9 * variance).then(|| {
         let z = (fit.minimum.parameters[at] - prior.mean).abs() / difference.sqrt();
         Normal::standard().sf(z) * 2.0

@@ -1,4 +1,4 @@
-//! The fit of a model to line data by maximum likelihood.
+//! Fit of a model to line data by maximum likelihood.
 
 use mechid_signal::correlation::share_above_of;
 use mechid_spectra::LineData;
@@ -17,7 +17,7 @@ use super::unknown_noise::{UnknownNoise, WeightedMinimum};
 use super::weights::Weights;
 use super::{LikelihoodError, NoiseSource, Settings};
 
-/// First values, bounds and priors of the parameters of a model.
+/// Initial values, bounds and priors of the parameters of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ParameterSpace {
     pub(super) start: Vec<f64>,
@@ -25,7 +25,7 @@ pub(super) struct ParameterSpace {
     pub(super) priors: Vec<PriorRow>,
 }
 
-/// A fit with everything that judging it needs.
+/// A fit with its data, weights and information.
 pub(super) struct Fit<'a, M> {
     pub(super) model: &'a M,
     pub(super) data: &'a LineData,
@@ -33,14 +33,14 @@ pub(super) struct Fit<'a, M> {
     pub(super) weights: Weights,
     pub(super) minimum: Minimum,
     pub(super) minima: Minima,
-    /// Information of data and priors in the parameters that no bound holds.
+    /// Information of data and priors about the parameters that are not at a bound.
     pub(super) information: Information,
-    /// Degrees of freedom of the level of the noise; ∞ for known noise.
+    /// Degrees of freedom of the noise level; ∞ for known noise.
     pub(super) degrees_of_freedom: f64,
-    /// Sum of squares of the data over its expectation; `None` if the noise comes from the
-    /// residual.
+    /// Ratio of the sum of squares of the data to its expectation; `None` if the noise comes from
+    /// the residual.
     pub(super) misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit under a right model.
+    /// Probability of a larger misfit under a correct model.
     pub(super) misfit_p_value: Option<f64>,
     pub(super) is_white: Option<bool>,
 }
@@ -94,7 +94,7 @@ fn check<M: ResponseModel>(
     let transient = residual.transient_unknowns();
     let unknowns = space.start.len() + transient;
     let numbers = residual.len();
-    // A line alone determines nothing about its noise.
+    // There is no residual with as many unknowns as numbers.
     if numbers + space.priors.len() <= unknowns {
         return Err(LikelihoodError::TooFewLines { numbers, unknowns });
     }
@@ -138,16 +138,17 @@ fn with_known_noise<'a, M: ResponseModel>(
     })
 }
 
-/// Sum of squares of a right model in units of the noise, whose covariances may be sampled.
+/// Expected sum of squares of a correct model in units of the noise, whose covariances may be
+/// sampled.
 struct Expected {
     cost: f64,
     variance: f64,
 }
 
 impl Expected {
-    /// For covariances of `freedom` deviations each and `total` together, with `spare` real numbers
-    /// that no parameter explains. Rows with a common covariance make one statistic, Hotelling's
-    /// T².
+    /// Computes mean and variance for covariances of `freedom` degrees of freedom each and `total`
+    /// together, with `spare` real numbers more than parameters. Rows with a common covariance have
+    /// one statistic, Hotelling's T².
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -173,7 +174,7 @@ impl Expected {
         self.variance.sqrt()
     }
 
-    /// Probability of a larger sum of squares.
+    /// Returns the probability of a larger sum of squares.
     fn p_value(&self, cost: f64) -> f64 {
         share_above_of(cost, self.cost, 0.5 * self.variance)
     }
@@ -233,9 +234,9 @@ fn searched<M: ResponseModel>(
     multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)
 }
 
-/// Covariance of an estimate over the inverse of the Fisher information, and mean of a squared
-/// residual, for weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of freedom: ν²/((ν − p)² − 1)
-/// and ν/(ν − p).
+/// Returns the ratio of the covariance of an estimate to the inverse of the Fisher information, and
+/// the mean of a squared residual, for weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of
+/// freedom: ν²/((ν − p)² − 1) and ν/(ν − p).
 fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodError> {
     if freedom.is_infinite() {
         return Ok([1.0, 1.0]);
@@ -244,8 +245,8 @@ fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodE
     if freedom <= p + 1.0 {
         return Err(LikelihoodError::FewDegreesOfFreedom { degrees_of_freedom: freedom, outputs });
     }
-    let rest = freedom - p;
-    Ok([freedom * freedom / (rest * rest - 1.0), freedom / rest])
+    let reduced = freedom - p;
+    Ok([freedom * freedom / (reduced * reduced - 1.0), freedom / reduced])
 }
 
 impl<'a, M: ResponseModel> Fit<'a, M> {
@@ -258,8 +259,8 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the
-    /// misfit is too large for the noise, otherwise 1.
+    /// Factor on the standard errors from the noise: the Birge ratio if the noise does not explain
+    /// the misfit, otherwise 1.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -271,15 +272,15 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Quantile of the deviation of an estimate in units of its standard error without
+    /// Returns a quantile of the error of an estimate in units of its standard error without
     /// [`Fit::error_scale`].
     pub(super) fn quantile(&self, probability: f64) -> f64 {
         let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))
     }
 
-    /// Logarithm of the likelihood: −½ Σ r² − Σ ln det(π S) over the lines, the errors of the
-    /// inputs averaged out.
+    /// Returns the log-likelihood −½ Σ r² − Σ ln det(π S) over the lines, with the true inputs
+    /// eliminated.
     pub(super) fn log_likelihood(&self) -> Option<f64> {
         let p = self.data.outputs().ncols() as f64;
         let mut log_determinant = 0.0;
@@ -295,7 +296,7 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         Some(-0.5 * self.minimum.cost - log_determinant)
     }
 
-    /// Errors y − G u of every line and output over the outputs, root mean squares per output.
+    /// Returns the ratio of the root mean squares of error and output, per output.
     pub(super) fn relative_errors(&self) -> Option<Vec<f64>> {
         let errors = self.residual().errors(&self.minimum.parameters)?.errors;
         let norm = |of: &DMatrix<Complex<f64>>, at: usize| of.column(at).norm();

@@ -1,26 +1,25 @@
-//! Numbers that decide something in the likelihood, with their reasons.
+//! Limits of the likelihood, with their reasons.
 
-/// Order of the polynomial in s that the transient of an open record adds to every output. What the
-/// samples fold back from above half their rate is smooth over the band; with the loads of the
-/// states, order 3 is the load polynomial of order 5 that a machine with all degrees of freedom
-/// measured has.
+/// Order of the polynomial in s that the transient of an open record adds to every output. It
+/// describes aliasing, which is smooth over the band. Together with the state loads, order 3
+/// corresponds to the load polynomial of order 5 of a machine with all degrees of freedom measured.
 pub(super) const TRANSIENT_ORDER: usize = 3;
 
-/// Smallest part that a column of a transient may have beside the others; below it the column is
-/// dependent on them, and rounding would decide its coefficient.
+/// Minimum relative length of the component of a transient column that is orthogonal to the other
+/// columns; a column with less counts as linearly dependent, because rounding would decide its
+/// coefficient.
 pub(super) const TRANSIENT_RANK: f64 = 1e-12;
 
-/// Ratio of singular values of the scaled Jacobian below which a combination of parameters is not
-/// determined: rounding of the responses, with a reserve.
+/// Minimum ratio of singular values of the scaled Jacobian for a determined combination of
+/// parameters: the rounding of the responses, with a reserve.
 pub(super) const RANK: f64 = 1e-9;
 
-/// Relative standard error beyond which a parameter counts as weakly determined: its interval comes
-/// from the profile of the likelihood, for the likelihood is no parabola over such a distance.
+/// Maximum relative standard error for a Wald interval. For a larger one the interval comes from
+/// the profile of the likelihood, because the likelihood is not quadratic over such a distance.
 pub(super) const WEAK: f64 = 0.3;
 
-/// Relative noise with which the first steps of every search are weighted: the response counts by
-/// its relative deviation, so that a resonance in the wrong place does not outweigh all other
-/// lines.
+/// Relative noise assumed in the first steps of every search: they weight relative deviations of
+/// the response, so that a resonance at a wrong frequency does not dominate all other lines.
 pub(super) const FIRST_RELATIVE_NOISE: f64 = 0.3;
 
 /// Maximum number of steps with relative weights.
@@ -29,48 +28,50 @@ pub(super) const FIRST_STEPS: usize = 40;
 /// Maximum number of steps of a search.
 pub(super) const STEPS: usize = 200;
 
-/// Relative difference of two sums of squares below which two searches ended at one minimum.
+/// Maximum relative difference of the sums of squares of two searches with the same minimum.
 pub(super) const SAME_MINIMUM: f64 = 1e-6;
 
-/// Standard deviations by which the misfit of a right model exceeds its expectation at most.
+/// Maximum excess of the misfit of a correct model over its expectation, in standard deviations.
 pub(super) const PLAUSIBLE: f64 = 6.0;
 
-/// Relative change of the noise levels below which another round of weighting is useless.
+/// Relative change of the noise levels that ends the rounds of weighting.
 pub(super) const NOISE_LEVEL_CHANGE: f64 = 1e-6;
 
-/// Maximum number of rounds in which levels of white noise and parameters are found in turn.
+/// Maximum number of rounds that alternate between the levels of white noise and the parameters.
 pub(super) const NOISE_ROUNDS: usize = 30;
 
-/// Number of rounds of weighting by a noise spectrum: the first is efficient, the others find its
-/// form.
+/// Number of rounds of weighting by a noise spectrum: the first is efficient, the others refine the
+/// shape of the spectrum.
 pub(super) const COLOURED_ROUNDS: usize = 3;
 
-/// Smallest power of a residual relative to that of the noise of the round before; a line without
-/// any residual would take all the weight.
+/// Minimum power of a residual relative to the noise of the round before; a line without residual
+/// would have an unbounded weight.
 pub(super) const LEAST_POWER: f64 = 1e-12;
 
-/// Smallest part of its noise that a residual keeps beside the parameters.
+/// Minimum share of its noise that a residual is assumed to keep after the fit (1 − leverage).
 pub(super) const LEAST_KEPT: f64 = 0.1;
 
 /// Maximum number of degrees of freedom of a machine with open records, whose transient acts on
 /// each of them: the cost of a line grows with their cube.
 pub(super) const OPEN_DOFS: usize = 60;
 
-/// Number of searches that have to end at the lowest minimum where the known noise explains it;
-/// otherwise every first value is searched from.
+/// Number of searches that must end at the lowest minimum if the known noise explains it; otherwise
+/// the search uses all initial estimates.
 pub(super) const CONFIRMED: usize = 2;
 
-/// The same where the noise is unknown, so that no misfit says whether a minimum is a right one.
+/// Number of searches that must end at the lowest minimum if the noise is unknown, because then no
+/// misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
-/// Level of significance of the misfit of known noise below which standard errors and intervals are
-/// those of the misfit: a right model gets wider intervals than it needs in one of a thousand fits.
+/// Significance level of the misfit test with known noise: for a smaller p-value the standard
+/// errors are scaled by the misfit. A correct model has too wide intervals in one of a thousand
+/// fits.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
-/// Part of a gradient outside the determined combinations above which the quantity is not
-/// determined; less is rounding of the singular vectors.
+/// Maximum share of a gradient outside the determined combinations for a determined quantity; this
+/// much is rounding of the singular vectors.
 pub(super) const UNDETERMINED_PART: f64 = 1e-5;
 
-/// Part of its terms that a combination of parameters has at most if it depends on their ratios
-/// alone; a combination of another kind has most of them.
+/// Maximum ratio of the sum of the terms of a combination to the sum of their absolute values if
+/// the combination depends only on ratios of parameters.
 pub(super) const COMMON_FACTOR: f64 = 1e-4;

@@ -1,8 +1,8 @@
-//! One likelihood for line data of every record and every model.
+//! One likelihood for the line data of all records and all models.
 //!
-//! Records come as [`LineData`](mechid_spectra::LineData): inputs, outputs and the covariance of
-//! their noise line by line. A model comes as a [`ResponseModel`]. Between them there is one
-//! residual with one derivative, one bounded search, and one covariance.
+//! [`LineData`](mechid_spectra::LineData) has the inputs, the outputs and the covariance of their
+//! noise, line by line. A [`ResponseModel`] is the model. All data and models share one residual
+//! with one derivative, one bounded search, and one covariance.
 
 mod covariance;
 pub mod entries;

@@ -1,4 +1,4 @@
-//! Searches from several first values, and all minima that they lead to.
+//! Searches from several initial estimates, and their minima.
 
 use mechid_signal::{Sampling, noise};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -14,16 +14,17 @@ pub(super) struct SearchEnd {
     pub(super) searches: usize,
 }
 
-/// All minima found, the lowest first.
+/// Minima of all searches, the lowest first.
 #[derive(Debug, Clone)]
 pub(super) struct Minima {
     pub(super) ends: Vec<SearchEnd>,
-    /// Number of searches, those without an end included.
+    /// Number of searches, including those that did not converge.
     pub(super) searches: usize,
 }
 
-/// First values of every search: the given ones, then each times a log-normal factor, within the
-/// bounds; one that may have either sign between two bounds is anywhere between them.
+/// Returns the initial estimates of all searches: the given one, then random ones, where each value
+/// is multiplied by a log-normal factor within its bounds. A value with a negative lower and a
+/// positive upper bound is drawn uniformly between them.
 pub(super) fn starts(
     given: &[f64],
     bounds: &Bounds,
@@ -51,12 +52,12 @@ pub(super) fn starts(
     starts
 }
 
-/// Searches from one start after the other, first with weights relative to the response, then with
-/// those of the noise. It ends early when `agreeing` searches have ended at the lowest minimum, a
-/// number that depends on its sum of squares.
+/// Searches from one initial estimate after another, first with weights relative to the response,
+/// then with the weights of the noise. It stops when enough searches have ended at the lowest
+/// minimum; `agreeing` returns this number for a sum of squares.
 ///
 /// # Errors
-/// [`LikelihoodError::NotConverged`] if no search ends at a minimum.
+/// [`LikelihoodError::NotConverged`] if no search converges.
 pub(super) fn search(
     rough: &impl LeastSquaresProblem,
     problem: &impl LeastSquaresProblem,
@@ -97,11 +98,11 @@ impl Minima {
             }
             return;
         }
-        let place = self.ends.partition_point(|end| end.minimum.cost < minimum.cost);
-        self.ends.insert(place, SearchEnd { minimum, searches: 1 });
+        let rank = self.ends.partition_point(|end| end.minimum.cost < minimum.cost);
+        self.ends.insert(rank, SearchEnd { minimum, searches: 1 });
     }
 
-    /// The lowest minimum.
+    /// Returns the lowest minimum.
     pub(super) fn best(&self) -> &SearchEnd {
         &self.ends[0]
     }

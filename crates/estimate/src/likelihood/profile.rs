@@ -1,20 +1,21 @@
-//! Intervals from the profile of the likelihood.
+//! Intervals from the profile likelihood.
 
 use super::fit::Fit;
 use super::limits::STEPS;
 use super::response_model::ResponseModel;
 use super::search::{Bounds, minimise};
 
-/// Maximum number of doublings of the distance in which the end of an interval is looked for.
+/// Maximum number of doublings of the distance in the search for the limit of an interval.
 const DOUBLINGS: usize = 24;
-/// Number of halvings of the distance to the end of an interval.
+/// Maximum number of bisections for the limit of an interval.
 const HALVINGS: usize = 20;
-/// Relative deviation of the rise of the sum of squares at which the end of an interval is found.
+/// Relative deviation from the required rise of the sum of squares that ends the bisection.
 const TOLERANCE: f64 = 1e-3;
 
-/// End of an interval of a parameter below (`direction` −1) or above (+1) its estimate: where the
-/// sum of squares, minimised over all other parameters, has risen by `rise`. The bound, if that
-/// comes first; infinite if the sum never rises so far.
+/// Returns the limit of an interval of a parameter below (`direction` −1) or above (+1) its
+/// estimate: the value with a sum of squares, minimised over all other parameters, that is larger
+/// by `rise`. It is the bound if the bound is nearer, and infinite if the sum never rises by
+/// `rise`.
 ///
 /// # Source
 /// Venzon & Moolgavkar (1988), Applied Statistics 37, 87–94; Raue et al. (2009), Bioinformatics 25,
@@ -46,9 +47,9 @@ pub(super) fn end<M: ResponseModel>(
         let beyond = if direction < 0.0 { value <= limit } else { value >= limit };
         let value = if beyond { limit } else { value };
         match excess(value) {
-            Some(rest) if rest < 0.0 && beyond => return limit,
-            Some(rest) if rest < 0.0 => inside = value,
-            // Beyond the responses that exist the likelihood is none.
+            Some(excess) if excess < 0.0 && beyond => return limit,
+            Some(excess) if excess < 0.0 => inside = value,
+            // The likelihood is zero if the response does not exist.
             _ => {
                 outside = Some(value);
                 break;
@@ -60,8 +61,8 @@ pub(super) fn end<M: ResponseModel>(
     for _ in 0..HALVINGS {
         let middle = 0.5 * (inside + outside);
         match excess(middle) {
-            Some(rest) if rest.abs() <= TOLERANCE * rise => return middle,
-            Some(rest) if rest < 0.0 => inside = middle,
+            Some(excess) if excess.abs() <= TOLERANCE * rise => return middle,
+            Some(excess) if excess < 0.0 => inside = middle,
             _ => outside = middle,
         }
     }

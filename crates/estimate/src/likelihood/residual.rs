@@ -1,4 +1,4 @@
-//! The residual of line data under a model, in units of the noise, and its derivative.
+//! Residual of line data for a model, in units of the noise, and its Jacobian.
 
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use super::search::LeastSquaresProblem;
 use super::transient::{self, Eliminated};
 use super::weights::{WeightedLine, Weights};
 
-/// A normal distribution that a parameter is known to have, as one row of the residual.
+/// Normal prior of a parameter, as one row of the residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PriorRow {
     pub(super) parameter: usize,
@@ -19,15 +19,16 @@ pub(super) struct PriorRow {
     pub(super) deviation: f64,
 }
 
-/// e = y − G u − G_own − A τ for every line, divided by its standard deviation: √2·L⁻¹e with
-/// L Lᴴ = E[e eᴴ], real and imaginary parts apart, has unit variance and no correlation.
+/// Weighted errors e = y − G u − G_own − A τ of every line, where G_own is the response to loads of
+/// the model: the real and imaginary parts of √2·L⁻¹e with L Lᴴ = E[e eᴴ] have unit variance and no
+/// correlation.
 ///
 /// With noisy inputs the covariance S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ depends on the parameters;
-/// the sum of squares is what remains of the likelihood once the true inputs and outputs of each
-/// line have been eliminated. The derivative is taken at the most likely input û: because û
-/// minimises, Jᵀr is half the gradient of the sum of squares, and JᵀJ is the Fisher information.
-/// The transient τ of each open record is eliminated, too: residual and derivative are projected
-/// off its columns A.
+/// the sum of squares is the likelihood after the true inputs and outputs of each line have been
+/// eliminated. The derivative is taken at the most likely input û. Because û is a minimum, Jᵀr is
+/// half the gradient of the sum of squares, and JᵀJ is the Fisher information. The transient τ of
+/// each open record is eliminated, too: residual and derivative are projected onto the orthogonal
+/// complement of its columns A.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -40,20 +41,20 @@ pub(super) struct Residual<'a, M> {
     pub(super) priors: &'a [PriorRow],
 }
 
-/// Residual and derivative at one set of parameters.
+/// Residual and Jacobian at one set of parameters.
 pub(super) struct Linearisation {
-    /// √2·L⁻¹e: row 2(p·line + output) is a real part, the next one the imaginary part; then the
-    /// priors.
+    /// Residual √2·L⁻¹e: row 2(p·line + output) is a real part, the next row the imaginary part;
+    /// then the priors.
     pub(super) residual: DVector<f64>,
     /// Derivative of the residual, one column per parameter.
     pub(super) jacobian: DMatrix<f64>,
 }
 
-/// What remains of the outputs at every line.
+/// Errors of the outputs at every line.
 pub(super) struct LineErrors {
-    /// y − G u − G_own − A τ, lines × p.
+    /// Errors y − G u − G_own − A τ, lines × p.
     pub(super) errors: DMatrix<Complex<f64>>,
-    /// G of each line.
+    /// Receptance G of each line.
     pub(super) receptances: Vec<DMatrix<Complex<f64>>>,
 }
 
@@ -70,19 +71,19 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         self.data.outputs().ncols()
     }
 
-    /// Number of real numbers of all lines.
+    /// Number of real and imaginary parts of all lines.
     pub(super) fn len(&self) -> usize {
         2 * self.outputs() * self.data.len()
     }
 
-    /// Number of unknowns of transients.
+    /// Number of unknowns of all transients.
     pub(super) fn transient_unknowns(&self) -> usize {
         let states = self.model.dimensions().states;
-        let each = self.data.records().iter();
-        each.map(|(_, kind)| transient::len(*kind, self.outputs(), states)).sum()
+        let records = self.data.records().iter();
+        records.map(|(_, kind)| transient::len(*kind, self.outputs(), states)).sum()
     }
 
-    /// Residual of a record at `parameters`, without the priors.
+    /// Returns the residual of a record at `parameters`, without the priors.
     fn record(
         &self,
         parameters: &[f64],
@@ -132,7 +133,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         })
     }
 
-    /// Writes the derivative of the residual of one record, of which `jacobian` holds the rows.
+    /// Returns the Jacobian of the residual of one record.
     fn derivative(
         &self,
         parameters: &[f64],
@@ -172,13 +173,13 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         jacobian.iter().all(|value| value.is_finite()).then_some(jacobian)
     }
 
-    /// Rows of the priors.
+    /// Returns the rows of the priors.
     fn prior_rows(&self, parameters: &[f64]) -> Vec<f64> {
         let row = |prior: &PriorRow| (parameters[prior.parameter] - prior.mean) / prior.deviation;
         self.priors.iter().map(row).collect()
     }
 
-    /// Residual and derivative at `parameters`; `None` where the response does not exist.
+    /// Returns residual and Jacobian at `parameters`; `None` if the response does not exist.
     pub(super) fn linearise(&self, parameters: &[f64]) -> Option<Linearisation> {
         let (size, count) = (self.len() + self.priors.len(), parameters.len());
         let mut residual = DVector::zeros(size);
@@ -199,8 +200,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         Some(Linearisation { residual, jacobian })
     }
 
-    /// Errors and receptances of every line at `parameters`; `None` where the response does not
-    /// exist.
+    /// Returns errors and receptances of every line at `parameters`; `None` if the response does
+    /// not exist.
     pub(super) fn errors(&self, parameters: &[f64]) -> Option<LineErrors> {
         let p = self.outputs();
         let mut errors = DMatrix::zeros(self.data.len(), p);

@@ -1,25 +1,25 @@
-//! Requirements of the likelihood on a model.
+//! Interface between the likelihood and a model.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Numbers of channels and unknowns of a [`ResponseModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimensions {
-    /// Outputs p.
+    /// Number of outputs, p.
     pub outputs: usize,
-    /// Inputs q.
+    /// Number of inputs, q.
     pub inputs: usize,
-    /// Parameters.
+    /// Number of parameters.
     pub parameters: usize,
-    /// Loads by which a difference between the initial and the final state of an open record acts
-    /// on the model; 0 if the model cannot tell.
+    /// Number of state loads, which describe the difference between the initial and the final state
+    /// of an open record; 0 if the model does not have them.
     pub states: usize,
 }
 
 /// A parametric linear model of outputs y = G(ω) u at given lines.
 ///
-/// A record reaches the model through its lines alone, and the model reaches a record through its
-/// responses alone.
+/// The model depends on a record only through the frequencies of its lines, and the likelihood uses
+/// only the responses of the model.
 pub trait ResponseModel: Sync {
     /// Response at one line and one set of parameters.
     type Line<'a>: LineResponse
@@ -29,16 +29,15 @@ pub trait ResponseModel: Sync {
     /// Returns the numbers of channels and unknowns.
     fn dimensions(&self) -> Dimensions;
 
-    /// Returns the angular frequency (rad/s) of each line that the model was prepared for.
+    /// Returns the angular frequency (rad/s) of each line of the model.
     fn omega(&self) -> &[f64];
 
-    /// Returns the response at a line with parameters in their own units, `None` where it does not
-    /// exist.
+    /// Returns the response at a line with parameters in their units, `None` if it does not exist.
     fn at(&self, parameters: &[f64], row: usize) -> Option<Self::Line<'_>>;
 
     /// Adds the uncertainty of the model itself to the covariance of the outputs (p × p, in the
     /// products of their units), at a line with the response `line` under `input` (q, in the units
-    /// of the inputs); a model that is exact adds nothing.
+    /// of the inputs); an exact model has none.
     fn add_covariance(
         &self,
         _row: usize,
@@ -49,7 +48,7 @@ pub trait ResponseModel: Sync {
     }
 }
 
-/// Response of a model at one line, and what its derivatives need.
+/// Response of a model at one line, with its derivatives.
 pub trait LineResponse {
     /// Returns G, p × q, in units of the outputs per unit of the inputs.
     fn receptance(&self) -> &DMatrix<Complex<f64>>;

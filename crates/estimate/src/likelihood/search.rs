@@ -1,17 +1,17 @@
-//! Bounded Gauss–Newton steps, damped where they do not descend.
+//! Bounded Gauss–Newton search with damping (Levenberg–Marquardt).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A sum of squares with its derivative.
 pub(super) trait LeastSquaresProblem {
-    /// The residual, `None` where it does not exist.
+    /// Returns the residual, `None` if it does not exist.
     fn residual(&self, parameters: &[f64]) -> Option<DVector<f64>>;
 
-    /// The residual and its derivative, `None` where one of them does not exist.
+    /// Returns the residual and its Jacobian, `None` if one of them does not exist.
     fn linearise(&self, parameters: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)>;
 }
 
-/// Bounds of the parameters; infinite where there are none.
+/// Bounds of the parameters; a parameter without a bound has an infinite one.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bounds {
     pub(super) min: Vec<f64>,
@@ -25,7 +25,7 @@ impl Bounds {
         }
     }
 
-    /// Whether a parameter lies at a bound that descent would push it through.
+    /// Returns whether a parameter is at a bound that a descent would violate.
     fn blocks(&self, at: usize, value: f64, gradient: f64) -> bool {
         let is_fixed = self.min[at] == self.max[at];
         let below = value <= self.min[at] && gradient > 0.0;
@@ -40,28 +40,28 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
     pub(super) steps: usize,
     pub(super) converged: bool,
-    /// Whether each parameter is at a bound beyond which the sum of squares would fall.
+    /// Flag of each parameter at a bound that the sum of squares would decrease across.
     pub(super) at_bound: Vec<bool>,
 }
 
-/// Promised decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard
+/// Predicted decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard
 /// errors.
 const COST_TOLERANCE: f64 = 1e-12;
-/// Length of a step relative to the parameters, both in units of their columns, that ends it, too,
-/// for data without noise.
+/// Ratio of the length of a step to the length of the parameters, both scaled by the columns of the
+/// Jacobian, that also ends a search; it decides for data without noise.
 const STEP_TOLERANCE: f64 = 1e-12;
-/// First damping, against a Gram matrix of unit diagonal.
+/// First damping, relative to the unit diagonal of the Gram matrix.
 const FIRST_DAMPING: f64 = 1e-8;
-/// Damping below which there is none.
+/// Minimum damping; a smaller one is set to zero.
 const LEAST_DAMPING: f64 = 1e-13;
-/// Damping beyond which rounding decides.
+/// Maximum damping; with a larger one the step would be rounding.
 const MAX_DAMPING: f64 = 1e12;
-/// Largest part of a step that its correction for curvature may be.
+/// Maximum ratio of the curvature correction to its step; a larger correction is not used.
 const MAX_CORRECTION: f64 = 0.75;
-/// Part of a step over which the curvature is measured.
+/// Fraction of a step for the finite difference of the curvature.
 const CURVATURE_STEP: f64 = 0.1;
 
-/// Normal equations in the parameters that no bound blocks, of columns of unit length.
+/// Normal equations for the parameters that no bound blocks, with columns of unit length.
 struct Local<'a> {
     residual: &'a DVector<f64>,
     jacobian: &'a DMatrix<f64>,
@@ -79,8 +79,8 @@ impl<'a> Local<'a> {
         parameters: &[f64],
         bounds: &Bounds,
     ) -> Self {
-        let all = jacobian.tr_mul(residual);
-        let free = |at: &usize| !bounds.blocks(*at, parameters[*at], all[*at]);
+        let half_gradient = jacobian.tr_mul(residual);
+        let free = |at: &usize| !bounds.blocks(*at, parameters[*at], half_gradient[*at]);
         let free: Vec<usize> = (0..parameters.len()).filter(free).collect();
         let length = |at: &usize| match jacobian.column(*at).norm() {
             length if length > 0.0 => length,
@@ -104,28 +104,28 @@ impl<'a> Local<'a> {
         damped.cholesky()
     }
 
-    /// A change of all parameters from one of the scaled free ones.
+    /// Returns the change of all parameters from that of the scaled free ones.
     fn change(&self, scaled: &DVector<f64>, count: usize) -> DVector<f64> {
         let mut change = DVector::zeros(count);
-        for (at, place) in self.free.iter().enumerate() {
-            change[*place] = scaled[at] / self.scale[at];
+        for (at, parameter) in self.free.iter().enumerate() {
+            change[*parameter] = scaled[at] / self.scale[at];
         }
         change
     }
 
-    /// Decrease of the sum of squares that the linearisation promises for a change.
+    /// Returns the decrease of the sum of squares that the linearisation predicts for a change.
     fn promise(&self, change: &DVector<f64>) -> f64 {
         let moved = self.jacobian * change;
         -(2.0 * self.residual.dot(&moved) + moved.norm_squared())
     }
 }
 
-/// Local minimum within `bounds` reached from `start` in at most `max_steps`; `None` where the
+/// Searches for a local minimum within `bounds` from `start` in at most `max_steps`; `None` if the
 /// residual does not exist.
 ///
 /// A step v and its correction a for the curvature r″ of the residual along v solve (JᵀJ + λI) v =
-/// −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) in the parameters that no bound blocks; the step is projected
-/// onto the bounds.
+/// −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) for the parameters that no bound blocks; the step is
+/// projected onto the bounds.
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, 2nd ed. (2006), sections 10.3 and 16.7 (projected
@@ -157,7 +157,7 @@ pub(super) fn minimise(
             }
         }
         let Some(next) = descend(problem, bounds, &local, &parameters, cost, &mut damping) else {
-            // No descent in any direction: a minimum to within rounding.
+            // No damped step descends: this is a minimum to rounding.
             return Some(Minimum { steps, converged: true, ..ended(&local, &parameters, cost) });
         };
         parameters = next;
@@ -173,8 +173,8 @@ fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
     Minimum { parameters: parameters.to_vec(), cost, steps: 0, converged: false, at_bound }
 }
 
-/// The last step, too small to matter for the sum of squares, is still taken if it does not raise
-/// it.
+/// Takes the last step, which is too small to matter for the sum of squares, if it does not
+/// increase the sum.
 fn polished(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
@@ -192,7 +192,7 @@ fn polished(
     }
 }
 
-/// The next parameters, with a lower sum of squares; `None` if no damping leads to one.
+/// Returns the next parameters, with a lower sum of squares; `None` if no damping gives a decrease.
 fn descend(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
@@ -225,7 +225,7 @@ fn descend(
     }
 }
 
-/// A damped step with its correction for curvature.
+/// Returns a damped step with its correction for curvature.
 fn step(
     problem: &impl LeastSquaresProblem,
     local: &Local<'_>,

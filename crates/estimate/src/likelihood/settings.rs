@@ -1,36 +1,35 @@
-//! Choices of a fit.
+//! Settings of a fit.
 
 use super::LikelihoodError;
 
-/// Source from which the noise of the outputs is known.
+/// Source of the noise covariance of the outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum NoiseSource {
-    /// The covariance that the data state; the residual if they state none.
+    /// Covariance that the data state; the residual if they state none.
     #[default]
     Automatic,
-    /// The residual: white noise of unknown level in every output.
+    /// Residual, as white noise of unknown level in every output.
     WhiteResidual,
-    /// The residual: noise with a smooth unknown spectrum in every output.
+    /// Residual, as noise with a smooth unknown spectrum in every output.
     SmoothResidual,
 }
 
-/// Choices of a fit.
+/// Settings of a fit.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Settings {
-    /// Source from which the noise of the outputs is known.
+    /// Source of the noise covariance of the outputs.
     pub noise: NoiseSource,
-    /// Maximum number of searches: one from the given values, the others from random ones.
+    /// Maximum number of searches: one from the given initial values, the others from random ones.
     pub starts: usize,
-    /// Factor by which random first values differ from the given ones, as a standard deviation of
-    /// their logarithm.
+    /// Geometric standard deviation of random initial values about the given ones, a factor.
     pub spread: f64,
-    /// Seed of the random first values.
+    /// Seed of the random initial values.
     pub seed: u64,
-    /// Probability with which the intervals contain the parameters.
+    /// Confidence level of the intervals.
     pub confidence: f64,
 }
 
@@ -41,7 +40,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Checks the numbers.
+    /// Checks that the numbers are in range.
     pub(super) fn check(&self) -> Result<(), LikelihoodError> {
         let refuse =
             |name, requirement, value| Err(LikelihoodError::Setting { name, requirement, value });

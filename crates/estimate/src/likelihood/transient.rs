@@ -1,14 +1,15 @@
-//! Transient of open records: linear unknowns that are eliminated record by record.
+//! Transients of open records: linear unknowns, eliminated record by record.
 
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::limits::{TRANSIENT_ORDER, TRANSIENT_RANK};
 
-/// Orders in s of the loads that a difference of states makes: M (s Δx + Δv) + C Δx.
+/// Number of powers of s in the loads M (s Δx + Δv) + C Δx from a difference of states.
 const STATE_ORDERS: usize = 2;
 
-/// Number of unknowns of the transient of a record with `outputs` outputs and `states` state loads.
+/// Returns the number of unknowns of the transient of a record with `outputs` outputs and `states`
+/// state loads.
 pub(super) fn len(transient: Transient, outputs: usize, states: usize) -> usize {
     match transient {
         Transient::None => 0,
@@ -16,14 +17,14 @@ pub(super) fn len(transient: Transient, outputs: usize, states: usize) -> usize 
     }
 }
 
-/// Frequency by which s is divided, so that its powers stay near 1: the highest of the record.
+/// Returns the reference frequency of the powers of s, the highest of the record, so that they are
+/// at most 1.
 pub(super) fn reference(data: &LineData, rows: std::ops::Range<usize>) -> f64 {
     data.omega()[rows].iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Columns of the transient at a line, p × unknowns: the response to the state loads in powers of
-/// s/ω₀, then a polynomial in s/ω₀ of every output, which describes what the samples fold back into
-/// the band.
+/// Returns the columns of the transient at a line, p × unknowns: the response to the state loads in
+/// powers of s/ω₀, then a polynomial in s/ω₀ for every output, which describes aliasing.
 pub(super) fn columns(
     omega: f64,
     reference: f64,
@@ -49,7 +50,7 @@ pub(super) fn columns(
     columns
 }
 
-/// Amplitudes of the state loads at a line that the unknowns of a transient make.
+/// Returns the amplitudes of the state loads at a line from the unknowns of a transient.
 pub(super) fn state_loads(
     omega: f64,
     reference: f64,
@@ -62,8 +63,7 @@ pub(super) fn state_loads(
     })
 }
 
-/// Orthonormal columns that span weighted columns, and the coefficients that a residual has along
-/// them.
+/// Orthonormal basis of the weighted columns of a transient, and its fit to a residual.
 pub(super) struct Eliminated {
     pub(super) basis: DMatrix<f64>,
     /// Unknowns of the transient that fit the residual.
@@ -71,8 +71,8 @@ pub(super) struct Eliminated {
 }
 
 impl Eliminated {
-    /// Fits weighted columns to a weighted residual; dependent columns share what they have in
-    /// common.
+    /// Fits weighted columns to a weighted residual; the coefficients of linearly dependent columns
+    /// are 0.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM J. Numerical Analysis 10, 413–432 (variable projection).

@@ -1,5 +1,5 @@
-//! Noise of the outputs that is known from the residual alone: levels, then spectra, in turn with
-//! the parameters.
+//! Noise of the outputs, estimated from the residual in alternation with the parameters: levels,
+//! then spectra.
 
 use mechid_spectra::LineData;
 use nalgebra::DMatrix;
@@ -15,17 +15,17 @@ use super::weights::Weights;
 use mechid_spectra::noise::level::motion_level;
 use mechid_spectra::noise::smooth;
 
-/// Parameters with the weights that belong to them.
+/// Minimum with its weights.
 pub(super) struct WeightedMinimum {
     pub(super) minimum: Minimum,
     pub(super) weights: Weights,
-    /// Whether every spectrum is white.
+    /// True if every spectrum is white.
     pub(super) is_white: bool,
-    /// Functions that the log powers of each record were fitted with; empty for white noise.
+    /// Basis functions of the log powers of each record; empty for white noise.
     pub(super) bases: Vec<DMatrix<f64>>,
 }
 
-/// What stays the same from round to round.
+/// Data and model of all rounds.
 pub(super) struct UnknownNoise<'a, M> {
     pub(super) model: &'a M,
     pub(super) data: &'a LineData,
@@ -38,7 +38,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Residual { model: self.model, data: self.data, weights, priors: self.priors }
     }
 
-    /// Weights for a first search: white noise of a tenth of each output.
+    /// Returns the weights of the first search: white noise of a tenth of each output.
     pub(super) fn first_weights(&self) -> Weights {
         let (lines, outputs) = self.data.outputs().shape();
         let power = |column: usize| {
@@ -55,8 +55,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         minimise(&residual, self.bounds, from, STEPS).filter(|minimum| minimum.converged)
     }
 
-    /// White noise of the levels that make the residual most likely, in turn with the parameters. A
-    /// level is larger than the root mean square of its residual by what the fit took up.
+    /// Alternates between the most likely levels of white noise and the parameters. A level is
+    /// corrected for the degrees of freedom of the fit.
     ///
     /// # Errors
     /// [`LikelihoodError::NotConverged`].
@@ -82,20 +82,20 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok(WeightedMinimum { minimum, weights, is_white: true, bases: Vec::new() })
     }
 
-    /// Real numbers over what the unknowns leave of them.
-    fn taken_up(&self, minimum: &Minimum, residual: &Residual<'_, M>) -> f64 {
+    /// Returns the ratio of the number of real numbers to the degrees of freedom of the residual.
+    fn freedom_ratio(&self, minimum: &Minimum, residual: &Residual<'_, M>) -> f64 {
         let free = minimum.at_bound.iter().filter(|at_bound| !**at_bound).count();
         let unknowns = (free + residual.transient_unknowns()).saturating_sub(self.priors.len());
         residual.len() as f64 / residual.len().saturating_sub(unknowns).max(1) as f64
     }
 
-    /// Variance of the noise of each output.
+    /// Estimates the variance of the noise of each output.
     fn levels(&self, weights: &Weights, minimum: &Minimum) -> Result<Vec<f64>, LikelihoodError> {
         let residual = self.residual(weights);
         let failed = LikelihoodError::NoResponse { at: "a minimum" };
         let LineErrors { errors, receptances } =
             residual.errors(&minimum.parameters).ok_or(failed)?;
-        let factor = self.taken_up(minimum, &residual);
+        let factor = self.freedom_ratio(minimum, &residual);
         let level = |output: usize| {
             let of_line = |row: usize| {
                 let by_inputs = weights.variance_by_inputs(row, output, &receptances[row]);
@@ -104,7 +104,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
             motion_level((0..self.data.len()).map(of_line)).powi(2)
         };
         let levels: Vec<f64> = (0..errors.ncols()).map(level).collect();
-        // An output without any residual must not take all the weight.
+        // An output without residual would have an unbounded weight.
         let size = |output: usize| {
             let column = self.data.outputs().column(output);
             column.iter().map(|y| y.norm_sqr()).sum::<f64>() / column.len() as f64
@@ -113,8 +113,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok(levels.into_iter().enumerate().map(floor).collect())
     }
 
-    /// Noise with the smooth spectra that the residual shows, one of each output and record; `None`
-    /// where all of them are white.
+    /// Alternates between smooth noise spectra from the residual, one for each output and record,
+    /// and the parameters; `None` if all spectra are white.
     ///
     /// # Errors
     /// [`LikelihoodError::NoResponse`].
@@ -136,7 +136,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok(last)
     }
 
-    /// Variances, lines × p, and the functions of every record that describe their logarithms.
+    /// Returns the variances, lines × p, and the basis functions of their logarithms for every
+    /// record.
     fn spectra(
         &self,
         before: &WeightedMinimum,
@@ -145,13 +146,13 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         let failed = || LikelihoodError::NoResponse { at: "a minimum" };
         let LineErrors { errors, receptances } =
             residual.errors(&before.minimum.parameters).ok_or_else(failed)?;
-        let kept = self.kept(before).ok_or_else(failed)?;
+        let residual_share = self.residual_share(before).ok_or_else(failed)?;
         let power = DMatrix::from_fn(errors.nrows(), errors.ncols(), |row, output| {
             let level = before.weights.variance(row, output);
             let by_inputs = before.weights.variance_by_inputs(row, output, &receptances[row]);
             let share = level / (level + by_inputs);
             let power = (share * errors[(row, output)].norm_sqr()).max(LEAST_POWER * level);
-            power / kept[(row, output)]
+            power / residual_share[(row, output)]
         });
         let mut variance = power.clone();
         let mut bases = Vec::new();
@@ -173,8 +174,8 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         Ok((variance, bases))
     }
 
-    /// Part of the noise that the residual keeps beside the parameters, lines × p.
-    fn kept(&self, before: &WeightedMinimum) -> Option<DMatrix<f64>> {
+    /// Returns the share of the noise in the residual after the fit (1 − leverage), lines × p.
+    fn residual_share(&self, before: &WeightedMinimum) -> Option<DMatrix<f64>> {
         let residual = self.residual(&before.weights);
         let linearisation = residual.linearise(&before.minimum.parameters)?;
         let free: Vec<usize> =

@@ -1,5 +1,4 @@
-//! Uncertainty of an estimate that follows from that of the smooth noise spectra by which it is
-//! weighted.
+//! Uncertainty of an estimate due to the estimated noise spectra of its weights.
 
 use mechid_spectra::LineData;
 use nalgebra::{DMatrix, DVector};
@@ -7,15 +6,14 @@ use nalgebra::{DMatrix, DVector};
 use super::covariance::Information;
 
 impl Information {
-    /// Adds to the covariance what the errors of noise spectra make of the estimate, and returns
-    /// the degrees of freedom of the variance of the parameter that has the fewest. `jacobian` is
-    /// the derivative of the residual, and `bases` the functions that the log powers of each record
-    /// were fitted with.
+    /// Adds the contribution of the errors of noise spectra to the covariance, and returns the
+    /// fewest degrees of freedom of the variance of a parameter. `jacobian` is the derivative of
+    /// the residual, and `bases` are the basis functions of the log powers of each record. `None`,
+    /// without a change of the covariance, if a parameter is not determined.
     ///
     /// With log powers B β of unit information, orthonormal sensitivities Q and P_i = Σ b_li
-    /// Q_lᵀQ_l, the estimate scatters more by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the inverse of the
-    /// Fisher information is too small by as much. `None`, and nothing added, where some parameter
-    /// is not determined.
+    /// Q_lᵀQ_l, the covariance of the estimate grows by Λ = Σ h_l Q_lᵀQ_l − Σ P_i P_i, and the
+    /// inverse of the Fisher information is too small by the same matrix.
     ///
     /// # Source
     /// Kenward & Roger (1997), Biometrics 53, 983–997; degrees of freedom: Satterthwaite (1946),
@@ -65,8 +63,8 @@ impl Information {
                 self.covariance[(*row, *column)] += more[(i, j)];
             }
         }
-        let each = root.row_iter().zip(spread.iter());
-        let freedom = each.map(|(c, spread)| 2.0 * c.norm_squared().powi(2) / spread);
+        let variances = root.row_iter().zip(spread.iter());
+        let freedom = variances.map(|(c, spread)| 2.0 * c.norm_squared().powi(2) / spread);
         Some(freedom.fold(f64::INFINITY, f64::min))
     }
 }

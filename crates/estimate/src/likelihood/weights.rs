@@ -1,4 +1,4 @@
-//! Covariance of the noise by which residuals are weighted.
+//! Noise covariance that weights the residuals.
 
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -13,11 +13,11 @@ pub(super) struct Weights {
     inputs_are_exact: bool,
 }
 
-/// e, its covariance L Lᴴ and the part of it that the inputs account for.
+/// Factors of the covariance L Lᴴ of the error e of a line.
 pub(super) struct WeightedLine {
-    /// L.
+    /// Lower triangular factor L.
     pub(super) lower: DMatrix<Complex<f64>>,
-    /// S_uy − S_uu Gᴴ, by which e shows the error of the inputs; empty for exact ones.
+    /// Covariance S_uy − S_uu Gᴴ of the errors of the inputs with e; empty for exact inputs.
     cross: DMatrix<Complex<f64>>,
 }
 
@@ -31,13 +31,13 @@ impl Weights {
         Self { covariance, outputs, inputs_are_exact }
     }
 
-    /// Covariance of the outputs alone, diagonal, lines × p, beside that of the inputs which the
-    /// data state.
+    /// Creates weights from variances of the outputs, lines × p, and the stated covariance of the
+    /// inputs.
     pub(super) fn from_variances(data: &LineData, variance: &DMatrix<f64>) -> Self {
         let (outputs, inputs) = (data.outputs().ncols(), data.inputs().ncols());
-        let all = outputs + inputs;
+        let channels = outputs + inputs;
         let covariance = (0..data.len()).map(|row| {
-            let mut matrix = DMatrix::zeros(all, all);
+            let mut matrix = DMatrix::zeros(channels, channels);
             if let Some(noise) = data.noise() {
                 let of_inputs = noise.covariance()[row].view((outputs, outputs), (inputs, inputs));
                 matrix.view_mut((outputs, outputs), (inputs, inputs)).copy_from(&of_inputs);
@@ -50,7 +50,7 @@ impl Weights {
         Self::new(covariance.collect(), outputs)
     }
 
-    /// The same with a share of the power of every output added: noise relative to the response.
+    /// Adds noise relative to the response: an amplitude `share` of every output.
     pub(super) fn with_relative(&self, data: &LineData, share: f64) -> Self {
         let mut covariance = self.covariance.clone();
         for (row, matrix) in covariance.iter_mut().enumerate() {
@@ -67,7 +67,7 @@ impl Weights {
         self.covariance[row][(output, output)].re
     }
 
-    /// Variance that the noise of the inputs makes of an output.
+    /// Variance of an output due to the noise of the inputs.
     pub(super) fn variance_by_inputs(
         &self,
         row: usize,
@@ -80,7 +80,8 @@ impl Weights {
         (gain * of_inputs * gain.adjoint())[(0, 0)].re
     }
 
-    /// L of S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ + `more`; `None` if that is singular.
+    /// Factors S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ plus the covariance that `more` adds; `None` if
+    /// the sum is singular.
     pub(super) fn line(
         &self,
         row: usize,
@@ -101,7 +102,7 @@ impl Weights {
         Some(WeightedLine { lower: cholesky(total)?, cross })
     }
 
-    /// Checks that the outputs have noise at every line where the inputs are exact.
+    /// Checks that the outputs have noise at every line if the inputs are exact.
     pub(super) fn check(&self, data: &LineData) -> Result<(), LikelihoodError> {
         if !self.inputs_are_exact {
             return Ok(());
@@ -118,8 +119,8 @@ impl Weights {
 }
 
 impl WeightedLine {
-    /// Input û = u − Q (L Lᴴ)⁻¹ e that, within its noise, agrees best with the outputs; `white` is
-    /// L⁻¹e.
+    /// Returns the most likely input û = u − Q (L Lᴴ)⁻¹ e, given its noise and the outputs; `white`
+    /// is L⁻¹e.
     pub(super) fn likely_input(
         &self,
         input: DVector<Complex<f64>>,
@@ -136,9 +137,9 @@ impl WeightedLine {
     }
 }
 
-/// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
+/// Returns L of a Hermitian positive definite matrix L Lᴴ, `None` for any other matrix.
 fn cholesky(matrix: DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
-    // nalgebra takes complex roots of negative pivots, so they have to be looked for.
+    // nalgebra does not reject negative pivots but computes their complex roots.
     let lower = matrix.cholesky()?.unpack();
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
     lower.diagonal().iter().all(positive).then_some(lower)

@@ -12,7 +12,7 @@ use crate::covariance::Product;
 use crate::estimate::EstimateParts;
 use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
-/// M̂, Ĉ, K̂ and the sampled and continuous state equations from which they are computed.
+/// M̂, Ĉ, K̂ and their sampled and continuous state equations.
 ///
 /// The residual ratios of its [`Estimate`] refer to the velocity increments ẋ⁺ − ẋ.
 #[derive(Debug, Clone, PartialEq)]
@@ -342,7 +342,7 @@ impl Fitted<'_> {
             .collect();
         let count = sensitivities.len();
         Ok(DMatrix::from_fn(count, count, |p, q| {
-            // Both orders are computed in the same way, so that the matrix is exactly symmetric.
+            // The same product for both orders makes the matrix exactly symmetric.
             let (p, q) = (p.min(q), p.max(q));
             weighted[p].dot(&gradients[q])
         }))

@@ -7,9 +7,9 @@
 //!
 //! | Discretisation | The force between samples | Error on noise-free data |
 //! |---|---|---|
-//! | [`Discretisation::Euler`] | irrelevant: ẋ is a difference quotient | proportional to the step, often per cents |
-//! | [`Discretisation::ZeroOrderHold`] | held, as a digital converter drives a shaker | none if it truly is |
-//! | [`Discretisation::FirstOrderHold`] | linear from sample to sample | none if it truly is; for a smooth force proportional to the square of the step |
+//! | [`Discretisation::Euler`] | any: ẋ is a difference quotient | ∝ Δt, often some per cent |
+//! | [`Discretisation::ZeroOrderHold`] | held, as by a digital converter | none if it is held |
+//! | [`Discretisation::FirstOrderHold`] | linear | none if it is linear; ∝ Δt² if it is smooth |
 //!
 //! When the acceleration is measured too, [`equation_of_motion`] needs no discretisation at all.
 //!

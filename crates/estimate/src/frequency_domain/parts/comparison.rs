@@ -56,7 +56,7 @@ struct Scores {
 
 impl Scores {
     /// Returns the scores of a part.
-    fn of_part(&self, part: usize) -> DVector<f64> {
+    fn part_scores(&self, part: usize) -> DVector<f64> {
         self.scores.rows(part * self.count, self.count).into_owned()
     }
 
@@ -132,7 +132,7 @@ impl PartsOfFit<'_> {
         let parts = scores.scores.len() / scores.count;
         let of_row = |row: usize| {
             let root = self.linear.root.row(row).transpose();
-            let square = |part: usize| root.dot(&scores.of_part(part)).powi(2);
+            let square = |part: usize| root.dot(&scores.part_scores(part)).powi(2);
             let expected = |part: usize| root.dot(&(scores.covariance_of(part) * &root));
             let (squares, expected) = (
                 (0..parts).map(square).sum::<f64>(),
@@ -149,7 +149,7 @@ impl PartsOfFit<'_> {
         let parts = cuts.columns(self.data, &self.linear.basis);
         let of_part = |(at, part): (usize, Part)| {
             let (inverse, _) = pseudo_inverse(&scores.covariance_of(at))?;
-            let difference = &inverse * scores.of_part(at);
+            let difference = &inverse * scores.part_scores(at);
             let of_others = -self.linear.basis.tr_mul(&(&parts[at] * &difference));
             let one = |row: usize| {
                 let root = self.linear.root.row(row).transpose();

@@ -1,12 +1,13 @@
-//! Elimination of a sparse complex matrix within the band that a good order leaves.
+//! Elimination of a sparse complex matrix within its band, after a reordering for a small band
+//! width.
 
 use nalgebra::{Complex, DMatrix};
 
-/// Order of rows and columns that gathers the entries of a symmetric pattern about the diagonal.
+/// Returns an order of rows and columns with the entries of a symmetric pattern near the diagonal.
 ///
 /// # Source
-/// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.3 (reverse
-/// Cuthill–McKee).
+/// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.3
+/// (reverse Cuthill–McKee).
 pub(super) fn order(neighbours: &[Vec<usize>]) -> Vec<usize> {
     let degree = |at: &usize| neighbours[*at].len();
     let mut visited = vec![false; neighbours.len()];
@@ -36,22 +37,23 @@ pub(super) fn order(neighbours: &[Vec<usize>]) -> Vec<usize> {
     order
 }
 
-/// Largest distance of an entry from the diagonal in an order.
+/// Returns the largest distance of an entry from the diagonal in an order.
 pub(super) fn half_band(neighbours: &[Vec<usize>], order: &[usize]) -> usize {
-    let mut place = vec![0; order.len()];
-    order.iter().enumerate().for_each(|(at, dof)| place[*dof] = at);
+    let mut index = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(at, dof)| index[*dof] = at);
     let distances = neighbours
         .iter()
         .enumerate()
         .flat_map(|(row, columns)| columns.iter().map(move |column| (row, *column)));
-    distances.map(|(row, column)| place[row].abs_diff(place[column])).max().unwrap_or(0)
+    distances.map(|(row, column)| index[row].abs_diff(index[column])).max().unwrap_or(0)
 }
 
-/// A square matrix with entries at most `half` beside the diagonal.
+/// A square band matrix with entries up to `half` columns from the diagonal.
 pub(super) struct Banded {
     order: usize,
     half: usize,
-    /// Rows of 3 `half` + 1 entries: from column i − half to i + 2 half, room for exchanged rows.
+    /// Rows of 3 `half` + 1 entries, from column i − half to i + 2 half, because row exchanges
+    /// widen the band.
     rows: Vec<Complex<f64>>,
 }
 
@@ -69,16 +71,16 @@ impl Banded {
         self.rows[at] += value;
     }
 
-    /// Replaces the right-hand sides, given as rows, by the solution; `false` for a singular matrix. The
-    /// matrix is used up.
+    /// Replaces the right-hand sides by the solution and overwrites the matrix; returns `false` for
+    /// a singular matrix.
     ///
     /// # Source
-    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.3 (band elimination with row
-    /// exchanges).
+    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.3 (band elimination
+    /// with row exchanges).
     pub(super) fn solve(&mut self, sides: &mut DMatrix<Complex<f64>>) -> bool {
         let count = sides.ncols();
         let transposed = sides.transpose();
-        // Rows of the sides one after the other.
+        // Row-major storage of the right-hand sides.
         let mut b: Vec<Complex<f64>> = transposed.as_slice().to_vec();
         for k in 0..self.order {
             if !self.eliminate(k, &mut b, count) {
@@ -101,7 +103,7 @@ impl Banded {
         b.iter().all(|z| z.is_finite())
     }
 
-    /// One step of the elimination with the largest pivot of the column.
+    /// Performs one step of the elimination with the largest pivot of the column.
     fn eliminate(&mut self, k: usize, b: &mut [Complex<f64>], count: usize) -> bool {
         let lowest = (k + self.half).min(self.order - 1);
         let last = (k + 2 * self.half).min(self.order - 1);
@@ -137,7 +139,7 @@ impl Banded {
     }
 }
 
-/// y ← y − x·factor.
+/// Replaces y by y − x·factor.
 fn subtract(y: &mut [Complex<f64>], x: &[Complex<f64>], factor: Complex<f64>) {
     for (y, x) in y.iter_mut().zip(x) {
         *y -= x * factor;

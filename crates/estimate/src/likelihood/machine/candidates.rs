@@ -1,4 +1,4 @@
-//! Places where another sensor or another force would say most.
+//! Information gain of another sensor or another force.
 
 use mechid_model::elements::{Input, InputColumn, Instruments, Machine, Sensor};
 use mechid_spectra::LineData;
@@ -10,9 +10,10 @@ use crate::likelihood::{LikelihoodError, LineResponse, ResponseModel};
 /// A measurement that could be added.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Candidate {
-    /// One sensor more in the same test, as noisy as those of its quantity.
+    /// An additional sensor in the same test, as noisy as the sensors of its quantity.
     Sensor(Sensor),
-    /// A second test with this force in place of the others, as large as they are, and the same sensors.
+    /// A second test with this force instead of the others, as large as they are, and the same
+    /// sensors.
     Force(Input),
 }
 
@@ -22,28 +23,28 @@ pub enum Candidate {
 pub struct CandidateGain {
     /// Name of the sensor or the force.
     pub name: String,
-    /// Logarithm of the factor by which the volume of the confidence region shrinks; infinite where a
-    /// combination becomes determined that was not.
+    /// Logarithm of the ratio of the volumes of the confidence region without and with the
+    /// candidate; infinite if a combination becomes determined.
     pub information_gain: f64,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
     /// Standard errors with the candidate, one for each parameter in their order and in its unit;
-    /// `None` of what stays open.
+    /// `None` for a parameter that is still not determined.
     pub standard_errors: Vec<Option<f64>>,
 }
 
-/// Ratio of eigenvalues of the scaled information below which a combination is not determined.
+/// Minimum ratio of eigenvalues of the scaled information for a determined combination.
 const RANK: f64 = 1e-13;
 
 impl MachineEstimate {
-    /// Ranks measurements that could be added to the test that led to this estimate, the best first.
+    /// Ranks additional measurements for the test of this estimate, the best first.
     ///
     /// # Errors
     /// [`LikelihoodError::Machine`] for a candidate at an unknown degree of freedom.
     ///
     /// # Source
-    /// Fedorov (1972), *Theory of Optimal Experiments*, chapter 2 (determinant of the information); Kammer
-    /// (1991), J. Guidance, Control and Dynamics 14, 251–259 (places of sensors).
+    /// Fedorov (1972), *Theory of Optimal Experiments*, chapter 2 (determinant of the information);
+    /// Kammer (1991), J. Guidance, Control and Dynamics 14, 251–259 (places of sensors).
     pub fn rank_candidates(
         &self,
         data: &LineData,
@@ -68,13 +69,13 @@ impl MachineEstimate {
             gains.push(CandidateGain { name, information_gain, newly_determined, standard_errors });
         }
         gains.sort_by(|a, b| {
-            let of = |gain: &CandidateGain| (gain.newly_determined, gain.information_gain);
-            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
+            let rank = |gain: &CandidateGain| (gain.newly_determined, gain.information_gain);
+            rank(b).partial_cmp(&rank(a)).unwrap_or(std::cmp::Ordering::Equal)
         });
         Ok(gains)
     }
 
-    /// JᵀJ of the present test with its priors, scaled by the values of the parameters.
+    /// Returns JᵀJ of the present test with its priors, scaled by the values of the parameters.
     fn information(
         &self,
         data: &LineData,
@@ -125,13 +126,14 @@ impl MachineEstimate {
         }
     }
 
-    /// Noise of a sensor: the mean variance of the sensors of its quantity, or of all, per squared gain.
+    /// Returns the noise of a sensor: the mean variance of the sensors of its quantity, or of all
+    /// sensors, corrected for the gains.
     fn sensor_variance(&self, instruments: &Instruments, sensor: &Sensor) -> DMatrix<f64> {
         let same = |at: &usize| instruments.sensors[*at].quantity == sensor.quantity;
-        let all: Vec<usize> = (0..self.variance.ncols()).collect();
-        let mut like: Vec<usize> = all.iter().copied().filter(same).collect();
+        let sensors: Vec<usize> = (0..self.variance.ncols()).collect();
+        let mut like: Vec<usize> = sensors.iter().copied().filter(same).collect();
         if like.is_empty() {
-            like = all;
+            like = sensors;
         }
         DMatrix::from_fn(self.variance.nrows(), 1, |row, _| {
             let sum: f64 = like
@@ -145,7 +147,7 @@ impl MachineEstimate {
         })
     }
 
-    /// JᵀJ of a test, in units of the values.
+    /// Returns JᵀJ of a test, scaled by the values of the parameters.
     fn gram(
         &self,
         machine: &Machine,
@@ -160,10 +162,10 @@ impl MachineEstimate {
         // Another set of sensors may have fewer delays among its parameters.
         let mut places = Vec::new();
         for parameter in assembly.parameters() {
-            let all = self.assembly.parameters();
-            let place = all.iter().position(|other| other.name == parameter.name);
+            let parameters = self.assembly.parameters();
+            let index = parameters.iter().position(|other| other.name == parameter.name);
             let what = "a candidate without unknowns of its own: unknown parameters";
-            places.push(place.ok_or(LikelihoodError::Size { what, expected: 0, got: 1 })?);
+            places.push(index.ok_or(LikelihoodError::Size { what, expected: 0, got: 1 })?);
         }
         let values: Vec<f64> = places.iter().map(|place| values[*place]).collect();
         let (count, outputs) = (self.assembly.parameters().len(), assembly.sensors().len());
@@ -191,12 +193,12 @@ impl MachineEstimate {
     }
 }
 
-/// Unit in which a parameter is counted.
+/// Returns the scale of a parameter.
 fn scale(value: f64) -> f64 {
     if value == 0.0 { 1.0 } else { value.abs() }
 }
 
-/// Sum of the logarithms of the eigenvalues that are determined, and their number.
+/// Returns the sum of the logarithms of the determined eigenvalues, and their number.
 fn spectrum(gram: &DMatrix<f64>) -> (f64, usize) {
     let Ok(eigen) = mechid_numerics::linear_algebra::hermitian_eigen(gram.clone()) else {
         return (f64::NAN, 0);
@@ -207,7 +209,8 @@ fn spectrum(gram: &DMatrix<f64>) -> (f64, usize) {
     (determined.iter().map(|value| value.ln()).sum(), determined.len())
 }
 
-/// Relative standard errors of the parameters; none where a direction that is open takes part.
+/// Returns the relative standard errors of the parameters; `None` if an undetermined direction
+/// depends on the parameter.
 fn standard_errors(gram: &DMatrix<f64>) -> Vec<Option<f64>> {
     let count = gram.nrows();
     let Ok(eigen) = mechid_numerics::linear_algebra::hermitian_eigen(gram.clone()) else {

@@ -12,8 +12,8 @@ use crate::likelihood::residual::PriorRow;
 use crate::likelihood::search::Bounds;
 use crate::likelihood::{LikelihoodError, Settings};
 
-/// Measured receptance of the part of a machine whose degrees of freedom are [`Machine::measured`], in their
-/// order.
+/// Measured receptance of the part of a machine with the degrees of freedom [`Machine::measured`],
+/// in their order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredReceptance {
     /// Receptance, d × d, in m/N, one for each line of the data.
@@ -22,30 +22,30 @@ pub struct MeasuredReceptance {
     pub variance: Option<Vec<DMatrix<f64>>>,
 }
 
-/// Unknowns of a machine that were identified.
+/// Identified machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MachineEstimate {
-    /// Parameters, intervals, minima and what is not determined.
+    /// Parameters, intervals, minima and undetermined combinations.
     pub likelihood: LikelihoodEstimate,
-    /// The machine by index.
+    /// The machine with its degrees of freedom by index.
     pub assembly: Assembly,
     /// Variance of the noise of each output, lines × p.
     pub(super) variance: DMatrix<f64>,
-    /// Difference of measured and modelled outputs, lines × p, in the units of the outputs; the transients
-    /// of open records are subtracted.
+    /// Difference of measured and modelled outputs, lines × p, in the units of the outputs; the
+    /// transients of open records are subtracted.
     pub errors: DMatrix<Complex<f64>>,
-    /// Residual in units of the noise, of unit variance: row 2(p·line + output) is a real part, the next
-    /// one the imaginary part.
+    /// Residual in units of the noise, of unit variance: row 2(p·line + output) is a real part, the
+    /// next row the imaginary part.
     pub residual: DVector<f64>,
-    /// Orthonormal columns of the part of the residual that the parameters explain, rows as of
+    /// Orthonormal basis of the sensitivities of the residual, with the rows of
     /// [`MachineEstimate::residual`].
     pub explained: DMatrix<f64>,
-    /// Part whose receptance was measured.
+    /// Part with a measured receptance.
     pub(super) part: Option<MeasuredPart>,
 }
 
-/// Identifies the unknown coefficients of a machine from line data whose outputs are the readings of its
-/// sensors and whose inputs are its inputs, in this order.
+/// Identifies the unknown coefficients of a machine from line data. The outputs of the data are the
+/// readings of the sensors, and the inputs are those of the instruments, in this order.
 ///
 /// ```
 /// use mechid_estimate::likelihood::{Settings, machine::identify_machine};
@@ -54,7 +54,7 @@ pub struct MachineEstimate {
 /// use mechid_spectra::{LineData, Transient};
 /// use nalgebra::{Complex, DMatrix, DVector};
 ///
-/// // A mass of 2 kg on a spring and a damper, with an exact receptance up to a disturbance.
+/// // A mass of 2 kg on a spring and a damper: exact receptance plus a small disturbance.
 /// let omega: Vec<f64> = (1..40).map(|line| 5.0 * line as f64).collect();
 /// let response = |w: f64| Complex::new(2e4 - 2.0 * w * w, 8.0 * w).inv();
 /// let disturbed = |at: usize| response(omega[at]) + Complex::cis((at * at) as f64) * 1e-7;
@@ -82,13 +82,13 @@ pub struct MachineEstimate {
 /// ```
 ///
 /// # Errors
-/// [`LikelihoodError::Machine`] if the machine does not make sense, and what else keeps data and machine
-/// from leading to an estimate.
+/// [`LikelihoodError::Machine`] if the description of the machine is not consistent, and the other
+/// errors of a fit.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapter 9
-/// (maximum likelihood); Mottershead & Friswell (1993), J. Sound and Vibration 167, 347–375 (updating of the
-/// parameters of a model).
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapter 9 (maximum likelihood); Mottershead & Friswell (1993), J. Sound and Vibration 167,
+/// 347–375 (updating of the parameters of a model).
 pub fn identify_machine(
     data: &LineData,
     machine: &Machine,
@@ -98,12 +98,12 @@ pub fn identify_machine(
     identify(data, machine, instruments, None, settings)
 }
 
-/// Identifies a machine of which one part, with the degrees of freedom [`Machine::measured`], is known by its
-/// measured receptance.
+/// Identifies a machine with a measured receptance of one part, which has the degrees of freedom
+/// [`Machine::measured`].
 ///
 /// # Errors
-/// As [`identify_machine`]; [`LikelihoodError::Size`] unless there is one receptance per line with one row
-/// and column per degree of freedom of the part.
+/// As [`identify_machine`]; [`LikelihoodError::Size`] unless there is one receptance per line with
+/// one row and column per degree of freedom of the part.
 ///
 /// # Source
 /// de Klerk, Rixen & Voormeeren (2008), AIAA Journal 46, 1169–1181 (coupling of measured parts).
@@ -176,9 +176,8 @@ fn checked_part(
     assembly: &Assembly,
     part: &MeasuredReceptance,
 ) -> Result<MeasuredPart, LikelihoodError> {
-    let size = |what, expected, got| match expected == got {
-        true => Ok(()),
-        false => Err(LikelihoodError::Size { what, expected, got }),
+    let size = |what, expected, got| {
+        if expected == got { Ok(()) } else { Err(LikelihoodError::Size { what, expected, got }) }
     };
     let dofs = assembly.measured().to_vec();
     size("measured receptances, one per line", data.len(), part.receptance.len())?;

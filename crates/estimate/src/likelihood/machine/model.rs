@@ -1,4 +1,5 @@
-//! The response of a machine: what is known, coupled to what is not by a small solve on every line.
+//! Response of a machine: its known part, coupled to the unknown terms by a small system of
+//! equations on every line.
 
 use std::ops::AddAssign;
 
@@ -9,7 +10,8 @@ use super::nominal::{NominalLine, Places, is_coupled, nominal_coefficient, prepa
 use super::{LikelihoodError, MeasuredPart};
 use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
 
-/// A term of the dynamic stiffness between the joints; index j is the support.
+/// A term of the dynamic stiffness between the joints (degrees of freedom of unknown terms); index
+/// j is the support.
 #[derive(Debug, Clone)]
 struct JointTerm {
     entries: JointPattern,
@@ -28,13 +30,13 @@ enum JointPattern {
 
 /// The [`ResponseModel`] of a machine.
 ///
-/// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the joints,
-/// the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹, of the order of the number of
-/// joints however many degrees of freedom are known.
+/// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the
+/// joints, the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹. The order of this
+/// system is the number of joints, for any number of known degrees of freedom.
 ///
 /// # Source
-/// Hager (1989), SIAM Review 31, 221–239 (updating an inverse); Gordis, Bielawa & Flannelly (1991), J. Sound
-/// and Vibration 150, 139–158 (structural synthesis in the frequency domain).
+/// Hager (1989), SIAM Review 31, 221–239 (updating an inverse); Gordis, Bielawa & Flannelly (1991),
+/// J. Sound and Vibration 150, 139–158 (structural synthesis in the frequency domain).
 #[derive(Debug, Clone)]
 pub struct MachineModel {
     assembly: Assembly,
@@ -43,7 +45,7 @@ pub struct MachineModel {
     terms: Vec<JointTerm>,
     lines: Vec<NominalLine>,
     line_of: Vec<usize>,
-    /// Sensors: weights of places and of the support, index r.
+    /// Weights of each sensor by index in `places`; index r is the support.
     sensors: Vec<Vec<(usize, f64)>>,
     states: usize,
     measured: Option<MeasuredPart>,
@@ -54,31 +56,34 @@ pub struct MachineModel {
 pub struct MachineLine<'a> {
     model: &'a MachineModel,
     omega: f64,
-    /// G, p × q.
+    /// Receptance G, p × q.
     receptance: DMatrix<Complex<f64>>,
-    /// Response of the sensors to each own load, p × loads, and to all of them.
+    /// Response of the sensors to a unit of each load of the machine, such as unbalance, p × loads.
     own_response: DMatrix<Complex<f64>>,
+    /// Response of the sensors to all loads of the machine.
     own: Option<DVector<Complex<f64>>>,
-    /// Own loads in units of those that are known.
+    /// Values of the loads of the machine; 1 for known loads.
     own_values: Vec<f64>,
-    /// S H from the joints, p × j.
+    /// Response S H of the sensors to forces at the joints, p × j.
     from_joints: DMatrix<Complex<f64>>,
-    /// Motion of joints and support (j + 1) per unit of each input and own load.
+    /// Motion of joints and support (j + 1) per unit of each input and load of the machine.
     joints: DMatrix<Complex<f64>>,
-    /// H between the joints, if there are state loads.
+    /// Receptance H between the joints, if there are state loads.
     internal: Option<DMatrix<Complex<f64>>>,
     /// Frequency factor of each term between the joints.
     factors: Vec<Complex<f64>>,
-    /// Of a measured part: S (I − H Δ) at its degrees of freedom, and the forces on it per input.
+    /// Response S (I − H Δ) of the sensors to motions of a measured part, and the forces on it per
+    /// input.
     part: Option<[DMatrix<Complex<f64>>; 2]>,
 }
 
 impl MachineModel {
-    /// Prepares a machine for lines at `omega` (rad/s); with `open` records all degrees of freedom become
-    /// joints, for the difference between the initial and the final state acts on each of them.
+    /// Prepares a machine for lines at `omega` (rad/s). With `open` records all degrees of freedom
+    /// are joints, because the difference between the initial and the final state acts on each of
+    /// them.
     ///
     /// # Errors
-    /// [`LikelihoodError::NoResponse`] if the machine has no response at its first values.
+    /// [`LikelihoodError::NoResponse`] if the machine has no response at its initial values.
     pub fn new(
         assembly: &Assembly,
         omega: &[f64],
@@ -88,10 +93,8 @@ impl MachineModel {
         let places = Places::new(assembly, measured, open);
         let (lines, line_of) = prepare(assembly, measured, &places, omega)?;
         let n = assembly.dof();
-        let joint = |dof: usize| match dof == n {
-            true => places.joints,
-            false => places.place(dof).unwrap_or(places.joints),
-        };
+        // The support, degree of freedom n, has no index in `places`.
+        let joint = |dof: usize| places.index(dof).unwrap_or(places.joints);
         let start = assembly.start();
         let coupled = assembly.terms().iter().enumerate();
         let coupled = coupled.filter(|(_, term)| is_coupled(term, measured));
@@ -101,7 +104,7 @@ impl MachineModel {
             };
             let entries = match &term.pattern {
                 Pattern::Dyad { left, right } => {
-                    // The support has no equation of its own.
+                    // The support has no equation of motion.
                     let moving: Vec<_> = left.iter().filter(|(dof, _)| *dof < n).copied().collect();
                     JointPattern::Dyad { left: indexed(&moving), right: indexed(right) }
                 }
@@ -116,8 +119,8 @@ impl MachineModel {
         });
         let terms = terms.collect();
         let sensors = assembly.sensors().iter().map(|sensor| {
-            let place = |dof: usize| places.place(dof).unwrap_or(places.dofs.len());
-            sensor.entries.iter().map(|(dof, weight)| (place(*dof), *weight)).collect()
+            let index = |dof: usize| places.index(dof).unwrap_or(places.dofs.len());
+            sensor.entries.iter().map(|(dof, weight)| (index(*dof), *weight)).collect()
         });
         let sensors = sensors.collect();
         Ok(Self {
@@ -133,12 +136,12 @@ impl MachineModel {
         })
     }
 
-    /// Returns the machine by index.
+    /// Returns the machine with its degrees of freedom by index.
     pub fn assembly(&self) -> &Assembly {
         &self.assembly
     }
 
-    /// Δ, j × (j + 1), and the frequency factors of its terms.
+    /// Returns Δ, j × (j + 1), and the frequency factors of its terms.
     fn change(&self, parameters: &[f64], omega: f64) -> (DMatrix<Complex<f64>>, Vec<Complex<f64>>) {
         let joints = self.places.joints;
         let speed = self.assembly.speed().at(omega);
@@ -170,7 +173,7 @@ impl MachineModel {
         (change, factors)
     }
 
-    /// Readings of the sensors under motions of the places, r × m, and of the support, in one column each.
+    /// Returns the readings of the sensors for motions of the `places`, r × m, and of the support.
     fn read(
         &self,
         factors: &[Complex<f64>],
@@ -180,9 +183,13 @@ impl MachineModel {
         let mut readings = DMatrix::zeros(self.sensors.len(), places.ncols());
         for (row, (entries, factor)) in self.sensors.iter().zip(factors).enumerate() {
             for column in 0..places.ncols() {
-                let motion = entries.iter().map(|(place, weight)| match *place < places.nrows() {
-                    true => places[(*place, column)] * *weight,
-                    false => support.map_or(Complex::default(), |of| of[column]) * *weight,
+                let motion = entries.iter().map(|(index, weight)| {
+                    let motion = if *index < places.nrows() {
+                        places[(*index, column)]
+                    } else {
+                        support.map_or(Complex::default(), |support| support[column])
+                    };
+                    motion * *weight
                 });
                 readings[(row, column)] = factor * motion.sum::<Complex<f64>>();
             }
@@ -190,7 +197,8 @@ impl MachineModel {
         readings
     }
 
-    /// S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on it per input.
+    /// Returns S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on
+    /// it per input.
     fn part(
         &self,
         (omega, readings_of): (f64, &[Complex<f64>]),
@@ -206,20 +214,20 @@ impl MachineModel {
         let mut readings = DMatrix::zeros(self.sensors.len(), part.dofs.len());
         let mut forces = DMatrix::zeros(part.dofs.len(), inputs);
         for (at, dof) in part.dofs.iter().enumerate() {
-            let place = self.places.place(*dof)?;
+            let index = self.places.index(*dof)?;
             for (row, (entries, factor)) in self.sensors.iter().zip(readings_of).enumerate() {
-                let direct: f64 = entries.iter().filter(|(of, _)| *of == place).map(|e| e.1).sum();
+                let direct: f64 = entries.iter().filter(|(of, _)| *of == index).map(|e| e.1).sum();
                 readings[(row, at)] = factor * direct;
-                if place < j {
-                    readings[(row, at)] -= coupled[(row, place)];
+                if index < j {
+                    readings[(row, at)] -= coupled[(row, index)];
                 }
             }
             for (column, input) in self.assembly.inputs().iter().enumerate() {
                 let loads = input.load(n, omega, self.assembly.speed());
                 let direct = loads.iter().filter(|(of, _)| of == dof).map(|(_, value)| value);
                 forces[(at, column)] = direct.sum();
-                if place < j {
-                    forces[(at, column)] -= reaction[(place, column)];
+                if index < j {
+                    forces[(at, column)] -= reaction[(index, column)];
                 }
             }
         }
@@ -247,7 +255,7 @@ impl ResponseModel for MachineModel {
         let (omega, nominal) = (self.omega[row], &self.lines[self.line_of[row]]);
         let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
         let (change, factors) = self.change(parameters, omega);
-        let all = nominal.loads.ncols();
+        let load_count = nominal.loads.ncols();
         let mut from_joints = nominal.from_joints.clone();
         let mut loads = nominal.loads.clone();
         if j > 0 {
@@ -270,9 +278,9 @@ impl ResponseModel for MachineModel {
         let own_loads = self.assembly.own_loads(omega);
         let value = |parameter: &Option<usize>| parameter.map_or(1.0, |at| parameters[at]);
         let own_values: Vec<f64> = own_loads.iter().map(|(of, _)| value(of)).collect();
-        let own_response = responses.columns(inputs, all - inputs).into_owned();
+        let own_response = responses.columns(inputs, load_count - inputs).into_owned();
         let values = DVector::from_iterator(own_values.len(), own_values.iter().map(|v| v.into()));
-        let own = (!own_values.is_empty()).then(|| &own_response * values);
+        let own_sum = (!own_values.is_empty()).then(|| &own_response * values);
         let from_joints = self.read(&of_sensors, &from_joints, None);
         let receptance = responses.columns(0, inputs).into_owned();
         receptance.iter().all(|z| z.is_finite()).then_some(())?;
@@ -282,7 +290,7 @@ impl ResponseModel for MachineModel {
             omega,
             receptance,
             own_response,
-            own,
+            own: own_sum,
             own_values,
             from_joints,
             joints,
@@ -292,8 +300,8 @@ impl ResponseModel for MachineModel {
         })
     }
 
-    /// Adds what the errors of a measured receptance make of the outputs: Σ var_ij |g_j|² P_i P_iᴴ with the
-    /// forces g on the part and the readings P of its motions.
+    /// Adds the covariance of the outputs due to the errors of a measured receptance: Σ var_ij
+    /// |g_j|² P_i P_iᴴ with the forces g on the part and the readings P of its motions.
     fn add_covariance(
         &self,
         row: usize,
@@ -326,7 +334,8 @@ impl LineResponse for MachineLine<'_> {
         (self.model.states > 0).then_some(&self.from_joints)
     }
 
-    /// ∂y = −S H ∂D x for every term, and the response to a unit of each own load.
+    /// Writes ∂y = −S H ∂D x for every term, and the response to a unit of each load of the
+    /// machine.
     fn sensitivity(
         &self,
         parameters: &[f64],
@@ -359,7 +368,7 @@ impl LineResponse for MachineLine<'_> {
                 );
             }
         }
-        // A delay τ turns a reading y by e^{−iωτ}: ∂y/∂τ = −iω y.
+        // A delay τ multiplies a reading y by e^{−iωτ}: ∂y/∂τ = −iω y.
         for (row, sensor) in assembly.sensors().iter().enumerate() {
             let Some(parameter) = sensor.delay_parameter else { continue };
             let mut reading = (self.receptance.row(row) * input)[0];
@@ -378,7 +387,7 @@ impl LineResponse for MachineLine<'_> {
 }
 
 impl MachineLine<'_> {
-    /// Readings under the forces of a term of unit coefficient that moves with `motion` (j + 1).
+    /// Returns the readings for the forces of a term of unit coefficient under `motion` (j + 1).
     fn response_to(
         &self,
         entries: &JointPattern,

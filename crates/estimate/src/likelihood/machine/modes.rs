@@ -19,18 +19,19 @@ pub struct MachineMode {
     pub damping_ratio_error: f64,
 }
 
-/// Relative distance from an eigenvalue at which its vectors are found by inverse iteration.
+/// Relative shift from an eigenvalue for the inverse iteration of its left vector.
 const SHIFT: f64 = 1e-7;
 
 impl MachineEstimate {
-    /// Returns the modes of [`MachineEstimate::system`] by rising frequency; structural damping is not in
-    /// them.
+    /// Returns the modes of [`MachineEstimate::system`] by rising frequency, without structural
+    /// damping.
     ///
     /// # Errors
-    /// As [`MachineEstimate::system`], and if the eigenvalues are not found.
+    /// As [`MachineEstimate::system`], and if the eigenvalues do not converge.
     ///
     /// # Source
-    /// Adhikari (1999), AIAA Journal 37, 1452–1458 (derivatives of the eigenvalues of damped systems).
+    /// Adhikari (1999), AIAA Journal 37, 1452–1458 (derivatives of the eigenvalues of damped
+    /// systems).
     pub fn modes(&self) -> Result<Vec<MachineMode>, LikelihoodError> {
         let system = self.system()?;
         let modes = system.modes().map_err(|error| LikelihoodError::Machine(error.into()))?;
@@ -64,7 +65,8 @@ impl MachineEstimate {
     }
 }
 
-/// ∂λ/∂θ = −ψᵀ ∂D φ / ψᵀ D′ φ with the left and right vectors of D(λ); `None` for eigenvalues that coincide.
+/// Returns ∂λ/∂θ = −ψᵀ ∂D φ / ψᵀ D′ φ with the left and right vectors of D(λ); `None` for
+/// coincident eigenvalues.
 fn slopes(
     assembly: &Assembly,
     values: &[f64],
@@ -77,17 +79,17 @@ fn slopes(
     let dynamic = complex(system.mass()) * (near * near)
         + complex(system.damping()) * near
         + complex(system.stiffness());
-    let right = mode.shape();
+    let phi = mode.shape();
     let factors = dynamic.transpose().lu();
-    let mut left = DVector::from_fn(n, |at, _| Complex::new(1.0 + 0.3 * (at % 7) as f64, 0.1));
+    let mut psi = DVector::from_fn(n, |at, _| Complex::new(1.0 + 0.3 * (at % 7) as f64, 0.1));
     for _ in 0..3 {
-        left = factors.solve(&left)?;
-        let norm = left.norm();
+        psi = factors.solve(&psi)?;
+        let norm = psi.norm();
         (norm.is_finite() && norm > 0.0).then_some(())?;
-        left.unscale_mut(norm);
+        psi.unscale_mut(norm);
     }
     let slope = complex(system.mass()) * (lambda * 2.0) + complex(system.damping());
-    let denominator = left.dot(&(slope * right));
+    let denominator = psi.dot(&(slope * phi));
     let mut slopes = DVector::<Complex<f64>>::zeros(values.len());
     let speed = constant_speed(assembly.speed());
     for term in assembly.terms().iter().filter(|term| term.power != Power::Hysteresis) {
@@ -98,7 +100,7 @@ fn slopes(
         let mut work = Complex::default();
         term.for_each_entry(n, |row, column, value| {
             if column < n {
-                work += left[row] * right[column] * value;
+                work += psi[row] * phi[column] * value;
             }
         });
         for (parameter, by) in term.derivatives(values) {

@@ -1,5 +1,5 @@
-//! The machine at nominal values of its unknowns, line by line, at the places where something is measured,
-//! excited or unknown.
+//! Response of the machine at nominal values of its unknowns, line by line, at the degrees of
+//! freedom with sensors, inputs or unknown terms.
 
 use std::collections::HashMap;
 
@@ -10,22 +10,23 @@ use rayon::prelude::*;
 use super::banded::{Banded, half_band, order};
 use super::{LikelihoodError, MeasuredPart};
 
-/// Hysteresis of the unknown terms of the nominal machine: none of its resonances is so sharp that a line
-/// could lie on it, and the unknown terms take it off again.
+/// Loss factor of the unknown terms of the nominal machine: it keeps the response finite at
+/// resonances, and the change of the unknown terms removes it again.
 const NOMINAL_LOSS: f64 = 0.05;
 
 /// Response of the nominal machine at one frequency, for the degrees of freedom of [`Places`].
 #[derive(Debug, Clone)]
 pub(super) struct NominalLine {
-    /// H₀ from the joints to all places, r × j.
+    /// Receptance H₀ from the joints to all degrees of freedom of [`Places`], r × j.
     pub(super) from_joints: DMatrix<Complex<f64>>,
-    /// Response of all places to a unit of each load, r × loads.
+    /// Response of these degrees of freedom to a unit of each load, r × loads.
     pub(super) loads: DMatrix<Complex<f64>>,
     /// Motion of the support per unit of each load.
     pub(super) support: Vec<Complex<f64>>,
 }
 
-/// Degrees of freedom that matter: the joints, where a term is unknown, come first.
+/// Degrees of freedom with unknown terms (joints), sensors or measured parts; the joints come
+/// first.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     pub(super) dofs: Vec<usize>,
@@ -33,7 +34,8 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Joints at all degrees of freedom, if `all`, or where a term is unknown or belongs to a measured part.
+    /// Collects the degrees of freedom. Joints are all of them if `all`, otherwise those of unknown
+    /// terms and of a measured part.
     pub(super) fn new(assembly: &Assembly, measured: Option<&MeasuredPart>, all: bool) -> Self {
         let n = assembly.dof();
         let mut dofs: Vec<usize> = Vec::new();
@@ -57,17 +59,18 @@ impl Places {
         for sensor in assembly.sensors() {
             sensor.entries.iter().for_each(|(at, _)| add(*at));
         }
-        // Errors of a measured receptance act where its part is loaded.
+        // The errors of a measured receptance act at all degrees of freedom of its part.
         measured.iter().flat_map(|part| &part.dofs).for_each(|at| add(*at));
         Self { dofs, joints }
     }
 
-    pub(super) fn place(&self, dof: usize) -> Option<usize> {
+    /// Returns the index of a degree of freedom.
+    pub(super) fn index(&self, dof: usize) -> Option<usize> {
         self.dofs.iter().position(|at| *at == dof)
     }
 }
 
-/// Degrees of freedom that a term couples; n is the support.
+/// Returns the degrees of freedom that a term couples; n is the support.
 pub(super) fn touched(term: &Term) -> impl Iterator<Item = usize> + '_ {
     let (left, right, block): (&[_], &[_], &[usize]) = match &term.pattern {
         Pattern::Dyad { left, right } => (left, right, &[]),
@@ -76,13 +79,14 @@ pub(super) fn touched(term: &Term) -> impl Iterator<Item = usize> + '_ {
     left.iter().chain(right).map(|(at, _)| *at).chain(block.iter().copied())
 }
 
-/// Whether a term is coupled at the joints, rather than part of what is known.
+/// Returns whether a term is coupled at the joints, and not a part of the known machine.
 pub(super) fn is_coupled(term: &Term, measured: Option<&MeasuredPart>) -> bool {
     let of_part = |at: usize| measured.is_some_and(|part| part.dofs.contains(&at));
     !term.is_known() || touched(term).any(of_part)
 }
 
-/// Coefficient of a term in the nominal machine at the values `start`; 0 where it touches a measured part.
+/// Returns the coefficient of a term in the nominal machine at the values `start`; 0 if it is
+/// connected to a measured part.
 pub(super) fn nominal_coefficient(
     term: &Term,
     start: &[f64],
@@ -100,7 +104,7 @@ pub(super) fn nominal_coefficient(
     Complex::new(1.0, loss) * term.value(start)
 }
 
-/// What is the same on all lines.
+/// Data that all lines share.
 struct Plan<'a> {
     assembly: &'a Assembly,
     measured: Option<&'a MeasuredPart>,
@@ -111,7 +115,8 @@ struct Plan<'a> {
     coefficients: Vec<Complex<f64>>,
 }
 
-/// Nominal responses at the distinct frequencies of `omega`, and which of them belongs to each row.
+/// Returns the nominal responses at the distinct frequencies of `omega`, and the index of the
+/// response of each row.
 pub(super) fn prepare(
     assembly: &Assembly,
     measured: Option<&MeasuredPart>,
@@ -140,7 +145,7 @@ pub(super) fn prepare(
     let nominal = |term: &Term| nominal_coefficient(term, &start, measured);
     let coefficients = assembly.terms().iter().map(nominal).collect();
     let plan = Plan { assembly, measured, places, row, half, coefficients };
-    // Rows of a measured part belong to its table; other frequencies may repeat.
+    // Rows of equal frequency share a line.
     let (mut distinct, mut lines): (HashMap<u64, usize>, Vec<usize>) = (HashMap::new(), Vec::new());
     let mut first_rows: Vec<usize> = Vec::new();
     for (at, omega) in omega.iter().enumerate() {
@@ -169,12 +174,15 @@ impl Plan<'_> {
                 continue;
             }
             let factor = term.power.factor(omega, speed.at(omega)) * coefficient;
-            term.for_each_entry(n, |row, column, value| match column < n {
-                true => band.add(self.row[row], self.row[column], factor * value),
-                false => support[row] -= factor * value,
+            term.for_each_entry(n, |row, column, value| {
+                if column < n {
+                    band.add(self.row[row], self.row[column], factor * value);
+                } else {
+                    support[row] -= factor * value;
+                }
             });
         }
-        // Rows of a measured part are those of its table, filled in below.
+        // The rows of a measured part are replaced by its receptance in `fill_measured`.
         (0..n).filter(|dof| is_measured(*dof)).for_each(|dof| {
             band.add(self.row[dof], self.row[dof], Complex::new(1.0, 0.0));
         });
@@ -213,14 +221,14 @@ impl Plan<'_> {
         })
     }
 
-    /// Loads of the inputs, then those of the machine itself.
+    /// Returns the loads of the inputs, then the loads of the machine.
     fn load_columns(&self, omega: f64) -> Vec<Vec<(usize, Complex<f64>)>> {
         let (n, speed) = (self.assembly.dof(), self.assembly.speed());
         let inputs = self.assembly.inputs().iter().map(|input| input.load(n, omega, speed));
         inputs.chain(self.assembly.own_loads(omega).into_iter().map(|(_, load)| load)).collect()
     }
 
-    /// Writes the rows of a measured part.
+    /// Writes the rows of a measured part from its receptance.
     fn fill_measured(
         &self,
         data_row: usize,

@@ -17,12 +17,13 @@ use crate::likelihood::limits::UNDETERMINED_PART;
 pub struct UncertainEntries {
     /// Entries.
     pub entries: Vec<Parameter>,
-    /// Covariance, one row and one column per entry, in the products of their units (kg, N·s/m, N/m); the
-    /// variance of an entry that the data do not determine is infinite.
+    /// Covariance, one row and one column per entry, in the products of their units (kg, N·s/m,
+    /// N/m); the variance of an entry that the data do not determine is infinite.
     pub covariance: DMatrix<f64>,
 }
 
-/// Speed of M, C + Ω G and K, in rad/s: 0 where nothing turns, or each line has its own speed.
+/// Returns the speed of M, C + Ω G and K, in rad/s: 0 without rotation, or if the speed differs
+/// from line to line.
 pub(super) fn constant_speed(speed: Speed) -> f64 {
     match speed {
         Speed::Constant(speed) => speed,
@@ -31,10 +32,11 @@ pub(super) fn constant_speed(speed: Speed) -> f64 {
 }
 
 impl MachineEstimate {
-    /// Returns M, C + Ω G and K with the parameters identified, at the constant speed of the instruments.
+    /// Returns M, C + Ω G and K with the identified parameters, at the constant speed of the
+    /// instruments.
     ///
     /// # Errors
-    /// What [`Assembly::system`](mechid_model::elements::Assembly::system) refuses: a degree of freedom
+    /// As [`Assembly::system`](mechid_model::elements::Assembly::system): a degree of freedom
     /// without mass.
     pub fn system(&self) -> Result<SecondOrderSystem, LikelihoodError> {
         let speed = constant_speed(self.assembly.speed());
@@ -42,8 +44,8 @@ impl MachineEstimate {
         system.map_err(|error| LikelihoodError::Machine(error.into()))
     }
 
-    /// Returns the covariance of the entries of [`MachineEstimate::system`] that depend on unknowns, to first
-    /// order; `None` if there are more than `most` of them.
+    /// Returns the covariance of the entries of [`MachineEstimate::system`] that depend on
+    /// unknowns, to first order; `None` if there are more than `most` such entries.
     ///
     /// # Errors
     /// [`LikelihoodError::Machine`] for an entry that does not exist.
@@ -82,7 +84,8 @@ impl MachineEstimate {
         Ok(Some(UncertainEntries { entries, covariance }))
     }
 
-    /// Derivatives of the entries of M, C and K with respect to the parameters, by matrix, row and column.
+    /// Returns the derivatives of the entries of M, C and K with respect to the parameters, by
+    /// matrix, row and column.
     fn gradients(&self, values: &[f64]) -> BTreeMap<(usize, usize, usize), DVector<f64>> {
         let (n, speed) = (self.assembly.dof(), constant_speed(self.assembly.speed()));
         let mut gradients = BTreeMap::new();
@@ -125,7 +128,8 @@ impl MachineEstimate {
     }
 }
 
-/// Length of the part of a gradient that is no sum of the determined combinations.
+/// Returns the length of the component of a gradient outside the span of the determined
+/// combinations.
 fn outside(combination: &Combination, scales: &[f64], gradient: &DVector<f64>) -> f64 {
     let determined = &combination.determined;
     if determined.is_empty() {

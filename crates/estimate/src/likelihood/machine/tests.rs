@@ -165,7 +165,8 @@ fn the_sensitivity_is_the_derivative_of_the_response() {
             let line = model.at(&parameters, row).unwrap();
             line.sensitivity(&parameters, &input(), &DVector::zeros(0), &mut sensitivity);
             for (at, column) in sensitivity.column_iter().enumerate() {
-                // A millionth of the response: its square is the error, rounding is some 10⁻¹⁰ of the step.
+                // A millionth of the response: its square is the error, rounding is some 10⁻¹⁰ of
+                // the step.
                 let response = naive(&assembly, &parameters, omega, &input());
                 let step = 1e-6 * response.norm() / column.norm();
                 let at_distance = |by: f64| {
