@@ -128,7 +128,7 @@ fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Optio
     let (first, others) = late.split_first()?;
     let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
     let fit = output_error(&all, unknowns).ok()?;
-    let closed = fit.ends.as_ref()?.taken_off(&late).ok()?;
+    let closed = fit.ends.as_ref()?.without_transients(&late).ok()?;
     let after = after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?;
     let findings = after.records.iter().flat_map(SpectralResidual::findings);
     let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);

@@ -64,7 +64,7 @@ pub(crate) const GRAM_LINES: usize = 256;
 /// digits.
 pub(crate) const GRAM_LANCZOS: usize = 80;
 
-/// Number of standard deviations by which the misfit ratio of a correct model may differ from 1.
+/// Maximum deviation of the misfit ratio of a correct model from 1, in standard deviations.
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
 /// Maximum number of sensitivities (residuals times parameters) for a covariance with correlated

@@ -143,9 +143,10 @@ pub(super) fn fit(
     spectra.without_sinusoids(&fit);
     let OpenSpectra { data, lines, force_noise } = spectra;
     let (closed, alone) = match &fit.ends {
-        Some(ends) => {
-            (ends.taken_off(&data)?, ends.taken_off_responses(&data, &fit.estimate.system()?)?)
-        }
+        Some(ends) => (
+            ends.without_transients(&data)?,
+            ends.without_transient_responses(&data, &fit.estimate.system()?)?,
+        ),
         None => (data.clone(), data.clone()),
     };
     let AfterSpectralFit { records: residuals, bias } =

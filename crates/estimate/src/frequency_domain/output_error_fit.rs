@@ -57,8 +57,8 @@ pub struct OutputErrorFit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLoads {
     tau: Vec<f64>,
-    /// Statistic τᵀ Cov(τ)⁻¹ τ: for records of whole periods it is χ² distributed with one degree
-    /// of freedom per load.
+    /// Statistic τᵀ Cov(τ)⁻¹ τ, a pure number: for records of whole periods it is χ² distributed
+    /// with one degree of freedom per load.
     pub statistic: f64,
     /// Ratio of the power of the loads on the lines to the power of the forces.
     pub share: f64,
@@ -88,7 +88,7 @@ impl EndLoads {
     ///
     /// # Errors
     /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
-    pub fn taken_off(
+    pub fn without_transients(
         &self,
         records: &[FrequencyData],
     ) -> Result<Vec<FrequencyData>, EstimateError> {
@@ -108,14 +108,14 @@ impl EndLoads {
     /// receptance exists.
     ///
     /// # Errors
-    /// As [`EndLoads::taken_off`], and [`NumericsError::Size`] for another number of degrees of
+    /// As [`EndLoads::without_transients`], and [`NumericsError::Size`] for another number of degrees of
     /// freedom.
-    pub fn taken_off_responses(
+    pub fn without_transient_responses(
         &self,
         records: &[FrequencyData],
         system: &SecondOrderSystem,
     ) -> Result<Vec<FrequencyData>, EstimateError> {
-        let closed = self.taken_off(records)?;
+        let closed = self.without_transients(records)?;
         let responses = records.iter().zip(&closed).map(|(record, closed)| {
             check_size("degrees of freedom", record.dof(), system.dof())?;
             Ok(record.without_response_to_transient(closed.force(), system))

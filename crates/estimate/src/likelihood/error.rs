@@ -34,7 +34,7 @@ pub enum LikelihoodError {
     /// Every coefficient is known.
     #[error("every coefficient is known: there is nothing to identify")]
     NoParameter,
-    /// There are not more measured numbers than unknowns.
+    /// The number of unknowns is at least that of the measured numbers.
     #[error(
         "{} cannot determine {}",
         message::count(*numbers, "measured number"),

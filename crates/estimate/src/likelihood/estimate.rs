@@ -178,7 +178,7 @@ pub struct LikelihoodEstimate {
     pub minima: Vec<FoundMinimum>,
     /// Number of searches.
     pub searches: usize,
-    /// Condition number of the scaled parameters.
+    /// Condition number of the Jacobian with columns of unit length, a pure number.
     pub condition: f64,
     /// Parameters with only some combinations determined.
     pub combinations: Vec<Combination>,

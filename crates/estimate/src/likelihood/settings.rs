@@ -29,7 +29,7 @@ pub struct Settings {
     pub spread: f64,
     /// Seed of the random initial values.
     pub seed: u64,
-    /// Confidence level of the intervals.
+    /// Confidence level of the intervals, a probability.
     pub confidence: f64,
 }
 

@@ -142,7 +142,7 @@ fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     assert_eq!(ends.len(), 24);
     assert!(ends.p_value() < 1e-12 && ends.share > 1e-4, "{ends:?}");
     // With these loads the rows are those of periods.
-    let closed = ends.taken_off(&records).unwrap();
+    let closed = ends.without_transients(&records).unwrap();
     let again =
         output_error(&closed[0].and(&closed[1]).unwrap(), &Unknowns::unknown_mass(2).unwrap())
             .unwrap();

@@ -126,8 +126,8 @@ impl PartsOfFit<'_> {
         Scores { scores: columns.tr_mul(&self.linear.residual), covariance, count }
     }
 
-    /// Returns the largest factor by which the scatter of the scores makes the standard error of a
-    /// parameter larger.
+    /// Returns the largest ratio of a standard error from the scatter of the scores to its value from the
+    /// noise.
     fn largest_scatter(&self, scores: &Scores, level: f64) -> Option<f64> {
         let parts = scores.scores.len() / scores.count;
         let of_row = |row: usize| {

@@ -37,7 +37,7 @@ pub struct MachineEstimate {
     /// Residual in units of the noise, of unit variance: row 2(p·line + output) is a real part, the
     /// next row the imaginary part.
     pub residual: DVector<f64>,
-    /// Orthonormal basis of the sensitivities of the residual, with the rows of
+    /// Orthonormal basis of the sensitivities of the residual (pure numbers), with the rows of
     /// [`MachineEstimate::residual`].
     pub explained: DMatrix<f64>,
     /// Part with a measured receptance.
