@@ -19,8 +19,8 @@ const RARE: f64 = 0.05;
 /// Largest pull of a hammer over its largest push: filters ring, and a hammer does not pull.
 const ONE_SIDED: f64 = 0.2;
 
-/// Power of a channel during the hits over that between them, beyond 1 and in standard deviations of such a ratio of
-/// noise, up to which no force acts there.
+/// Power of a channel during the hits over that between them, beyond 1 and in standard deviations
+/// of such a ratio of noise, up to which no force acts there.
 const MOVES: f64 = 6.0;
 
 /// One hit of a record, used or left out.
@@ -81,7 +81,8 @@ impl fmt::Display for HitRow {
     }
 }
 
-/// Returns a line for every record with its number of hits, and one for every hit that was left out.
+/// Returns a line for every record with its number of hits, and one for every hit that was left
+/// out.
 pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     let mut text = String::new();
     for of_record in rows.chunk_by(|a, b| a.record == b.record && a.number < b.number) {
@@ -171,7 +172,8 @@ impl Struck {
     }
 }
 
-/// Returns whether the force on a degree of freedom is no larger during the hits on another than between them.
+/// Returns whether the force on a degree of freedom is no larger during the hits on another than
+/// between them.
 fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
     let force = held.force.channel(dof);
     let mut is_pulse = vec![false; force.len()];

@@ -1,10 +1,9 @@
-//! Identification of a machine from its measured records, and reconstruction of the force that drove
-//! it.
+//! Identification of a machine from its measured records, and reconstruction of the force on it.
 //!
-//! The numerical crates fit arrays; this one answers the questions that a test engineer asks of a
+//! The numerical crates fit arrays; this crate answers the questions of a test engineer about a
 //! record. It opens files of any format and length (or takes arrays), converts units, cuts windows,
-//! chooses spectral lines and methods, checks the data before the fit and the residual after it, and
-//! says what speaks against the result. It simulates nothing, draws nothing and prints nothing.
+//! chooses spectral lines and methods, checks the data before the fit and the residual after it,
+//! and reports doubts about the result. It does not simulate, plot or print.
 //!
 //! ```
 //! use mechid_analysis::{Channels, Identify, Machine, Measurement, Reconstruct, ResponseQuantity};
@@ -13,13 +12,13 @@
 //! let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
 //! let channels = Channels::new("force", ResponseQuantity::Displacement, "displacement");
 //! let test = Measurement::open(rig, &channels)?.period(256)?;
-//! let found = identify(&[test.clone()], &Identify::spectra(Method::MaximumLikelihood))?;
-//! let mass = found.estimate().parameter("m")?;
+//! let identified = identify(&[test.clone()], &Identify::spectra(Method::MaximumLikelihood))?;
+//! let mass = identified.estimate().parameter("m")?;
 //! assert!((mass.value - 25.0).abs() < 3.0 * mass.standard_error);
-//! println!("{found}");
+//! println!("{identified}");
 //!
-//! // The force that drove the machine, from the response alone.
-//! let force = reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
+//! // The force on the machine, from the response alone.
+//! let force = reconstruct(&test, &identified.machine()?, &Reconstruct::auto())?;
 //! assert!(force.force().standard_error().is_some());
 //! # Ok::<(), mechid_analysis::AnalysisError>(())
 //! ```
@@ -43,8 +42,8 @@
 //! | What are the machines behind these records? | [`SavedAnalysis::row`] | [`SavedAnalysis`] | [`ResultRow`] |
 //! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
 //!
-//! Settings are plain structs with defaults, which `serde` saves and reads back; every result carries
-//! those it was made with, and prints itself with [`Display`](std::fmt::Display).
+//! Settings are plain structs with defaults, which `serde` saves and reads; every result contains
+//! its settings and implements [`Display`](std::fmt::Display).
 
 pub mod batch;
 pub mod bearing;

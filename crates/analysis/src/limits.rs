@@ -1,87 +1,89 @@
-//! Limits on the memory that work on a record takes, and numbers that decide about the modes of a
-//! test.
+//! Limits on the memory of an analysis, and limits that decide about the modes of a test.
 //!
-//! The work is refused before its memory is taken: where the numbers that it holds, times the bytes
-//! that it takes for each, exceed the memory allowed for a file of this size
-//! ([`mechid_io::Limits::memory`]). A setting `memory_gb` allows more.
+//! An analysis is refused before it allocates memory if its numbers, times the bytes for each, need
+//! more than the memory allowed for a file of this size ([`mechid_io::Limits::memory`]). The
+//! setting `memory_gb` allows more.
 
 use crate::AnalysisError;
 use crate::measurement::Reading;
 
-/// Bytes that an inspection takes for each number of a record: the column, its spectrum and its
-/// lags, of several columns at a time.
+/// Bytes of memory per number of a record for an inspection: the column, its spectrum and its lags,
+/// for several columns at a time.
 pub const INSPECT_BYTES: usize = 96;
 
-/// Bytes that work on a stretch of a record takes for each number of it: the identification from
-/// spectra, sample by sample, and frequency responses.
+/// Bytes of memory per number of a section of a record: the identification from spectra, sample by
+/// sample, and frequency responses.
 pub const STRETCH_BYTES: usize = 256;
 
-/// Bytes that work which needs a window as a whole takes for each number of it: nonlinear terms,
-/// the separation of hits, derivatives of a whole period.
+/// Bytes of memory per number of a window that is analysed as a whole: nonlinear terms, the
+/// separation of hits, derivatives of a whole period.
 pub const WHOLE_BYTES: usize = 640;
 
-/// Bytes that a prediction, or the fit of a free decay, takes for each number of its window.
+/// Bytes of memory per number of the window for a prediction, or the fit of a free decay.
 pub const PREDICT_BYTES: usize = 800;
 
-/// Bytes that the covariances of the noise take for each line and pair of channels: eight copies of a complex number, the
-/// most that were measured (periods of 500 forces and 500 responses).
+/// Bytes of memory per line and pair of channels for the covariances of the noise: eight copies of
+/// a complex number, the largest measured (periods of 500 forces and 500 responses).
 pub const PAIR_BYTES: usize = 128;
 
-/// Number of channels up to which the noise of the spectra takes no more than [`STRETCH_BYTES`] for each sample of each: lines
-/// are half of the samples.
+/// Largest number of channels whose noise covariances need at most [`STRETCH_BYTES`] per sample and
+/// channel: the number of lines is half the number of samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
-/// Relative error of the standard errors from which a fit says so: that of 12 equations to spare.
+/// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
-/// Least share of the variance of a response that the modes of a test must explain. Below it, most
-/// of the response is something else, and the entries of the shapes there mean little.
+/// Minimum share of the variance of a response that the modes of a test must explain. With less,
+/// most of the response has another cause, and the entries of the shapes at this response are
+/// unreliable.
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
-/// Power of a force over its largest, in the mean of [`DRIVEN_LINES`] lines, below which these lines
-/// are not part of the default band. At −40 dB the response to the force drowns in the noise of
-/// usual sensors (60 to 80 dB below their range); a lower value would take in lines of noise alone.
+/// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
+/// power, for lines of the default band. At −40 dB the response to the force is below the noise of
+/// usual sensors (60 to 80 dB below their range); a lower limit would include lines of noise alone.
 pub const DRIVEN_POWER: f64 = 1e-4;
 
-/// Number of lines whose mean power decides whether a force drives them. The power of a random force
-/// on one line scatters by its own size, on 16 by a quarter; many more would blur the band's edges.
+/// Number of lines in the mean power that decides whether a force excites them. The power of a
+/// random force on one line has a standard deviation of 100 %, the mean of 16 lines 25 %; many more
+/// lines would blur the edges of the band.
 pub const DRIVEN_LINES: usize = 16;
 
-/// Largest share of a record that may be kept out of the fit for its validation. Beyond it, the fit
-/// is to so little that it says nothing of the fit to all.
+/// Maximum share of a record that the fit may exclude for its validation. With a larger share, the
+/// fit to the small remainder is not representative of the fit to all data.
 pub const MOST_VALIDATED: f64 = 0.8;
 
-/// Share of the motion of a mode that unmeasured forces drive, above which a note says so. Below
-/// it, the share is in the table alone.
+/// Minimum share of unmeasured forces in the motion of a mode for a note; a smaller share is only
+/// in the table.
 pub const NOTED_UNMEASURED: f64 = 0.01;
 
-/// Largest correlation of the errors of two lines of averaged responses that may both be used:
-/// neighbours under a Hann window have 0.44, second neighbours 0.03. A smaller one would give away
-/// lines; with a larger one, smooth noise passes for modes.
+/// Maximum correlation of the errors of two lines of averaged responses in the same fit: neighbours
+/// under a Hann window have 0.44, second neighbours 0.03. A smaller limit would discard lines; with
+/// a larger one, smooth noise would appear as modes.
 pub const LINE_CORRELATION: f64 = 0.1;
 
-/// Half-power bandwidth, in lines of a segment, below which what a window blunts of a mode is not
-/// subtracted: between lines, the response of a narrower one is larger than its averages tell.
+/// Minimum half-power bandwidth, in lines of a segment, of a mode for a correction of its window
+/// bias: the averaged lines do not determine the response of a narrower mode between them.
 pub const LEAST_SHARPENED_LINES: f64 = 0.5;
 
-/// Largest number of samples of a segment times the number of segments that overlap it, of a table that
-/// states segments. Beyond it, the weights of its window take minutes, and the statement is not used.
+/// Maximum product of the samples of a segment and the number of segments that overlap it, for a
+/// table that states segments. For a larger product the weights of the window would take minutes,
+/// and the statement is ignored.
 pub const MOST_SEGMENT_WORK: usize = 1 << 22;
 
-/// Largest number of rounds in which modes are fitted to averaged responses less what their window
-/// blunts of these modes. Each takes most of what is left; at two lines a resonance and little noise
-/// some ten are needed.
+/// Maximum number of corrections of the window bias of modes from averaged responses. Each removes
+/// most of the remaining bias; two lines per resonance and little noise need about ten.
 pub const SHARPENING_ROUNDS: usize = 20;
 
-/// Change of a frequency or damping ratio in a round, in standard errors, below which the rounds end.
+/// Change of a frequency or damping ratio, in standard errors, that ends these corrections.
 pub const SHARPENING_SETTLED: f64 = 0.1;
 
-/// Probability below which a check of the modes by a test fails, after adjustment for all of them.
+/// Maximum p-value, adjusted for the number of tests, of a failed check of the modes.
 pub const MODAL_SIGNIFICANCE: f64 = 0.01;
 
 /// Number of bytes in the unit of the setting `memory_gb`.
 const GIGABYTE: f64 = 1e9;
 
-/// Refuses work on `numbers` numbers, of `bytes` bytes each, that takes more memory than `allowed` bytes.
+/// Refuses an analysis of `numbers` numbers, of `bytes` bytes each, that needs more than `allowed`
+/// bytes.
 pub(crate) fn check_memory(
     file: &str,
     numbers: usize,
@@ -98,22 +100,23 @@ pub(crate) fn check_memory(
 
 /// Returns the setting `memory_gb` in bytes.
 pub(crate) fn memory_bytes(reading: &Reading) -> Option<usize> {
-    // A float that no address space has becomes the largest integer, NaN and less than nothing 0.
+    // The conversion saturates: a huge number becomes the largest integer, NaN and negative numbers
+    // 0.
     reading.memory_gb.map(|gb| (gb * GIGABYTE) as usize)
 }
 
-/// Largest number of degrees of freedom of a machine of elements whose modes are a part of its result; of
-/// more, `modes` finds them.
+/// Largest number of degrees of freedom of a machine of elements with modes in its result; the
+/// modes of a larger machine come from `modes`.
 pub(crate) const LISTED_MODES_DOF: usize = 30;
 
-/// Share of the information on a parameter from its prior above which the result says so.
+/// Minimum share of the prior in the information about a parameter for a remark.
 pub(crate) const PRIOR_SHARE: f64 = 0.5;
 
-/// Relative difference up to which two frequencies of tables are one: tables are printed with some digits.
+/// Maximum relative difference of two equal frequencies in tables, which have few digits.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
 
-/// 1 − coherence (median over the lines) below which a table states no noise: the digits of a file, or a coherence that
-/// was never computed.
+/// Largest 1 − coherence (median over the lines) of a table that states no noise: it is rounding of
+/// the file, or the coherence was not computed.
 pub const COHERENCE_OF_ONE: f64 = 1e-6;
 
 /// Maximum number of fits with a force that is held or linear between its samples.

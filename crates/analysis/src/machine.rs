@@ -28,21 +28,21 @@ pub struct Machine {
     pub degrees_of_freedom: usize,
     /// The system with its nonlinear terms; `None` for a linear one.
     pub nonlinear: Option<NonlinearPart>,
-    /// Names of the channels that the system was identified from, one per degree of freedom; empty if they are
-    /// not known.
+    /// Names of the channels that the system was identified from, one per degree of freedom; empty
+    /// if they are not known.
     pub names: Channels,
 }
 
 /// A system with nonlinear terms, as its channels show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearPart {
-    /// M, C and K with the terms and their coefficients, and the covariance of those of them that are
-    /// uncertain.
+    /// M, C and K with the terms and their coefficients, and the covariance of those of them that
+    /// are uncertain.
     pub uncertain: UncertainNonlinearSystem,
     /// Delay and phase that the channels add.
     pub channels: ChannelPhase,
-    /// Largest displacement (m) that a term saw in the data of its identification; `None` if there were
-    /// none.
+    /// Largest displacement (m) that a term saw in the data of its identification; `None` if there
+    /// were none.
     pub largest_displacement: Option<f64>,
 }
 
@@ -81,8 +81,8 @@ impl Machine {
     }
 
     /// Reads the `system` of a JSON file (`-`: of standard input) and, if it is there, its
-    /// `covariance`, its `nonlinear` terms and the names of its `channels` or `points`: the description of an
-    /// experiment, or the result of an identification.
+    /// `covariance`, its `nonlinear` terms and the names of its `channels` or `points`: the
+    /// description of an experiment, or the result of an identification.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read, [`AnalysisError::UnknownParameter`] if the
@@ -142,7 +142,8 @@ impl Machine {
         AnalysisError::NonlinearMachine { file: self.name.clone(), terms: terms.to_string() }
     }
 
-    /// Returns the system with its nonlinear terms, none for a linear one, and what its channels add.
+    /// Returns the system with its nonlinear terms, none for a linear one, and what its channels
+    /// add.
     pub(crate) fn with_terms(&self) -> Result<NonlinearPart, AnalysisError> {
         match &self.nonlinear {
             Some(part) => Ok(part.clone()),
@@ -169,8 +170,8 @@ impl Machine {
         terms && self.uncertain.parameters().is_empty()
     }
 
-    /// Returns natural frequencies, damping ratios and mode shapes with their standard errors, which
-    /// are zero for a system that is taken as exactly known.
+    /// Returns natural frequencies, damping ratios and mode shapes with their standard errors,
+    /// which are zero for a system that is taken as exactly known.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the system has no modes.

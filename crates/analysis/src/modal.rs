@@ -30,8 +30,8 @@ pub struct ModalSummary {
     pub response_names: Vec<String>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ShapedMode>,
-    /// Frequency of each mode without damping over its amplitude, as far as the data reached from which
-    /// nonlinear terms were identified; empty of a linear system.
+    /// Frequency of each mode without damping over its amplitude, as far as the data reached from
+    /// which nonlinear terms were identified; empty of a linear system.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub backbone: Vec<BackboneRow>,
     /// M, C and K.
@@ -66,7 +66,8 @@ pub struct BackboneRow {
 pub struct ShapeEntry {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// Standard errors of real and imaginary part, in the same unit; `None` for a machine that is exactly known.
+    /// Standard errors of real and imaginary part, in the same unit; `None` for a machine that is
+    /// exactly known.
     pub standard_error: Option<[f64; 2]>,
 }
 
@@ -105,8 +106,8 @@ const AMPLITUDES: usize = 10;
 
 impl Machine {
     /// Returns the frequency of each mode without damping over its amplitude, up to the largest
-    /// displacement that the data of an identification held; nothing of a linear machine or where there
-    /// were no data.
+    /// displacement that the data of an identification held; nothing of a linear machine or where
+    /// there were no data.
     ///
     /// # Errors
     /// [`AnalysisError::Model`] if the covariance reaches where there is no such machine.
@@ -217,8 +218,8 @@ impl ModalSummary {
         name.map_or_else(|| format!("direction {}", dof + 1), Clone::clone)
     }
 
-    /// Returns a line for each unstable mode; where the interval of its growth rate contains zero, the
-    /// line says so.
+    /// Returns a line for each unstable mode; where the interval of its growth rate contains zero,
+    /// the line says so.
     fn instability(&self) -> String {
         let line = |(number, mode): (usize, &ShapedMode)| {
             let rate = mode.row.growth_rate?;

@@ -76,13 +76,13 @@ pub struct PredictionError {
 /// Predicts the response of a machine to the force of a record.
 ///
 /// With a period, the steady state under the mean period; otherwise the whole window from its first
-/// sample on. Between the samples the force is band-limited. Measured responses are compared, if there
-/// are any; a steady state without the means.
+/// sample on. Between the samples the force is band-limited. Measured responses are compared, if
+/// there are any; a steady state without the means.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::DegreesOfFreedom`], [`AnalysisError::Setting`] if
-/// `settle` cannot be used, and [`AnalysisError::Estimate`] if the response diverges or the record is
-/// too coarse for the machine.
+/// `settle` cannot be used, and [`AnalysisError::Estimate`] if the response diverges or the record
+/// is too coarse for the machine.
 pub fn predict(
     measured: &Measurement,
     machine: &Machine,
@@ -139,15 +139,17 @@ pub fn predict(
     Ok(Predicted { summary, response })
 }
 
-/// Parts of a record of which the first and the last are compared, and their ratio from which a start is to blame.
+/// Parts of a record of which the first and the last are compared, and their ratio from which a
+/// start is to blame.
 const PARTS: usize = 8;
 const DIES_AWAY: f64 = 3.0;
-/// Samples in such a part at least, and those in which the error has to show at once: that of a machine which is not
-/// quite the right one grows with its motion.
+/// Samples in such a part at least, and those in which the error has to show at once: that of a
+/// machine which is not quite the right one grows with its motion.
 const SHORTEST: usize = 16;
 const AT_ONCE: f64 = 0.5;
 
-/// Returns whether the error of a channel dies away from the beginning of a record on, as a free motion does.
+/// Returns whether the error of a channel dies away from the beginning of a record on, as a free
+/// motion does.
 fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
     let error: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p).collect();
     let part = error.len() / PARTS;

@@ -23,10 +23,9 @@ pub fn text_table(rows: &[Vec<String>]) -> String {
 /// Columns that fit beside one another on a page.
 const PAGE: usize = 100;
 
-/// Formats a table as [`text_table`] does, in several tables one below the other where one would be too
-/// wide; each begins
-/// with the first column, and has no rows that say nothing more. The first table has the first
-/// columns, as many as stay `together`.
+/// Formats a table as [`text_table`] does, in several tables one below the other where one would be
+/// too wide; each begins with the first column, and has no rows that say nothing more. The first
+/// table has the first columns, as many as stay `together`.
 pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let part = |chosen: &[usize]| {
@@ -53,8 +52,8 @@ pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
 }
 
-/// Formats a number, in any unit, with so many significant digits; scientific where plain notation would be
-/// long.
+/// Formats a number, in any unit, with so many significant digits; scientific where plain notation
+/// would be long.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -72,8 +71,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Formats a number as [`significant`] does, without zeros at the end: for numbers that were chosen,
-/// not measured, in any unit.
+/// Formats a number as [`significant`] does, without zeros at the end: for numbers that were
+/// chosen, not measured, in any unit.
 pub fn compact(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     if text.contains('.') && !text.contains('e') {
@@ -89,7 +88,8 @@ pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
-/// Returns the note on standard errors that are `factor` times those of the noise, for the reasons that `checks` name.
+/// Returns the note on standard errors that are `factor` times those of the noise, for the reasons
+/// that `checks` name.
 pub(crate) fn scaled_errors(factor: f64, checks: &str) -> String {
     format!(
         "standard errors and intervals are {} times those of the noise alone, for model and data disagree beyond the \

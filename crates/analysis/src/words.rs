@@ -1,5 +1,5 @@
-//! Words of settings: the names by which `serde` saves the variants of an enum are those of the program's
-//! options and of Python's keywords.
+//! Words of settings: the names by which `serde` saves the variants of an enum are those of the
+//! program's options and of Python's keywords.
 
 use serde::de::value::Error;
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Visitor};
@@ -53,8 +53,8 @@ impl<'de> Deserializer<'de> for Variants<'_> {
     }
 }
 
-/// Readers of settings as they are saved or as a person writes them: a text such as `1024:50:hann`, a number, or true for
-/// the usual values.
+/// Readers of settings as they are saved or as a person writes them: a text such as `1024:50:hann`,
+/// a number, or true for the usual values.
 pub(crate) mod written {
     use std::fmt::Display;
     use std::str::FromStr;

@@ -21,7 +21,8 @@ use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements
 pub struct ResultRow {
     /// Name of the record: its path, as it was given.
     pub record: String,
-    /// Value of the column that tells the records of a file apart; `None` where the file is the record.
+    /// Value of the column that tells the records of a file apart; `None` where the file is the
+    /// record.
     pub record_id: Option<String>,
     /// Reason why there is no result.
     pub error: Option<RowError>,
@@ -106,8 +107,9 @@ pub struct FindingRow {
 }
 
 impl SavedAnalysis {
-    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a panic
-    /// included, is the error of the row; the same record and analysis always make the same row.
+    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a
+    /// panic included, is the error of the row; the same record and analysis always make the same
+    /// row.
     pub fn row(
         &self,
         record: &str,

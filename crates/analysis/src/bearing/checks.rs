@@ -17,22 +17,22 @@ use crate::AnalysisError;
 use crate::identify::checks::{CheckRow, When};
 use crate::measurement::Channels;
 
-/// A finding with the test that it belongs to, if it is one.
+/// A finding, with its test if it concerns only one.
 type Placed<'a> = (When, Option<(&'a str, &'a Channels)>, Finding);
 
-/// Returns all findings on the tests and on the baseline tests, with one error rate for the statistical tests among
-/// them.
+/// Returns all findings on the tests and on the baseline tests; the p-values are adjusted for the
+/// number of statistical tests.
 pub(super) fn rows(
     tests: &BearingData,
     baseline: Option<&BearingData>,
     film: &Film,
     stator_mass: f64,
 ) -> Result<Vec<CheckRow>, AnalysisError> {
-    let mut all = of_condition(tests, &film.fit)?;
+    let mut findings = condition_findings(tests, &film.fit)?;
     if let Some((baseline, fit)) = baseline.zip(film.baseline_fit.as_ref()) {
-        all.extend(of_condition(baseline, fit)?);
+        findings.extend(condition_findings(baseline, fit)?);
     }
-    let mut after = |finding| all.push((When::After, None, finding));
+    let mut after = |finding| findings.push((When::After, None, finding));
     instability_of_rig(film, stator_mass)?.into_iter().for_each(&mut after);
     if film.values().len() == NAMED.len() {
         mass_symmetry(&film.fit.estimate).into_iter().for_each(&mut after);
@@ -40,46 +40,47 @@ pub(super) fn rows(
         let test = film.inertia.map(|test| fluid_inertia(test.statistic, test.p_value));
         test.into_iter().for_each(&mut after);
     }
-    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
     let several = tests.records.len() + baseline.map_or(0, |b| b.records.len()) > 1;
     let unnamed = Channels::default();
     let row = |(when, test, finding): &Placed<'_>| {
         let name = test.filter(|_| several).map(|(name, _)| name.to_owned());
         CheckRow::new(*when, name, finding, test.map_or(&unnamed, |(_, channels)| channels))
     };
-    Ok(all.iter().map(row).collect())
+    Ok(findings.iter().map(row).collect())
 }
 
 /// Returns the findings on the tests of one condition and on their fit.
-fn of_condition<'a>(
+fn condition_findings<'a>(
     tests: &'a BearingData,
     fit: &OutputErrorFit,
 ) -> Result<Vec<Placed<'a>>, AnalysisError> {
-    let place = |at: usize| {
+    let test = |at: usize| {
         let record = &tests.records[at];
         Some((record.name.as_str(), &*record.channels))
     };
-    let first = place(0);
+    let first = test(0);
     let before = before_spectral_fit(&tests.data, &Unknowns::unknown_mass(2)?)?;
-    let mut all: Vec<Placed<'a>> =
+    let mut findings: Vec<Placed<'a>> =
         before.into_iter().map(|finding| (When::Before, first, finding)).collect();
     for (at, record) in tests.records.iter().enumerate() {
-        all.extend(record.before.iter().map(|finding| (When::Before, place(at), finding.clone())));
+        let before = record.before.iter();
+        findings.extend(before.map(|finding| (When::Before, test(at), finding.clone())));
     }
     let residuals = after_spectral_fit(&data_of(tests), &fit.estimate, Extent::WholePeriod)?;
     for (at, residual) in residuals.records.iter().enumerate() {
-        let findings = residual.findings().into_iter();
-        all.extend(findings.map(|finding| (When::After, place(at), finding)));
+        let after = residual.findings().into_iter();
+        findings.extend(after.map(|finding| (When::After, test(at), finding)));
     }
-    Ok(all)
+    Ok(findings)
 }
 
 fn data_of(tests: &BearingData) -> Vec<FrequencyData> {
     tests.records.iter().map(|record| record.data.clone()).collect()
 }
 
-/// Returns the mean of the residual power of the tests over that of their noise if the power of any test exceeds
-/// its noise significantly; 1 otherwise, and where the noise is not known.
+/// Returns the ratio of the residual power of all tests to the noise power if the residual of any
+/// test exceeds its noise significantly; otherwise, or if the noise is not known, 1.
 pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, AnalysisError> {
     let residuals = after_spectral_fit(&data_of(tests), &fit.estimate, Extent::WholePeriod)?;
     let mut findings: Vec<Finding> =
@@ -92,8 +93,8 @@ pub(super) fn excess(tests: &BearingData, fit: &OutputErrorFit) -> Result<f64, A
     Ok(if findings.iter().any(exceeds) { fit.misfit_ratio.max(1.0) } else { 1.0 })
 }
 
-/// Tells whether the housing on the film and its baseline has a free response that grows: it had none while it was
-/// tested.
+/// Returns a finding if a free response of the housing on the identified film would grow, which the
+/// tests contradict.
 fn instability_of_rig(film: &Film, stator_mass: f64) -> Result<Option<Finding>, AnalysisError> {
     let estimate: &Estimate = &film.fit.estimate;
     let matrix = |kind: usize| DMatrix::from_row_slice(2, 2, &film.rig.as_slice()[4 * kind..][..4]);

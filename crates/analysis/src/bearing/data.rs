@@ -1,4 +1,4 @@
-//! Forces on the film and its motion, from records or from tables of frequency responses.
+//! Forces and motions of the film, from records or from tables of frequency responses.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -19,8 +19,8 @@ use crate::identify::left_out::LineRule;
 use crate::identify::tabulated::response_data;
 use crate::measurement::{Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed};
 
-/// Degrees of freedom from which the noise of a line is known well enough to weight with it: the loss
-/// of information is then below 3 %.
+/// Minimum number of degrees of freedom of a noise covariance for a weight: the loss of information
+/// is then less than 3 %.
 const WELL_KNOWN: usize = 40;
 
 /// Spectra of f − M_s a and d, of all tests of one condition.
@@ -28,18 +28,18 @@ const WELL_KNOWN: usize = 40;
 pub struct BearingData {
     /// Names of the tests.
     pub(super) names: Vec<String>,
-    /// Rows of all tests, with their noise where it is known.
+    /// Rows of all tests, with their noise if it is known.
     pub(super) data: FrequencyData,
-    /// Distance of the lines of a test, in Hz; 0 of a single frequency.
+    /// Line spacing of a test, in Hz; 0 for a single frequency.
     pub(super) spacing_hz: f64,
-    /// The rows of each test, with the checks made of its record.
+    /// Rows of each test, with the findings on its record.
     pub(super) records: Vec<TestRecord>,
-    /// Source of the noise, in words; `None` where it is not known.
+    /// Source of the noise, in words; `None` if it is not known.
     pub(super) noise: Option<&'static str>,
-    /// Largest distance of the housing from its mean place, relative to the shaft, in m; `None` of
-    /// frequency responses.
+    /// Largest displacement of the housing from its mean position, relative to the shaft, in m;
+    /// `None` for frequency responses.
     pub(super) largest_displacement: Option<f64>,
-    /// Frequencies with rotation that were left out, in Hz.
+    /// Excluded frequencies at multiples of the rotation, in Hz.
     pub(super) left_out_hz: Vec<f64>,
     pub(super) remarks: Vec<String>,
 }
@@ -56,31 +56,33 @@ pub(super) struct TestRecord {
 }
 
 impl BearingData {
-    /// Takes records of whole periods: `force` the two shaker forces, `acceleration` of the housing and
-    /// `displacement` of the housing relative to the shaft, x before y in each.
+    /// Reads records of whole periods with the two shaker forces (`force`), the acceleration of the
+    /// housing (`acceleration`) and the displacement of the housing relative to the shaft
+    /// (`displacement`), x before y in each.
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] if a record has no displacement or
-    /// acceleration in two directions, or no line is left, what
-    /// [`choose_lines`](crate::identify::lines::choose_lines) refuses, and if a file cannot be read
-    /// again.
+    /// acceleration in two directions, or if all lines are excluded, the errors of
+    /// [`choose_lines`](crate::identify::lines::choose_lines), and an error if a file cannot be
+    /// read again.
     pub fn of_records(tests: &[Measurement], how: &IdentifyBearing) -> Result<Self, AnalysisError> {
         how.check()?;
-        let each = tests.iter().map(|test| Self::of_record(test, how));
-        let all = each.collect::<Result<Vec<_>, _>>()?.into_iter();
-        all.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+        let data = tests.iter().map(|test| Self::from_record(test, how));
+        let data = data.collect::<Result<Vec<_>, _>>()?.into_iter();
+        data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
-    /// Takes tables of frequency responses, two per test: the displacement relative to the shaft and then
-    /// the acceleration of the housing per shaker force, at the same frequencies. A test has both
-    /// directions of force, or one of them.
+    /// Reads tables of frequency responses, two per test: the displacement relative to the shaft
+    /// and then the acceleration of the housing per shaker force, at the same frequencies. A test
+    /// has both directions of force, or one of them.
     ///
-    /// The errors of displacement and acceleration are taken as independent of one another, as those of
-    /// their sensors are.
+    /// The errors of displacement and acceleration are assumed to be independent, because they come
+    /// from different sensors.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], those of [`identify_responses`](crate::identify_responses()), and
-    /// [`AnalysisError::Setting`] if the tables do not belong together or lines are chosen by number.
+    /// [`AnalysisError::NoRecord`], the errors of
+    /// [`identify_responses`](crate::identify_responses()), and [`AnalysisError::Setting`] if the
+    /// tables do not match or lines are chosen by number.
     ///
     /// # Source
     /// Rouvas and Childs (1993).
@@ -90,28 +92,28 @@ impl BearingData {
     ) -> Result<Self, AnalysisError> {
         how.check()?;
         let tests = tables.chunks(2).map(|test| match test {
-            [displacement, acceleration] => Self::of_tables(displacement, acceleration, how),
+            [displacement, acceleration] => Self::from_tables(displacement, acceleration, how),
             _ => Err(apart(&format!(
                 "a test has two tables, of displacement and of acceleration: there are {}",
                 tables.len()
             ))),
         });
-        let all = tests.collect::<Result<Vec<_>, _>>()?.into_iter();
-        all.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+        let data = tests.collect::<Result<Vec<_>, _>>()?.into_iter();
+        data.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
-    fn of_tables(
+    fn from_tables(
         displacement: &FrequencyResponses,
         acceleration: &FrequencyResponses,
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
-        let settings = how.of_tables()?;
-        let of = |table: &FrequencyResponses, quantity| {
+        let settings = how.response_settings()?;
+        let read = |table: &FrequencyResponses, quantity| {
             let how = IdentifyResponses { quantity: Some(quantity), ..settings.clone() };
             response_data(table, &how)
         };
-        let (d, noise) = of(displacement, ResponseQuantity::Displacement)?;
-        let (a, noise_of_a) = of(acceleration, ResponseQuantity::Acceleration)?;
+        let (d, noise) = read(displacement, ResponseQuantity::Displacement)?;
+        let (a, noise_of_a) = read(acceleration, ResponseQuantity::Acceleration)?;
         if (d.dof(), a.dof()) != (2, 2) {
             return Err(apart("a bearing has two directions: choose two `points`"));
         }
@@ -162,15 +164,15 @@ impl BearingData {
         })
     }
 
-    fn of_record(test: &Measurement, how: &IdentifyBearing) -> Result<Self, AnalysisError> {
+    fn from_record(test: &Measurement, how: &IdentifyBearing) -> Result<Self, AnalysisError> {
         let recorded = test.hold(Hold::Periods)?;
-        let held = &recorded.held;
-        let (film_force, d) = of_film(held, how.stator_mass)?;
-        how.check_rotation(held.force.sampling().rate_hz())?;
-        let period = held.force.sampling().with_len(held.period)?;
+        let block = &recorded.held;
+        let (film_force, d) = force_and_motion(block, how.stator_mass)?;
+        how.check_rotation(block.force.sampling().rate_hz())?;
+        let period = block.force.sampling().with_len(block.period)?;
         let spacing_hz = period.line_spacing_hz();
         let rule = LineRule { choice: &how.lines, without: &how.without };
-        let chosen = rule.lines(&held.force, held.period)?;
+        let chosen = rule.lines(&block.force, block.period)?;
         let (rotating, kept): (Vec<usize>, Vec<usize>) = chosen
             .into_iter()
             .partition(|line| rotates(*line as f64 * spacing_hz, how.rotation_hz, spacing_hz));
@@ -183,7 +185,7 @@ impl BearingData {
         let count = periods.count();
         let (data, noise) = match count {
             0 | 1 => (periods.mean()?, None),
-            // A few periods, and as many neighbouring lines as make the noise well known.
+            // The covariance is pooled over as many neighbouring lines as it needs for a weight.
             _ => {
                 let half_width = WELL_KNOWN.div_ceil(count - 1) / 2;
                 let pooling = match half_width {
@@ -191,28 +193,29 @@ impl BearingData {
                     wide => Pooling::Neighbours(wide),
                 };
                 let noisy = periods.mean_with_noise(pooling)?;
-                match shows_noise(&noisy) {
-                    true => (noisy, Some("estimated from the periods")),
-                    false => (periods.mean()?, None),
+                if shows_noise(&noisy) {
+                    (noisy, Some("estimated from the periods"))
+                } else {
+                    (periods.mean()?, None)
                 }
             }
         };
-        let mut remarks = held.unit_notes();
+        let mut remarks = block.unit_notes();
         if noise.is_none() {
             remarks.push(format!(
                 "{}: the periods show no noise ({count} of them); it was taken from the residual, on the \
                  displacement alone",
-                held.file
+                block.file
             ));
         }
         let record = TestRecord {
-            name: held.file.clone(),
-            channels: Arc::clone(&held.names),
+            name: block.file.clone(),
+            channels: Arc::clone(&block.names),
             data: data.clone(),
-            before: of_record(held, &film_force, &d)?,
+            before: record_findings(block, &film_force, &d)?,
         };
         Ok(Self {
-            names: vec![held.file.clone()],
+            names: vec![block.file.clone()],
             data,
             spacing_hz,
             records: vec![record],
@@ -223,7 +226,7 @@ impl BearingData {
         })
     }
 
-    /// The rows of both.
+    /// Concatenates the rows of both.
     fn and(mut self, other: Self) -> Result<Self, AnalysisError> {
         self.data = self.data.and(&other.data)?;
         self.noise = self.noise.and(other.noise);
@@ -292,27 +295,27 @@ fn shows_noise(data: &FrequencyData) -> bool {
     scatter > ROUNDING * ROUNDING * data.displacement().norm_squared()
 }
 
-/// Sorted, each number once.
+/// Returns the different numbers in rising order.
 fn distinct(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
     numbers
 }
 
-/// Smallest distance between different frequencies, in Hz; 0 of a single one.
+/// Returns the smallest distance between different frequencies, in Hz; 0 for a single frequency.
 fn spacing(omega: &[f64]) -> f64 {
     let sorted = distinct(omega.to_vec());
     let smallest = sorted.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest / TAU } else { 0.0 }
 }
 
-/// Returns whether the rotation or a multiple of it shows on a line.
+/// Returns whether a line is at a multiple of the speed of rotation.
 pub(super) fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
     rotation_hz.is_some_and(|rotation| Disturbance::rotation(rotation).reaches(hz, spacing_hz))
 }
 
-/// f − M_s a and d of consecutive samples.
-fn of_film(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> {
+/// Returns f − M_s a and d of consecutive samples.
+fn force_and_motion(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> {
     let missing = |setting| AnalysisError::Setting {
         setting,
         why: format!(
@@ -330,20 +333,24 @@ fn of_film(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> 
     Ok((force, d.clone()))
 }
 
-/// Checks the channels of a record, its periods, and the power that goes into the housing and into the film.
-fn of_record(held: &Block, film_force: &Record, d: &Record) -> Result<Vec<Finding>, AnalysisError> {
+/// Checks the channels of a record, its periods, and the power into the housing and into the film.
+fn record_findings(
+    block: &Block,
+    film_force: &Record,
+    d: &Record,
+) -> Result<Vec<Finding>, AnalysisError> {
     let kind = ResponseQuantity::Displacement;
-    let mut findings = held.unit_findings.clone();
-    findings.extend(of_sensors(held));
-    findings.extend(steady_periods(&held.force, d, held.period)?);
-    if let Some(a) = &held.acceleration {
-        findings.extend(power(&held.force, a, ResponseQuantity::Acceleration)?);
+    let mut findings = block.unit_findings.clone();
+    findings.extend(of_sensors(block));
+    findings.extend(steady_periods(&block.force, d, block.period)?);
+    if let Some(a) = &block.acceleration {
+        findings.extend(power(&block.force, a, ResponseQuantity::Acceleration)?);
     }
     findings.extend(power(film_force, d, kind)?);
     Ok(findings)
 }
 
-/// All periods of a test, read chunk by chunk.
+/// Reads all periods of a test, chunk by chunk.
 fn film_periods(
     recorded: &Windowed,
     lines: &Lines,
@@ -351,16 +358,16 @@ fn film_periods(
 ) -> Result<RepeatedPeriods, AnalysisError> {
     let Block { period, periods, .. } = &recorded.held;
     let kind = ResponseQuantity::Displacement;
-    let mut all = RepeatedPeriods::expecting(lines, 2, kind, *periods);
+    let mut spectra = RepeatedPeriods::expecting(lines, 2, kind, *periods);
     let samples = period * (CHUNK_SAMPLES / period).max(1);
     recorded.chunks(samples, samples, &mut |chunk| {
-        let (force, d) = of_film(chunk, mass)?;
-        Ok(all.push(&force, &d)?)
+        let (force, d) = force_and_motion(chunk, mass)?;
+        Ok(spectra.push(&force, &d)?)
     })?;
-    Ok(all)
+    Ok(spectra)
 }
 
-/// Largest distance from the mean place, in m.
+/// Returns the largest displacement from the mean position, in m.
 fn largest_orbit(d: &Record) -> f64 {
     let d: DMatrix<f64> = d.without_mean().into_data();
     d.row_iter().map(|row| row.norm()).fold(0.0, f64::max)

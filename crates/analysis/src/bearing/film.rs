@@ -1,4 +1,4 @@
-//! Eight or twelve coefficients of a film, less those of the baseline.
+//! Eight or twelve coefficients of a film, minus those of the baseline.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{
@@ -14,10 +14,10 @@ use super::selection::{conditional_interval, gap};
 use super::{BearingData, Coefficients};
 use crate::AnalysisError;
 
-/// Level of the test on the inertia of the fluid.
+/// Significance level of the test of the inertia of the fluid.
 const SIGNIFICANCE: f64 = 0.05;
 
-/// Coefficients of each kind.
+/// Number of coefficients of each matrix.
 const EACH: usize = 4;
 
 /// Names of the coefficients, in the order of every covariance.
@@ -27,36 +27,36 @@ pub(super) const NAMED: [&str; 3 * EACH] =
 /// Coefficients of a film with their covariance: kxx, kxy, kyx, kyy, then c and m likewise.
 #[derive(Debug, Clone)]
 pub(super) struct Film {
-    /// 12 or 8.
+    /// Coefficients, 12 or 8.
     values: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Test whether M = 0.
+    /// Test of M = 0.
     pub inertia: Option<LikelihoodRatio>,
-    /// All twelve coefficients of the rig, and of the baseline, which the line-by-line stiffness and
-    /// its bridging take.
+    /// All twelve coefficients of the rig, for the stiffness line by line.
     pub rig: DVector<f64>,
+    /// All twelve coefficients of the baseline, with their covariance.
     pub baseline: Option<(DVector<f64>, DMatrix<f64>)>,
-    /// Fit of the tests, by which the result is judged.
+    /// Fit of the tests, for the checks of the result.
     pub fit: OutputErrorFit,
-    /// Likewise of the baseline tests.
+    /// Fit of the baseline tests, for the checks of the result.
     pub baseline_fit: Option<OutputErrorFit>,
-    /// Residual power over that of the noise where it exceeds that significantly, otherwise 1; all variances
-    /// are multiplied by it.
+    /// Ratio of residual power to noise power if the residual is significantly larger, otherwise 1;
+    /// all variances are multiplied by it.
     pub excess: f64,
-    /// Level that the statistic of all masses had to exceed; `None` where the test chose nothing.
+    /// Critical value of the statistic of all masses; `None` if the test did not choose the model.
     critical: Option<f64>,
     pub degrees_of_freedom: usize,
 }
 
 impl Film {
-    pub fn of(
+    pub fn new(
         tests: &BearingData,
         baseline: Option<&BearingData>,
         coefficients: Coefficients,
     ) -> Result<Self, AnalysisError> {
-        let rig = Fitted::of(tests)?;
-        let base = baseline.map(Fitted::of).transpose()?;
-        let (values, covariance) = rig.less(base.as_ref());
+        let rig = Fitted::new(tests)?;
+        let base = baseline.map(Fitted::new).transpose()?;
+        let (values, covariance) = rig.minus(base.as_ref());
         let fits = std::iter::once(&rig).chain(&base);
         let each = fits.map(|fitted| fitted.full.estimate.degrees_of_freedom());
         let degrees_of_freedom = each.min().unwrap_or(0);
@@ -94,7 +94,7 @@ impl Film {
             let chosen = coefficients == Coefficients::Automatic && film.inertia.is_some();
             film.critical = fisher
                 .filter(|_| chosen)
-                // The covariance grows by the excess, which divides the statistic.
+                // The excess multiplies the covariance, and so divides the statistic.
                 .map(|fisher| EACH as f64 * fisher.inverse_cdf(1.0 - SIGNIFICANCE) / before_choice);
             film.widen(before_choice);
             return Ok(film);
@@ -136,7 +136,7 @@ impl Film {
         Ok(())
     }
 
-    /// Returns by how much the residuals of tests and baseline exceed their noise, the larger of both.
+    /// Returns the larger [`excess`] of tests and baseline.
     fn excess_of(
         &self,
         tests: &BearingData,
@@ -149,7 +149,7 @@ impl Film {
         }
     }
 
-    /// Multiplies all variances by the power of the residual over that of the noise.
+    /// Multiplies all variances by the ratio of residual power to noise power.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227.
@@ -161,8 +161,9 @@ impl Film {
         }
     }
 
-    /// Returns the interval of a coefficient at a level, given that the test has chosen twelve; `None` where it has
-    /// not, or where it would have chosen them whatever the coefficient.
+    /// Returns the interval of a coefficient at a level, conditional on the choice of twelve
+    /// coefficients by the test; `None` if the test has not chosen them, or if its choice does not
+    /// depend on the coefficient.
     pub fn interval_after_choice(&self, at: usize, level: f64) -> Option<[f64; 2]> {
         let masses = 2 * EACH..3 * EACH;
         let gap = gap(&self.values, &self.covariance, at, masses, self.critical?)?;
@@ -170,12 +171,12 @@ impl Film {
         conditional_interval(estimate, self.degrees_of_freedom, gap, level)
     }
 
-    /// Returns K, C or M, 2×2; M is zero where it was not identified.
+    /// Returns K, C or M, 2×2; M is zero if it was not identified.
     pub fn matrix(&self, kind: usize) -> Matrix2<f64> {
         let at = kind * EACH;
-        match self.values.len() > at {
-            true => Matrix2::from_row_slice(&self.values.as_slice()[at..at + EACH]),
-            false => Matrix2::zeros(),
+        match self.values.as_slice().get(at..at + EACH) {
+            Some(entries) => Matrix2::from_row_slice(entries),
+            None => Matrix2::zeros(),
         }
     }
 
@@ -188,7 +189,7 @@ impl Film {
     }
 }
 
-/// Twelve coefficients of one condition of the rig.
+/// Fit of twelve coefficients to the tests of one condition of the rig.
 struct Fitted {
     full: OutputErrorFit,
     values: DVector<f64>,
@@ -196,13 +197,13 @@ struct Fitted {
 }
 
 impl Fitted {
-    fn of(data: &BearingData) -> Result<Self, AnalysisError> {
+    fn new(data: &BearingData) -> Result<Self, AnalysisError> {
         let full = output_error(&data.data, &Unknowns::unknown_mass(2)?)?;
         let (values, covariance) = in_order(&full, &Matrix2::zeros());
         Ok(Self { full, values, covariance })
     }
 
-    /// The fit with M given.
+    /// Returns the fit with a known M.
     fn with_mass(
         &self,
         data: &BearingData,
@@ -212,29 +213,30 @@ impl Fitted {
         Ok(output_error(&data.data, &Unknowns::known_mass(&mass)?)?)
     }
 
-    /// Coefficients less those of a baseline, with the sum of the covariances.
-    fn less(&self, base: Option<&Self>) -> (DVector<f64>, DMatrix<f64>) {
+    /// Subtracts the coefficients of a baseline and adds the covariances.
+    fn minus(&self, base: Option<&Self>) -> (DVector<f64>, DMatrix<f64>) {
         match base {
             None => (self.values.clone(), self.covariance.clone()),
             Some(base) => (&self.values - &base.values, &self.covariance + &base.covariance),
         }
     }
 
-    /// M far below rounding: the checks of a fit need one that can be inverted.
+    /// Returns a mass far below rounding: the checks of a fit need an invertible mass.
     fn least_mass(&self) -> Matrix2<f64> {
         let least = self.values.rows(EACH, EACH).amax() * f64::EPSILON * f64::EPSILON;
         Matrix2::from_diagonal_element(least)
     }
 
-    /// M if the film has no inertia: that of the baseline, estimated from both; zero without one.
+    /// Returns M of rig and baseline if the film has no inertia, estimated from both; zero without
+    /// a baseline.
     fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
         let Some(base) = base else { return Ok(Matrix2::zeros()) };
-        let of = |fitted: &Self| {
+        let mass = |fitted: &Self| {
             let at = 2 * EACH;
             let covariance = fitted.covariance.view((at, at), (EACH, EACH)).into_owned();
             (fitted.values.rows(at, EACH).into_owned(), covariance)
         };
-        let ((rig, of_rig), (base, of_base)) = (of(self), of(base));
+        let ((rig, of_rig), (base, of_base)) = (mass(self), mass(base));
         let total = solve(
             &(&of_rig + of_base),
             &DMatrix::from_column_slice(EACH, 1, (&rig - base).as_slice()),
@@ -244,7 +246,7 @@ impl Fitted {
     }
 }
 
-/// Covariance of eight coefficients once the last four are known to be zero.
+/// Returns the covariance of eight coefficients, conditional on zero masses.
 ///
 /// # Source
 /// The conditional normal distribution: Anderson, *An Introduction to Multivariate Statistical
@@ -257,7 +259,7 @@ fn without_mass(all: &DMatrix<f64>) -> Result<DMatrix<f64>, AnalysisError> {
     Ok(all.view((0, 0), (eight, eight)) - explained)
 }
 
-/// A⁻¹B of a covariance A, whose entries may be of different units.
+/// Returns A⁻¹B for a covariance A with entries of different units.
 fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, AnalysisError> {
     let scale = a.diagonal().map(|v| if v > 0.0 { v.sqrt().recip() } else { 1.0 });
     let scaling = DMatrix::from_diagonal(&scale);
@@ -269,12 +271,12 @@ fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {
     [matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 0)], matrix[(1, 1)]]
 }
 
-/// Coefficients of a fit as kxx, kxy, kyx, kyy, c and m likewise, with their covariance; `mass` where
-/// it was given, without covariance.
+/// Returns the coefficients of a fit as kxx, kxy, kyx, kyy, then c and m likewise, with their
+/// covariance; the given `mass` is used if it was known, without covariance.
 fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let estimate = &fit.estimate;
     let free: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();
-    let place = |p: &Parameter| {
+    let index = |p: &Parameter| {
         let kind = match p.matrix() {
             Matrix::Stiffness => 0,
             Matrix::Damping => 1,
@@ -282,15 +284,15 @@ fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix
         };
         EACH * kind + 2 * p.row() + p.column()
     };
-    let places: Vec<usize> = free.iter().map(place).collect();
+    let places: Vec<usize> = free.iter().map(index).collect();
     let mut values = DVector::zeros(3 * EACH);
     values.rows_mut(2 * EACH, EACH).copy_from_slice(&row_by_row(mass));
     let mut covariance = DMatrix::zeros(3 * EACH, 3 * EACH);
-    let found = estimate.covariance();
+    let fitted = estimate.covariance();
     for (from, (p, to)) in estimate.parameters().zip(&places).enumerate() {
         values[*to] = p.value;
         for (other, column) in places.iter().enumerate() {
-            covariance[(*to, *column)] = found[(from, other)];
+            covariance[(*to, *column)] = fitted[(from, other)];
         }
     }
     (values, covariance)

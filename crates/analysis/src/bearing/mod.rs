@@ -1,16 +1,16 @@
 //! Identification of a journal bearing on a test rig with a floating housing.
 //!
-//! The housing floats on the film of a shaft that rotates in fixed supports; two shakers excite it, in
-//! one test each or on interleaved lines of one. With the mass M_s of the housing, its acceleration a,
-//! the shaker forces f and the displacement d of the housing relative to the shaft,
+//! The housing floats on the film of a shaft that rotates in fixed supports; two shakers excite it,
+//! in one test each or on interleaved lines of one. With the mass M_s of the housing, its
+//! acceleration a, the shaker forces f and the displacement d of the housing relative to the shaft,
 //!
 //! ```text
 //! f − M_s a = H d,   H(ω) = K − ω² M + iω C
 //! ```
 //!
-//! is a linear system with noise on both sides. Its twelve entries of K, C and M, or eight without M,
-//! are found by maximum likelihood with the noise that the periods show. M is the inertia of the
-//! fluid: its entries may be negative.
+//! is a linear system with noise on both sides. Its twelve entries of K, C and M, or eight without
+//! M, are estimated by maximum likelihood with the noise from the scatter of the periods. M is the
+//! inertia of the fluid: its entries may be negative.
 //!
 //! | File | What it does |
 //! |---|---|
@@ -18,7 +18,7 @@
 //! | `data` | f − M_s a and d from records or from tables of frequency responses |
 //! | `film` | eight or twelve coefficients, with the baseline subtracted; the likelihood-ratio test |
 //! | `selection` | intervals after the test has chosen twelve |
-//! | `rotation` | the speed of which a misfit speaks |
+//! | `rotation` | the speed of rotation that would explain a misfit |
 //! | `checks` | checks of the records and of the residual |
 //! | `stiffness` | the dynamic stiffness line by line |
 //! | `summary` | the result: numbers, remarks |
@@ -52,31 +52,31 @@ pub use self::stiffness::StiffnessLine;
 pub use self::summary::{Amplitude, BearingSummary, CoefficientRow, Dimensionless, StabilityRow};
 use crate::AnalysisError;
 
-/// Identifies the film of a bearing from tests under excitation, and from baseline tests of the same
-/// rig without the film, if there are any: their coefficients are subtracted with their covariance.
+/// Identifies the film of a bearing from tests with excitation. The coefficients of baseline tests
+/// of the same rig without the film, if there are any, are subtracted with their covariance.
 ///
 /// # Errors
-/// [`AnalysisError::Setting`] for settings that are not positive, [`AnalysisError::Estimate`] if a fit
-/// fails, such as for excitation in one direction only.
+/// [`AnalysisError::Setting`] for settings that are not positive, [`AnalysisError::Estimate`] if a
+/// fit fails, such as for excitation in one direction only.
 ///
 /// # Source
-/// That of this module; Wilks (1938) for the likelihood-ratio test.
+/// As this module; Wilks (1938) for the likelihood-ratio test.
 pub fn identify_bearing(
     tests: &BearingData,
     baseline: Option<&BearingData>,
     how: &IdentifyBearing,
 ) -> Result<IdentifiedBearing, AnalysisError> {
     how.check()?;
-    let film = Film::of(tests, baseline, how.coefficients)?;
+    let film = Film::new(tests, baseline, how.coefficients)?;
     let lines = stiffness::lines(tests, &film)?;
     let checks = checks::rows(tests, baseline, &film, how.stator_mass)?;
     let summary = BearingSummary::new(tests, baseline, &film, lines, checks, how)?;
     Ok(IdentifiedBearing { film, summary })
 }
 
-/// The coefficients of a bearing, and what they were identified from.
+/// Coefficients of a bearing, with the fit of the tests.
 ///
-/// [`Display`](std::fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](std::fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]
 pub struct IdentifiedBearing {
     film: Film,
@@ -94,19 +94,19 @@ impl IdentifiedBearing {
         self.film.matrix(1)
     }
 
-    /// Returns M, 2×2, in kg: zero where eight coefficients were identified.
+    /// Returns M, 2×2, in kg: zero if eight coefficients were identified.
     pub fn mass(&self) -> Matrix2<f64> {
         self.film.matrix(2)
     }
 
-    /// Returns the covariance of the coefficients, one row per coefficient, in products of their units:
-    /// kxx, kxy, kyx, kyy, then c and m likewise.
+    /// Returns the covariance of the coefficients, one row per coefficient, in products of their
+    /// units: kxx, kxy, kyx, kyy, then c and m likewise.
     pub fn covariance(&self) -> &DMatrix<f64> {
         self.film.covariance()
     }
 
-    /// Returns the test whether the inertia of the fluid can be left out; `None` where the noise is
-    /// not known.
+    /// Returns the test whether the inertia of the fluid is negligible; `None` if the noise is not
+    /// known.
     pub fn inertia_test(&self) -> Option<LikelihoodRatio> {
         self.film.inertia
     }

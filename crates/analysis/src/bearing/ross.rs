@@ -6,26 +6,28 @@ use std::fmt::Write as _;
 use super::film::NAMED;
 use super::{BearingSummary, BearingTable};
 
-/// Coefficient of ours with its sign that each of the four entries of a matrix is in the axes of ROSS.
+/// Index and sign of our coefficient for each of the four entries of a matrix in the axes of ROSS.
 ///
-/// The load acts along x here and along −y there, and both systems turn from x to y: x there is y here, y there is −x
-/// here.
+/// The load acts along x here and along −y in ROSS, and both shafts rotate from x to y: x of ROSS
+/// is y here, and y of ROSS is −x here.
 ///
 /// ```text
-/// K_there = R K Rᵀ,   R = |  0  1 |
-///                         | −1  0 |
+/// K_ROSS = R K Rᵀ,   R = |  0  1 |
+///                        | −1  0 |
 /// ```
 const TURNED: [(usize, f64); 4] = [(3, 1.0), (2, -1.0), (1, -1.0), (0, 1.0)];
 
 impl BearingTable {
-    /// Returns the table as text in the axes of ROSS: `speed` in rad/s, and kxx … myy in SI units (masses of zero where
-    /// they were not identified), one row per speed and load.
+    /// Returns the table as text in the axes of ROSS: `speed` in rad/s, and kxx … myy in SI units
+    /// (zero for masses that were not identified), one row per speed and load.
     ///
-    /// The columns kxx … myy are keyword arguments of `BearingElement`. Its releases 1 and 2 call the speed `frequency`;
-    /// release 3 calls it `speed`, and `frequency` the frequency of the excitation.
+    /// The columns kxx … myy are keyword arguments of `BearingElement`. Its releases 1 and 2 call
+    /// the speed `frequency`; release 3 calls it `speed`, and `frequency` the frequency of the
+    /// excitation.
     ///
     /// # Source
-    /// Timbó et al., ROSS – Rotordynamic Open Source Software, Journal of Open Source Software 5(48), 2120 (2020).
+    /// Timbó et al., ROSS – Rotordynamic Open Source Software, Journal of Open Source Software
+    /// 5(48), 2120 (2020).
     pub fn ross_csv(&self) -> String {
         let mut text = format!("speed,{}", NAMED.join(","));
         for row in &self.rows {
@@ -48,7 +50,7 @@ fn in_axes_of_ross(bearing: &BearingSummary) -> [f64; 12] {
 fn turned(value: impl Fn(usize) -> f64) -> [f64; 12] {
     std::array::from_fn(|at| {
         let (from, sign) = TURNED[at % 4];
-        // Without a negative zero.
+        // The sum with 0 avoids a negative zero.
         sign * value(at / 4 * 4 + from) + 0.0
     })
 }
@@ -59,7 +61,8 @@ mod tests {
 
     use super::*;
 
-    /// K and C of `CylindricalBearing` of ROSS 2.3.0: 525 N, 1,500 rev/min, D 0.1 m, L 0.03 m, clearance 0.1 mm, 0.1 Pa·s.
+    /// K and C of `CylindricalBearing` of ROSS 2.3.0: 525 N, 1,500 rev/min, D 0.1 m, L 0.03 m,
+    /// clearance 0.1 mm, 0.1 Pa·s.
     #[test]
     fn a_short_bearing_is_that_of_the_package() {
         let of_ross = [

@@ -1,23 +1,25 @@
-//! Intervals of coefficients that a test has chosen.
+//! Intervals of coefficients after a choice of the model by a test.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Number of halvings of the range in which an end of an interval is searched: to the rounding of a double.
+/// Number of bisections for a limit of an interval: down to rounding.
 const HALVINGS: usize = 80;
 
-/// Half the range in which an end is searched, in standard errors: conditioning on a test at 5 % of four coefficients
-/// moves it by far less.
+/// Half the search range for a limit, in standard errors: the condition on a test of four
+/// coefficients at 5 % moves the limit by far less.
 const REACH: f64 = 60.0;
 
-/// Returns the values that a coefficient cannot be estimated at, since the test of `tested` others would then have
-/// left them out, as [low, high] of the estimate `at`; `None` where the test chooses whatever its value.
+/// Returns the range [low, high] of the estimate `at` in which the test would have chosen the model
+/// without the coefficients `tested`; `None` if its choice does not depend on this estimate.
 ///
-/// The test chooses where mᵀS⁻¹m exceeds `critical`, m being the `tested` estimates and S their covariance. With the
-/// part of m that is independent of the coefficient given, that is a quadratic inequality in its estimate.
+/// The test chooses the larger model if mᵀS⁻¹m exceeds `critical`, with the `tested` estimates m
+/// and their covariance S. For a given component of m that is independent of the coefficient, this
+/// is a quadratic inequality in its estimate.
 ///
 /// # Source
-/// Lee, Sun, Sun & Taylor (2016), Annals of Statistics 44, 907–927 (the polyhedral lemma, here for a quadric).
+/// Lee, Sun, Sun & Taylor (2016), Annals of Statistics 44, 907–927 (the polyhedral lemma, here for
+/// a quadric).
 pub(super) fn gap(
     values: &DVector<f64>,
     covariance: &DMatrix<f64>,
@@ -34,7 +36,7 @@ pub(super) fn gap(
     let correlation = DMatrix::from_fn(count, count, |i, j| {
         covariance[(first + i, first + j)] / (scale[i] * scale[j])
     });
-    // In units of their standard errors.
+    // The tested estimates in units of their standard errors.
     let tested = DVector::from_fn(count, |row, _| values[first + row] / scale[row]);
     let slope = DVector::from_fn(count, |row, _| {
         covariance[(first + row, at)] / (variance.sqrt() * scale[row])
@@ -44,7 +46,7 @@ pub(super) fn gap(
     let lu = correlation.lu();
     let (of_slope, of_rest) = (lu.solve(&slope)?, lu.solve(&independent)?);
     let (square, half) = (slope.dot(&of_slope), independent.dot(&of_slope));
-    // The estimates at hand were chosen, whatever the rounding of their statistic.
+    // The limit ensures that the present estimates are outside the gap despite rounding.
     let critical = critical.min(tested.dot(&lu.solve(&tested)?));
     let root = half * half - square * (independent.dot(&of_rest) - critical);
     if !(square > 0.0 && root > 0.0) {
@@ -54,11 +56,11 @@ pub(super) fn gap(
     Some(ends.map(|end| end * variance.sqrt()))
 }
 
-/// Returns the interval at `level` of a coefficient whose estimate, with this standard error, can have any value but
-/// those inside `gap`.
+/// Returns the interval at `level` of a coefficient whose estimate, with this standard error,
+/// cannot be inside `gap`.
 ///
 /// # Source
-/// That of [`gap`].
+/// As [`gap`].
 pub(super) fn conditional_interval(
     [value, standard_error]: [f64; 2],
     degrees_of_freedom: usize,
@@ -68,14 +70,14 @@ pub(super) fn conditional_interval(
     let student = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok()?;
     let [low, high] = gap.map(|end| end / standard_error);
     let estimate = value / standard_error;
-    // Probability of an estimate as far above the truth, which rises with the truth.
+    // Conditional probability of a larger estimate, which rises with the true value.
     let above = |truth: f64| {
         let (below_gap, above_gap) = (student.cdf(low - truth), student.sf(high - truth));
-        let all = below_gap + above_gap;
+        let outside_gap = below_gap + above_gap;
         if estimate > 0.5 * (low + high) {
-            student.sf(estimate.max(high) - truth) / all
+            student.sf(estimate.max(high) - truth) / outside_gap
         } else {
-            1.0 - student.cdf(estimate.min(low) - truth) / all
+            1.0 - student.cdf(estimate.min(low) - truth) / outside_gap
         }
     };
     let end = |probability: f64| {

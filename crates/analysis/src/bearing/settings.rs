@@ -11,9 +11,10 @@ use crate::text::compact;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdentifyBearing {
-    /// Mass of the housing with all that moves with it, in kg.
+    /// Mass of the housing with all parts that move with it, in kg.
     pub stator_mass: f64,
-    /// Speed of rotation, in Hz; its lines and multiples are left out. `None`: the shaft stands still.
+    /// Speed of rotation, in Hz; the lines at its multiples are excluded. `None`: the shaft does
+    /// not rotate.
     pub rotation_hz: Option<f64>,
     /// Static load of the bearing, in N, for dimensionless coefficients.
     pub load: Option<f64>,
@@ -23,10 +24,10 @@ pub struct IdentifyBearing {
     pub coefficients: Coefficients,
     /// Spectral lines to use.
     pub lines: LineChoice,
-    /// Spectral lines to leave out of these, beside those of the rotation.
+    /// Additional lines to exclude, in addition to those of the rotation.
     pub without: LeftOut,
-    /// Independent averages behind the coherence of tables of frequency responses, a pure number; need
-    /// not be whole.
+    /// Number of independent averages of the coherence of tables of frequency responses, a pure
+    /// number that need not be an integer.
     pub averages: Option<f64>,
     /// Points of tables of frequency responses, x before y; empty: all, in the order of the table.
     pub points: Vec<String>,
@@ -60,8 +61,8 @@ pub enum Coefficients {
 }
 
 impl IdentifyBearing {
-    /// Returns what these settings say of tables of frequency responses.
-    pub(super) fn of_tables(&self) -> Result<IdentifyResponses, AnalysisError> {
+    /// Returns the settings for tables of frequency responses.
+    pub(super) fn response_settings(&self) -> Result<IdentifyResponses, AnalysisError> {
         let numbered = |setting| {
             let why = "frequency responses have no numbered lines: choose a band".into();
             Err(AnalysisError::Setting { setting, why })
@@ -78,8 +79,8 @@ impl IdentifyBearing {
         Ok(IdentifyResponses { averages, points, band, ..IdentifyResponses::default() })
     }
 
-    /// Refuses a speed of rotation that a record sampled at `rate_hz` cannot show: run-out would be folded onto other
-    /// lines, and the speed is more likely to be in another unit.
+    /// Refuses a speed of rotation above half the sampling rate `rate_hz`: run-out would alias to
+    /// other lines, and the speed is probably in another unit.
     pub(super) fn check_rotation(&self, rate_hz: f64) -> Result<(), AnalysisError> {
         let Some(rotation_hz) = self.rotation_hz.filter(|hz| *hz > 0.5 * rate_hz) else {
             return Ok(());
@@ -93,7 +94,7 @@ impl IdentifyBearing {
         Err(AnalysisError::Setting { setting: "rotation_hz", why })
     }
 
-    /// Checks that every number given is positive and finite.
+    /// Checks that every given number is positive and finite.
     pub(super) fn check(&self) -> Result<(), AnalysisError> {
         let size = &self.size;
         for (setting, value) in [

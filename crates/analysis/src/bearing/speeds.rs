@@ -18,7 +18,7 @@ use crate::identify::summary::verdict;
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
 use crate::text::{compact, paged_table, significant};
 
-/// Tests at several speeds and loads, all with the same columns: the saved form of a test campaign.
+/// Plan of a test campaign: tests at several speeds and loads, all with the same columns.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BearingPlan {
@@ -28,11 +28,12 @@ pub struct BearingPlan {
     pub reading: Reading,
     /// Samples to use.
     pub window: Window,
-    /// Settings; each point replaces speed and load.
+    /// Settings; the speed and load of each point replace those of the settings.
     pub settings: IdentifyBearing,
-    /// Baseline tests for every point that has none of its own.
+    /// Baseline tests for every point without other ones.
     pub baseline: Vec<PathBuf>,
-    /// `true` if the files are tables of frequency responses, of displacement and acceleration by turns.
+    /// `true` if the files are tables of frequency responses, alternately of displacement and
+    /// acceleration.
     pub frf_table: bool,
     /// Speeds and loads.
     pub points: Vec<BearingPoint>,
@@ -56,7 +57,7 @@ impl BearingPlan {
     /// Identifies the bearing at every point.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`] for a point without tests, and those of
+    /// [`AnalysisError::NoRecord`] for a point without tests, and the errors of
     /// [`BearingData::of_records`] and [`identify_bearing`](super::identify_bearing()).
     pub fn run(&self) -> Result<BearingTable, AnalysisError> {
         let bearings = self.points.iter().map(|point| self.at(point));
@@ -108,9 +109,9 @@ impl BearingTable {
         Self { rows }
     }
 
-    /// Returns the table as text: `speed` in rad/s, `load` in N, the coefficients kxx … myy (zero where
-    /// they were not identified) in SI units, and each with its standard error. The columns without
-    /// the load and the errors are the arguments of a bearing element in rotor-dynamics programs.
+    /// Returns the table as text: `speed` in rad/s, `load` in N, the coefficients kxx … myy in SI
+    /// units (zero if they were not identified), and their standard errors. The columns except the
+    /// load and the errors are the arguments of a bearing element in rotor-dynamics programs.
     pub fn csv(&self) -> String {
         let names = NAMED;
         let mut text = String::from("speed,load");
@@ -124,14 +125,15 @@ impl BearingTable {
             let speed = row.rotation_hz.unwrap_or(0.0) * TAU;
             let load = row.load.map_or(String::new(), |load| format!("{load:?}"));
             let _ = write!(text, "\n{speed:?},{load}");
-            let of =
+            let coefficient =
                 |name: &str| row.coefficients.iter().find(|c: &&CoefficientRow| c.name == name);
             for name in names {
-                let _ = write!(text, ",{:?}", of(name).map_or(0.0, |c| c.estimate.value));
+                let _ = write!(text, ",{:?}", coefficient(name).map_or(0.0, |c| c.estimate.value));
             }
             for name in names {
-                // Empty where it is withheld, zero for a mass that is taken as zero.
-                let error = of(name).map_or(Some(0.0), |c| c.estimate.standard_error);
+                // The cell is empty for a withheld error, and zero for a mass that is not
+                // identified.
+                let error = coefficient(name).map_or(Some(0.0), |c| c.estimate.standard_error);
                 let _ = match error {
                     Some(error) => write!(text, ",{error:?}"),
                     None => write!(text, ","),

@@ -1,4 +1,4 @@
-//! The dynamic stiffness line by line, which no model has smoothed.
+//! Dynamic stiffness line by line, without a model.
 
 use std::f64::consts::TAU;
 
@@ -18,22 +18,23 @@ pub struct StiffnessLine {
     pub real: [f64; 4],
     /// Im H = ω C, in N/m.
     pub imaginary: [f64; 4],
-    /// Standard errors of the real parts, in N/m; `None` where the noise is not known.
+    /// Standard errors of the real parts, in N/m; `None` if the noise is not known.
     pub standard_error_real: Option<[f64; 4]>,
-    /// Standard errors of the imaginary parts, in N/m; `None` where the noise is not known.
+    /// Standard errors of the imaginary parts, in N/m; `None` if the noise is not known.
     pub standard_error_imaginary: Option<[f64; 4]>,
 }
 
 type Complex2 = Matrix2<Complex<f64>>;
 
-/// Sine of the angle between two displacements below which they do not tell two directions apart.
+/// Minimum sine of the angle between two displacements in independent directions.
 const INDEPENDENT: f64 = 0.1;
 
-/// Frequencies that differ by less than this part of themselves are one.
+/// Maximum relative difference of equal frequencies.
 const SAME: f64 = 1e-9;
 
-/// Solves G = H D at every frequency with two tests, or on pairs of neighbouring lines with one each,
-/// which the fitted film takes to their middle; the baseline is subtracted as it was fitted.
+/// Solves G = H D at every frequency with two tests, or on pairs of neighbouring lines with one
+/// test each, which the fitted film interpolates to their middle; the fitted baseline is
+/// subtracted.
 pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLine>, AnalysisError> {
     let omega = tests.data.omega();
     let mut rows: Vec<usize> = (0..omega.len()).collect();
@@ -55,7 +56,7 @@ pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLin
     Ok(lines)
 }
 
-/// H from some rows at about one frequency; `None` if they move in one direction only.
+/// Returns H from some rows at about one frequency; `None` if they move in one direction only.
 fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLine> {
     let data = &tests.data;
     let middle = rows.iter().map(|row| data.omega()[*row]).sum::<f64>() / rows.len() as f64;
@@ -71,7 +72,7 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
         forces += force * d.adjoint();
         power += d * d.adjoint();
     }
-    // |det| of two displacements over their lengths is the sine of the angle between them.
+    // The ratio of |det| to the lengths of two displacements is the sine of the angle between them.
     let lengths = power[(0, 0)].re + power[(1, 1)].re;
     if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
         return None;
@@ -124,7 +125,7 @@ fn error_powers(covariance: &nalgebra::DMatrix<Complex<f64>>, h: &Complex2) -> [
     [error[(0, 0)].re.max(0.0), error[(1, 1)].re.max(0.0)]
 }
 
-/// K − ω² M + iω C of twelve coefficients.
+/// Returns K − ω² M + iω C for twelve coefficients.
 pub(super) fn modelled(coefficients: &DVector<f64>, omega: f64) -> Complex2 {
     let entry = |at: usize| {
         let (k, c, m) = (coefficients[at], coefficients[4 + at], coefficients[8 + at]);

@@ -1,4 +1,4 @@
-//! The result of a bearing test.
+//! Result of a bearing test.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -20,13 +20,14 @@ use crate::identify::rows::{CONFIDENCE, Uncertain, header};
 use crate::identify::summary::verdict;
 use crate::text::{compact, paragraph, significant, text_table};
 
-/// Amplitude over clearance above which the linearised film is biased.
+/// Maximum ratio of amplitude to clearance for a linear film; a larger amplitude biases the
+/// coefficients.
 pub const LARGEST_AMPLITUDE: f64 = 0.05;
 
 /// Half the width of an interval at 95 %, in standard errors.
 const NORMAL: f64 = 1.96;
 
-/// Relative change of the width of an interval by the choice of the test from which it is said.
+/// Minimum relative change of the width of an interval by the choice of the model for a remark.
 const MOVED: f64 = 0.02;
 
 /// Units of k, c and m.
@@ -39,7 +40,7 @@ pub struct BearingSummary {
     pub tests: Vec<String>,
     /// The baseline tests; empty without them.
     pub baseline: Vec<String>,
-    /// Speed of rotation, in Hz; `None` of a shaft that stands still.
+    /// Speed of rotation, in Hz; `None` without rotation.
     pub rotation_hz: Option<f64>,
     /// Static load, in N, if it was given.
     pub load: Option<f64>,
@@ -49,25 +50,25 @@ pub struct BearingSummary {
     pub coefficients: Vec<CoefficientRow>,
     /// Covariance of the coefficients.
     pub covariance: ParameterCovariance,
-    /// Likelihood-ratio test whether the inertia of the fluid can be left out; `None` where the noise is
+    /// Likelihood-ratio test whether the inertia of the fluid is negligible; `None` if the noise is
     /// not known.
     pub inertia_test: Option<LikelihoodRatio>,
     /// Dimensionless coefficients, if load and clearance are known.
     pub dimensionless: Option<Dimensionless>,
     /// Whirl and threshold of instability of a rigid rotor; `None` without rotation.
     pub stability: Option<StabilityRow>,
-    /// Amplitude of the tests; `None` of frequency responses.
+    /// Amplitude of the tests; `None` for frequency responses.
     pub amplitude: Option<Amplitude>,
-    /// Residual power over noise power, a ratio; 1 where the noise is not known.
+    /// Ratio of residual power to noise power; 1 if the noise is not known.
     pub misfit_ratio: f64,
-    /// Number by which the standard errors that follow from the noise are multiplied (Birge ratio): 1 where the residual
-    /// is no larger than the noise, `None` where it is so much larger that errors and intervals are withheld.
+    /// Factor on the standard errors from the noise (Birge ratio): 1 if the noise explains the
+    /// residual, `None` if the residual is so large that errors and intervals are withheld.
     pub error_scale: Option<f64>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of spectral lines, summed over the tests.
     pub lines: usize,
-    /// Frequencies that were left out, in Hz, one per line at which the shaft rotates.
+    /// Frequencies of the lines excluded because of the rotation, in Hz.
     pub left_out_hz: Vec<f64>,
     /// Dynamic stiffness of the film line by line.
     pub dynamic_stiffness: Vec<StiffnessLine>,
@@ -82,7 +83,7 @@ pub struct BearingSummary {
 /// One coefficient of a film.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientRow {
-    /// Name: the first index is the direction of the force, the second that of the motion.
+    /// Name: the first index is the direction of the force, the second the direction of the motion.
     pub name: &'static str,
     /// SI unit.
     pub unit: &'static str,
@@ -94,29 +95,29 @@ pub struct CoefficientRow {
 /// Dimensionless coefficients: k c/W, c c Ω/W, m c Ω²/W with the clearance c and the load W.
 #[derive(Debug, Clone, Serialize)]
 pub struct Dimensionless {
-    /// Coefficients, a ratio each; without rotation of stiffness alone.
+    /// Coefficients, a ratio each; without rotation only those of the stiffness.
     pub coefficients: Vec<CoefficientRow>,
-    /// Sommerfeld number μ N L D (R/c)²/W, dimensionless; `None` if size or viscosity are not known.
+    /// Sommerfeld number μ N L D (R/c)²/W, dimensionless; `None` if size or viscosity are unknown.
     pub sommerfeld_number: Option<f64>,
 }
 
 /// Whirl of a rigid rotor on this film.
 #[derive(Debug, Clone, Serialize)]
 pub struct StabilityRow {
-    /// Whirl frequency over the speed of rotation at the threshold, a ratio; `None` if no rotor becomes
-    /// unstable.
+    /// Ratio of the whirl frequency to the speed of rotation at the threshold; `None` if no rotor
+    /// becomes unstable.
     pub whirl_frequency_ratio: Option<Uncertain>,
-    /// Mass per bearing above which a rigid rotor is unstable at this speed and load, in kg; `None` if
-    /// there is no such mass.
+    /// Mass per bearing above which a rigid rotor is unstable at this speed and load, in kg; `None`
+    /// if there is no such mass.
     pub critical_mass: Option<Uncertain>,
 }
 
 /// Amplitude of the housing relative to the shaft.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Amplitude {
-    /// Largest distance from the mean place, in m.
+    /// Largest displacement from the mean position, in m.
     pub largest_displacement: f64,
-    /// The same over the clearance, a ratio; `None` if that is not known.
+    /// Ratio of this displacement to the clearance; `None` if the clearance is unknown.
     pub over_clearance: Option<f64>,
 }
 
@@ -188,7 +189,7 @@ impl BearingSummary {
             analysis: how.clone(),
         };
         summary.remarks.extend(baseline.iter().flat_map(|b| b.remarks.iter().cloned()));
-        summary.remarks.extend(summary.of_intervals(tests, film));
+        summary.remarks.extend(summary.interval_remarks(tests, film));
         summary.dimensionless = summary.scaled()?;
         summary.stability = match how.rotation_hz {
             Some(hz) => summary.whirl(film, TAU * hz, &uncertain)?,
@@ -198,9 +199,9 @@ impl BearingSummary {
         Ok(summary)
     }
 
-    /// Returns what the residual and the choice of twelve coefficients do to the intervals, and the speed that the
-    /// misfit speaks of.
-    fn of_intervals(&self, tests: &BearingData, film: &Film) -> Vec<String> {
+    /// Returns remarks about intervals that the residual or the choice of twelve coefficients has
+    /// changed, and about a speed of rotation that would explain the misfit.
+    fn interval_remarks(&self, tests: &BearingData, film: &Film) -> Vec<String> {
         let mut remarks = Vec::new();
         match self.error_scale {
             None => remarks.push(format!(
@@ -262,15 +263,15 @@ impl BearingSummary {
         let coefficients = rows.collect();
         let sommerfeld_number = match (size.diameter, size.length, size.viscosity, omega) {
             (Some(diameter), Some(length), Some(viscosity), Some(omega)) => {
-                let all = Conditions { diameter, length, clearance, viscosity, omega };
-                Some(all.sommerfeld_number(load)?)
+                let conditions = Conditions { diameter, length, clearance, viscosity, omega };
+                Some(conditions.sommerfeld_number(load)?)
             }
             _ => None,
         };
         Ok(Some(Dimensionless { coefficients, sommerfeld_number }))
     }
 
-    /// The threshold of instability; a remark where the coefficients allow none.
+    /// Returns the threshold of instability; adds a remark if the coefficients do not have one.
     fn whirl(
         &mut self,
         film: &Film,
@@ -288,15 +289,15 @@ impl BearingSummary {
         };
         let covariance: DMatrix<f64> = film.covariance().view((0, 0), (8, 8)).into_owned();
         let errors = threshold.standard_errors(&covariance)?;
-        let of = |value: Option<f64>, error: Option<f64>| {
+        let with_error = |value: Option<f64>, error: Option<f64>| {
             value.zip(error).map(|(value, error)| uncertain(value, error * error)).transpose()
         };
         Ok(Some(StabilityRow {
-            whirl_frequency_ratio: of(
+            whirl_frequency_ratio: with_error(
                 threshold.whirl_frequency_ratio(),
                 errors.whirl_frequency_ratio,
             )?,
-            critical_mass: of(threshold.critical_mass(), errors.critical_mass)?,
+            critical_mass: with_error(threshold.critical_mass(), errors.critical_mass)?,
         }))
     }
 
@@ -321,14 +322,14 @@ impl BearingSummary {
             }
         );
         let table = |what: &str, rows: &[CoefficientRow]| {
-            let mut all = vec![header(what)];
-            all.extend(rows.iter().map(|row| {
+            let mut cells = vec![header(what)];
+            cells.extend(rows.iter().map(|row| {
                 let mut cells = vec![row.name.to_owned()];
                 cells.extend(self.cells(&row.estimate));
                 cells.push(row.unit.into());
                 cells
             }));
-            text_table(&all)
+            text_table(&cells)
         };
         text += &table("coefficient", &self.coefficients);
         if let Some(scaled) = &self.dimensionless {

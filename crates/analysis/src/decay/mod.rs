@@ -1,4 +1,4 @@
-//! Modes of a free response: a record in which no force acts.
+//! Modes of a free response: a record without force.
 
 mod nonlinear;
 mod release;
@@ -26,30 +26,31 @@ use crate::text::significant;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DecaySettings {
-    /// Beginning of the decay, in s from the first sample of the window; `None`: found in the record.
+    /// Beginning of the decay, in s from the first sample of the window; `None`: detected in the
+    /// record.
     pub from_s: Option<f64>,
-    /// End of what is used, in s from the first sample of the window; `None`: the end of the window, or where rounding
-    /// takes over.
+    /// End of the part used, in s from the first sample of the window; `None`: the end of the
+    /// window, or the time at which a channel has fallen to its rounding.
     pub to_s: Option<f64>,
-    /// Number of modes; `None`: as many as the record shows.
+    /// Number of modes; `None`: chosen by the Bayesian information criterion.
     pub modes: Option<usize>,
-    /// Largest number of modes to look for where the number is not given.
+    /// Maximum number of modes if the number is not given.
     pub max_modes: usize,
     /// `true` if each channel has an unknown constant.
     pub offset: bool,
 }
 
 impl Default for DecaySettings {
-    /// Everything is found in the record; at most ten modes.
+    /// Returns settings that detect everything in the record, with at most ten modes.
     fn default() -> Self {
         let FreeDecay { modes, max_modes, offset } = FreeDecay::default();
         Self { from_s: None, to_s: None, modes, max_modes, offset }
     }
 }
 
-/// Modes of a free response, and the response beside that of the modes.
+/// Modes of a free response, and the measured response with that of the modes.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]
 pub struct Decayed {
     summary: DecaySummary,
@@ -57,29 +58,30 @@ pub struct Decayed {
     compared: Compared,
 }
 
-/// Finds natural frequencies, damping ratios and shapes in a record without force: a structure that was
-/// plucked or struck, or whose shaker was switched off.
+/// Identifies natural frequencies, damping ratios and shapes from a record without force: after a
+/// release or an impact, or after a shaker was switched off.
 ///
-/// The record needs no force column, and one that is named is not read. All channels are of one kind of
-/// response. Unless its beginning is given, the decay begins with the last sample at which the sum of the
-/// squares of all channels, each over its own power, is at least 80 % of the largest. Unless its end is given, it ends
-/// where a channel falls to twelve of the steps in which its values come, if they do.
+/// The record needs no force column, and a named one is not read. All channels have the same
+/// quantity. Without a given beginning, the decay begins at the last sample with a sum of squares
+/// of all channels, each divided by its power, of at least 80 % of the largest sum. Without a given
+/// end, it ends where the range of a channel has fallen to twelve quantisation steps, if its values
+/// are quantised.
 ///
 /// ```
 /// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
 ///
 /// let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/decay.csv");
 /// let channels = Channels::of_responses(ResponseQuantity::Acceleration, "a1,a2,a3");
-/// let found = decay(&Measurement::open(rig, &channels)?, &DecaySettings::default())?;
-/// assert_eq!(found.estimate().modes().len(), 3);
-/// println!("{found}");
+/// let decayed = decay(&Measurement::open(rig, &channels)?, &DecaySettings::default())?;
+/// assert_eq!(decayed.estimate().modes().len(), 3);
+/// println!("{decayed}");
 /// # Ok::<(), mechid_analysis::AnalysisError>(())
 /// ```
 ///
 /// # Errors
-/// [`AnalysisError::NoMotion`] without a response, [`AnalysisError::Setting`] for several kinds of response, a
-/// period, or a beginning or end outside the window, [`AnalysisError::Window`], those of
-/// [`free_decay`], and if the file cannot be read again.
+/// [`AnalysisError::NoMotion`] without a response, [`AnalysisError::Setting`] for several
+/// quantities, a period, or a beginning or end outside the window, [`AnalysisError::Window`], the
+/// errors of [`free_decay`], and an error if the file cannot be read again.
 pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, AnalysisError> {
     let kind = kind_of(measurement)?;
     let whole = how.part(measurement)?.whole_block()?;
@@ -120,7 +122,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     Ok(Decayed { summary, estimate, compared })
 }
 
-/// The one kind of response that a record has columns of.
+/// Returns the only quantity of the response columns of a record.
 fn kind_of(measurement: &Measurement) -> Result<ResponseQuantity, AnalysisError> {
     let channels = measurement.channels();
     let named = |kind: &ResponseQuantity| !channels.response(*kind).is_empty();
@@ -142,8 +144,8 @@ fn responses_of(
     block: &Block,
     kind: ResponseQuantity,
 ) -> Result<(ResponseQuantity, &Record), AnalysisError> {
-    let found = block.responses().into_iter().find(|(own, _)| *own == kind);
-    found.ok_or(AnalysisError::NoMotion)
+    let response = block.responses().into_iter().find(|(quantity, _)| *quantity == kind);
+    response.ok_or(AnalysisError::NoMotion)
 }
 
 impl DecaySettings {
@@ -151,7 +153,7 @@ impl DecaySettings {
         FreeDecay { modes: self.modes, max_modes: self.max_modes, offset: self.offset }
     }
 
-    /// The part of a record between beginning and end.
+    /// Returns the part of a record between beginning and end.
     fn part(&self, measurement: &Measurement) -> Result<Measurement, AnalysisError> {
         if measurement.window_settings().period.is_some() {
             let why = "a free decay has no period: choose `from` and `to`".into();
@@ -164,28 +166,25 @@ impl DecaySettings {
         measurement.clone().window(window)
     }
 
-    /// Samples between beginning and end, of a window of `len` samples `dt` seconds apart.
+    /// Returns the samples between beginning and end in a window of `len` samples, `dt` seconds
+    /// apart.
     fn samples(&self, len: usize, dt: f64) -> Result<Range<usize>, AnalysisError> {
         let at = |setting: &'static str, seconds: f64| {
             let sample = (seconds / dt).round();
-            match (0.0..=len as f64).contains(&sample) {
-                true => Ok(sample as usize),
-                false => {
-                    let whole = len as f64 * dt;
-                    let why = format!("{seconds} s is not in the window of {whole} s");
-                    Err(AnalysisError::Setting { setting, why })
-                }
+            if (0.0..=len as f64).contains(&sample) {
+                return Ok(sample as usize);
             }
+            let whole = len as f64 * dt;
+            let why = format!("{seconds} s is not in the window of {whole} s");
+            Err(AnalysisError::Setting { setting, why })
         };
         let first = self.from_s.map_or(Ok(0), |seconds| at("from", seconds))?;
         let end = self.to_s.map_or(Ok(len), |seconds| at("to", seconds))?;
-        match first < end {
-            true => Ok(first..end),
-            false => {
-                let why = "it must be after `from`".into();
-                Err(AnalysisError::Setting { setting: "to", why })
-            }
+        if first >= end {
+            let why = "it must be after `from`".into();
+            return Err(AnalysisError::Setting { setting: "to", why });
         }
+        Ok(first..end)
     }
 }
 
@@ -200,7 +199,7 @@ impl Decayed {
         &self.estimate
     }
 
-    /// Returns the response from the beginning of the decay on, measured and fitted.
+    /// Returns the measured and the fitted response, from the beginning of the decay.
     pub fn compared(&self) -> &Compared {
         &self.compared
     }

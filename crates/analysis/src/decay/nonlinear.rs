@@ -1,4 +1,4 @@
-//! Signs of more than linear modes in a free decay: a backbone, harmonics, a second hit.
+//! Signs of a nonlinear response in a free decay: a backbone, harmonics, a second hit.
 
 use mechid_estimate::IdentifiedMode;
 use mechid_modal::free_decay::Backbone;
@@ -9,30 +9,32 @@ use crate::AnalysisError;
 use crate::identify::rows::Uncertain;
 use crate::text::{compact, significant, text_table};
 
-/// Highest multiple of a frequency that is looked for.
+/// Highest order of a harmonic.
 const HIGHEST_HARMONIC: u32 = 7;
-/// Part of the frequency of a mode that the errors of a multiple reach at most.
+/// Maximum ratio of the tolerance of a harmonic to the frequency of the fundamental mode.
 const HARMONIC_REACH: f64 = 0.1;
-/// Number of standard errors within which a frequency is a multiple of another.
+/// Maximum difference of a frequency from a multiple of another, in standard errors, for a
+/// harmonic.
 const HARMONIC_ERRORS: f64 = 4.0;
 
-/// Mode whose frequency is a multiple of that of another, within their errors.
+/// Mode with a frequency that is a multiple of that of another mode, within their errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Harmonic {
     /// The other mode, counted from 1.
     pub of_mode: usize,
-    /// The multiple.
+    /// Order of the harmonic.
     pub order: u32,
 }
 
-/// Frequency and damping over amplitude.
+/// Frequency and damping as functions of the amplitude (backbone curve).
 #[derive(Debug, Serialize)]
 pub struct BackboneRow {
-    /// Modes of the linear model that stand for this one, counted from 1.
+    /// Linear modes that represent this nonlinear mode, counted from 1.
     pub modes: Vec<usize>,
-    /// Decrease of the Bayesian information criterion from the linear modes to the backbone, a pure number.
+    /// Decrease of the Bayesian information criterion from the linear modes to the backbone, a pure
+    /// number.
     pub gain: f64,
-    /// Values from the first amplitude down.
+    /// Values by falling amplitude.
     pub points: Vec<BackbonePointRow>,
 }
 
@@ -68,8 +70,9 @@ impl BackboneRow {
 }
 
 impl DecaySummary {
-    /// Names the modes whose frequency is, within four standard errors, a multiple of that of the mode that is not linear,
-    /// which changes with the amplitude. Of linear modes a multiple says nothing.
+    /// Marks the modes whose frequency is, within four standard errors, a multiple of the frequency
+    /// of the nonlinear mode at some amplitude. Without a nonlinear mode a multiple is a
+    /// coincidence.
     pub(super) fn name_harmonics(&mut self, modes: &[IdentifiedMode]) {
         let named: Vec<Option<Harmonic>> =
             (0..modes.len()).map(|at| self.harmonic(modes, at)).collect();
@@ -91,13 +94,13 @@ impl DecaySummary {
         });
         let energy = |number: usize| self.modes[number - 1].energy_share;
         let strongest = backbone.modes.iter().max_by(|a, b| energy(**a).total_cmp(&energy(**b)));
-        // The band of a frequency that is hardly known holds a multiple by chance.
+        // The wide interval of an uncertain frequency contains a multiple by chance.
         let (order, of_mode) = order.zip(strongest).filter(|_| reach < HARMONIC_REACH * low)?;
         Some(Harmonic { of_mode: *of_mode, order })
     }
 
-    /// What speaks against a sum of decaying oscillations.
-    pub(super) fn of_model(&self) -> Vec<String> {
+    /// Returns remarks about deviations from a sum of decaying oscillations.
+    pub(super) fn model_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if let Some(backbone) = &self.backbone {
             let numbers: Vec<String> = backbone.modes.iter().map(usize::to_string).collect();
@@ -138,7 +141,7 @@ impl DecaySummary {
         remarks
     }
 
-    /// Returns frequency and damping over amplitude as a table, or nothing.
+    /// Returns frequency and damping over amplitude as a table; an empty text without a backbone.
     pub(super) fn backbone_table(&self) -> String {
         let Some(backbone) = &self.backbone else { return String::new() };
         let header = [

@@ -1,27 +1,28 @@
-//! The beginning of a free decay.
+//! Beginning of a free decay.
 
 use mechid_checks::limits::SIGNIFICANCE;
 use mechid_signal::{Record, Spectrum};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Part of the largest sum of squares at which the decay begins.
+/// Minimum ratio of the sum of squares to its largest value at the beginning of the decay.
 const LEVEL: f64 = 0.8;
-/// Part of the record, at its end, over which the constants are averaged.
+/// Number of equal parts of a record; the mean of the last part is the constant of a channel.
 const REST: usize = 4;
-/// Number of parts in which the amplitude is followed over time.
+/// Number of intervals of time for the trend of the amplitude.
 const PARTS: usize = 8;
-/// Least number of parts that show whether the amplitude was held at first.
+/// Minimum number of intervals for a trend.
 const FEWEST: usize = 5;
-/// Twice the logarithm of a likelihood ratio that is strong evidence: with less, the decay begins late rather than
-/// before its release.
+/// Minimum of twice the log-likelihood ratio for strong evidence of an amplitude that decays from
+/// the beginning; with less, the decay begins late rather than before its release.
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Returns the last sample, counted from 0, at which the squares of all channels, each over its own power, sum
-/// up to [`LEVEL`] of their largest sum or more; the first such sample if the amplitude falls from there on, and the first
-/// sample of the record if it rises over most of it.
+/// Returns the beginning of a decay, counted from 0: the last sample whose sum of squares of all
+/// channels, each divided by its power, is at least [`LEVEL`] of the largest sum. It is the first
+/// such sample if the amplitude decays from there, and the first sample of the record if the
+/// amplitude grows over most of it.
 ///
-/// That is after a pull that is let go, after the last cycles of a shaker and at the peak that an impact
-/// leaves. Squares are those about the mean of the last quarter.
+/// This sample is after a static release, after the last cycles of a shaker, and at the peak after
+/// an impact. The squares are about the mean of the last quarter.
 pub(super) fn release(record: &Record) -> usize {
     let sums = sums(record);
     let largest = sums.iter().copied().fold(0.0, f64::max);
@@ -31,69 +32,72 @@ pub(super) fn release(record: &Record) -> usize {
     else {
         return 0;
     };
-    // A pull or a shaker holds the amplitude before the release; a light decay loses some of it all the time.
+    // A static load or a shaker keeps the amplitude constant before the release; a lightly damped
+    // decay decreases from its beginning.
     let energies = energies(record, &sums[first..=last], first);
     if trend(&energies) < 0.0 && falls_throughout(&energies) {
         return first;
     }
-    // A growth multiplies the amplitude in equal times.
+    // The logarithm of a growing amplitude rises linearly.
     let logarithms: Vec<f64> = crests(&sums[..=last]).iter().map(|crest| crest.ln()).collect();
     let rises = (sums.len() - last) * PARTS < sums.len() && trend(&logarithms) > 0.0;
     if rises { 0 } else { last }
 }
 
-/// Returns the logarithm of the mean of the `sums` from the sample `first` on over stretches of whole periods of the
-/// strongest line; none of a record without one, or of too few periods.
+/// Returns the logarithms of the means of the `sums`, which begin at the sample `first`, over
+/// intervals of whole periods of the strongest line; none for a record without such a line, or with
+/// too few periods.
 fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
     let spectrum = Spectrum::of(&part.without_mean());
     let power = |line: usize| -> f64 {
-        let each = (0..record.channels()).map(|channel| {
+        let powers = (0..record.channels()).map(|channel| {
             let largest = part.column(channel).amax();
             if largest > 0.0 { (spectrum.line(line, channel) / largest).norm_sqr() } else { 0.0 }
         });
-        each.sum()
+        powers.sum()
     };
     let Some(strongest) = (1..spectrum.len()).max_by(|a, b| power(*a).total_cmp(&power(*b))) else {
         return Vec::new();
     };
     let period = part.len() as f64 / strongest as f64;
     let periods = (sums.len() as f64 / (PARTS as f64 * period)).floor().max(1.0);
-    let stretch = (periods * period).round() as usize;
+    let interval = (periods * period).round() as usize;
     let mean = |part: &[f64]| (part.iter().sum::<f64>() / part.len() as f64).ln();
-    let all: Vec<f64> = sums.chunks_exact(stretch.max(1)).map(mean).collect();
-    if all.len() < FEWEST { Vec::new() } else { all }
+    let means: Vec<f64> = sums.chunks_exact(interval.max(1)).map(mean).collect();
+    if means.len() < FEWEST { Vec::new() } else { means }
 }
 
-/// Returns the largest sums of some parts of equal length; none of a stretch that is too short.
+/// Returns the largest sum of each of [`PARTS`] intervals of equal length; none for fewer sums.
 fn crests(sums: &[f64]) -> Vec<f64> {
     let part = sums.len() / PARTS;
     let of_part = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
     if part == 0 { Vec::new() } else { sums.chunks_exact(part).take(PARTS).map(of_part).collect() }
 }
 
-/// Returns whether a line describes falling values so much better than values that are held for some time and fall then
-/// that they were not held, by twice the logarithm of the likelihood.
+/// Returns whether there is strong evidence that values fall from the beginning, by the likelihood
+/// ratio of a straight line and a constant followed by a straight line.
 ///
 /// # Source
-/// Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795, for what strong evidence is.
+/// Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795, for the
+/// limit of strong evidence.
 fn falls_throughout(values: &[f64]) -> bool {
     let count = values.len() as f64;
-    // Residual of a constant up to a place and a line from there on.
-    let left = |held: usize| {
-        let x = |at: usize| at.saturating_sub(held) as f64;
+    // Residual sum of squares of a constant for the first `constant` values and a line after them.
+    let residual = |constant: usize| {
+        let x = |at: usize| at.saturating_sub(constant) as f64;
         let [mean_x, mean] = [(0..values.len()).map(x).sum::<f64>(), values.iter().sum::<f64>()]
             .map(|sum| sum / count);
         let deviations = || values.iter().enumerate().map(|(at, y)| (x(at) - mean_x, y - mean));
-        let [products, squares, all] = deviations()
+        let [products, squares, total] = deviations()
             .fold([0.0; 3], |[xy, xx, yy], (x, y)| [xy + x * y, xx + x * x, yy + y * y]);
-        all - products * products / squares
+        total - products * products / squares
     };
-    let held = (1..values.len().saturating_sub(2)).map(left).fold(f64::INFINITY, f64::min);
-    count * (left(0) / held).ln() <= -STRONG_EVIDENCE
+    let later = (1..values.len().saturating_sub(2)).map(residual).fold(f64::INFINITY, f64::min);
+    count * (residual(0) / later).ln() <= -STRONG_EVIDENCE
 }
 
-/// Returns the slope of some values, and 0 where their scatter may make it as steep.
+/// Returns the slope of a regression line through some values, and 0 if it is not significant.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1.
@@ -103,22 +107,22 @@ fn trend(values: &[f64]) -> f64 {
         return 0.0;
     }
     let (middle, mean) = (0.5 * (count - 1.0), values.iter().sum::<f64>() / count);
-    let (mut products, mut squares, mut all) = (0.0, 0.0, 0.0);
+    let (mut products, mut squares, mut total) = (0.0, 0.0, 0.0);
     for (at, value) in values.iter().enumerate() {
         let (x, y) = (at as f64 - middle, value - mean);
         products += x * y;
         squares += x * x;
-        all += y * y;
+        total += y * y;
     }
     let slope = products / squares;
-    let error = ((all - slope * products).max(0.0) / (count - 2.0) / squares).sqrt();
+    let error = ((total - slope * products).max(0.0) / (count - 2.0) / squares).sqrt();
     let student = StudentsT::new(0.0, 1.0, count - 2.0).expect("positive degrees of freedom");
     let ratio = (slope / error).abs();
     let is_scatter = ratio.is_nan() || student.sf(ratio) > SIGNIFICANCE;
     if is_scatter { 0.0 } else { slope }
 }
 
-/// Returns the sum of the squares of all channels, each over its own power, at every sample.
+/// Returns the sum of the squares of all channels, each divided by its power, at every sample.
 fn sums(record: &Record) -> Vec<f64> {
     let len = record.len();
     let mut sums = vec![0.0; len];
@@ -128,8 +132,8 @@ fn sums(record: &Record) -> Vec<f64> {
         if largest == 0.0 {
             continue;
         }
-        let rest = &x[len - len.div_ceil(REST)..];
-        let mean = rest.iter().map(|x| x / largest).sum::<f64>() / rest.len() as f64;
+        let end = &x[len - len.div_ceil(REST)..];
+        let mean = end.iter().map(|x| x / largest).sum::<f64>() / end.len() as f64;
         let squares = || x.iter().map(|x| (x / largest - mean).powi(2));
         let power: f64 = squares().sum();
         if power > 0.0 {

@@ -1,36 +1,39 @@
-//! The part of a free decay that its converter shows.
+//! Part of a free decay that is large against the quantisation steps of its converter.
 
 use mechid_signal::{Record, quantisation_step};
 
-/// Number of stretches of a record in which its range is looked at, and least samples of one.
-const STRETCHES: usize = 64;
+/// Number of intervals of a record for the range of its channels.
+const INTERVALS: usize = 64;
+/// Minimum number of samples of an interval.
 const SHORTEST: usize = 32;
-/// Range of a channel in a stretch, in steps of its values, below which rounding makes its own motion of the rest.
+/// Minimum range of a channel in an interval, in quantisation steps; with less, rounding distorts
+/// the motion.
 const STEPS: f64 = 12.0;
-/// Range at its largest, in steps, from which a channel is looked at.
+/// Minimum of the largest range, in quantisation steps, for an end of the decay by quantisation.
 const LARGE: f64 = 8.0 * STEPS;
 
-/// End of the part of a decay that its converter shows.
+/// End of the part of a decay that its converter resolves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LastShown {
-    /// Number of samples up to it.
+    /// Number of samples of this part.
     pub samples: usize,
     /// Channel that falls to a few steps first, counted from 0.
     pub channel: usize,
-    /// Step of its values, in its unit.
+    /// Quantisation step of this channel, in its unit.
     pub step: f64,
 }
 
-/// Returns where the first channel of a decay falls to a few of the steps in which its values come; `None` where none
-/// does.
+/// Returns the end of the part of a decay in which all channels span more than a few quantisation
+/// steps; `None` if they always do.
 ///
-/// Beyond, rounding is no noise: what is left of a sinusoid of a few steps is a square wave that stops.
+/// After it, the rounding error is not white noise: a sinusoid of a few steps becomes a square wave
+/// that stops.
 ///
 /// # Source
-/// Widrow & Kollár, *Quantization Noise* (2008), for where the error of rounding is as white noise; the limits are
-/// ours.
+/// Widrow & Kollár, *Quantization Noise* (2008), for the conditions of a white rounding error; the
+/// limits are ours.
 pub(super) fn last_shown(record: &Record) -> Option<LastShown> {
-    let stretch = record.len().div_ceil(STRETCHES).max(SHORTEST);
+    let interval = record.len().div_ceil(INTERVALS).max(SHORTEST);
     let of_channel = |channel: usize| {
         let samples = record.channel(channel);
         let step = quantisation_step(samples)?;
@@ -41,20 +44,20 @@ pub(super) fn last_shown(record: &Record) -> Option<LastShown> {
                 });
             (high - low) / step
         };
-        let ranges: Vec<f64> = samples.chunks(stretch).map(range).collect();
+        let ranges: Vec<f64> = samples.chunks(interval).map(range).collect();
         let largest = ranges.iter().copied().fold(0.0, f64::max);
         let shown = ranges.iter().rposition(|range| *range >= STEPS)? + 1;
-        let samples = (shown * stretch).min(record.len());
+        let samples = (shown * interval).min(record.len());
         (largest >= LARGE && samples < record.len()).then_some(LastShown { samples, channel, step })
     };
     (0..record.channels()).filter_map(of_channel).min_by_key(|last| last.samples)
 }
 
-/// Returns the channels, counted from 0, that come in so few steps that rounding is no noise of theirs anywhere, with the
-/// number of steps that they span.
+/// Returns the channels, counted from 0, that span so few quantisation steps that their rounding
+/// error is not white noise at any time, each with its number of steps.
 ///
 /// # Source
-/// The source of [`last_shown`].
+/// As [`last_shown`].
 pub(super) fn coarse(record: &Record) -> Vec<(usize, usize)> {
     let span = |channel: usize| {
         let samples = record.channel(channel);
@@ -65,8 +68,8 @@ pub(super) fn coarse(record: &Record) -> Vec<(usize, usize)> {
     (0..record.channels()).filter_map(span).collect()
 }
 
-/// Distance of neighbouring values, in their unit, of a channel that takes few; `None` of one that takes many without
-/// steps.
+/// Returns the smallest distance of the values of a channel, in its unit, if it has only a few
+/// different values.
 fn smallest_step(samples: &[f64]) -> Option<f64> {
     let mut values = samples.to_vec();
     values.sort_unstable_by(f64::total_cmp);
@@ -84,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// A decay from 1, of 20 Hz and 1 %, in so many steps.
+    /// A decay from 1, of 20 Hz and 1 %, rounded to `steps` steps.
     fn decay(steps: f64, noise_steps: f64) -> Record {
         let sampling = Sampling::new(1.0 / 512.0, 4096).unwrap();
         let exact = |t: f64| (-0.01 * TAU * 20.0 * t).exp() * (TAU * 20.0 * t).cos();

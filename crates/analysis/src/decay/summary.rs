@@ -1,4 +1,4 @@
-//! The result of an analysis of a free decay.
+//! Result of an analysis of a free decay.
 
 use std::fmt::{self, Write as _};
 
@@ -17,13 +17,14 @@ use crate::measurement::{Block, Measurement};
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, significant, text_table};
 
-/// Cycles in the record below which frequency and damping of a mode are hardly known.
+/// Minimum number of cycles in the record for a reliable frequency and damping of a mode.
 const FEW_CYCLES: f64 = 2.0;
-/// Frequency over half the sampling rate above which a mode may be the image of a higher one.
+/// Maximum ratio of the frequency of a mode to half the sampling rate; a mode above it may be an
+/// alias.
 const HIGH: f64 = 0.8;
-/// Damping ratio above which a mode hardly oscillates.
+/// Maximum damping ratio of an oscillation; a mode with more may represent an overdamped one.
 const HEAVY: f64 = 0.5;
-/// Share of the variance of a channel below which a remark tells how much the modes explain.
+/// Minimum share of the variance of a channel that the modes explain without a remark.
 const EXPLAINED: f64 = 0.9;
 
 /// Modes of a free response: numbers and remarks.
@@ -41,17 +42,19 @@ pub struct DecaySummary {
     pub last_sample: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// `true` if the beginning was found in the record, not given.
+    /// `true` if the beginning was detected in the record and not given.
     pub release_found: bool,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
     /// Modes by rising frequency.
     pub modes: Vec<DecayModeRow>,
-    /// Frequency and damping over amplitude of the strongest mode; `None` where linear modes describe the response better.
+    /// Frequency and damping over amplitude of the strongest mode; `None` if linear modes describe
+    /// the response better.
     pub backbone: Option<BackboneRow>,
-    /// Time at which the response is excited again, in s from the first sample of the window; `None` if it is not.
+    /// Time at which the response is excited again, in s from the first sample of the window;
+    /// `None` if it is not.
     pub excited_again_s: Option<f64>,
-    /// Channels, one each.
+    /// Fit of each channel.
     pub channels: Vec<DecayChannelRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
@@ -65,15 +68,16 @@ pub struct DecayModeRow {
     /// Frequencies, damping, pole and shape.
     #[serde(flatten)]
     pub mode: ShapedMode,
-    /// Amplitude at the first sample where the shape is largest, in the unit of the response.
+    /// Amplitude at the first sample, at the largest entry of the shape, in the unit of the
+    /// response.
     pub amplitude: Uncertain,
-    /// Phase there, in degrees.
+    /// Phase of this amplitude, in degrees.
     pub phase_deg: f64,
-    /// Part of the sum of squares of all modes, a ratio.
+    /// Share of the sum of squares of all modes, a ratio.
     pub energy_share: f64,
-    /// `false` if the interval of the growth rate does not lie below zero.
+    /// `false` if the interval of the growth rate is not below zero.
     pub decays: bool,
-    /// Mode of which this one is a multiple; `None` if it is of none.
+    /// Mode with this mode as a harmonic; `None` if this mode is not a harmonic.
     pub harmonic: Option<Harmonic>,
 }
 
@@ -90,16 +94,16 @@ pub struct DecayChannelRow {
     pub noise_order: usize,
     /// Constant, in the unit of the response.
     pub offset: f64,
-    /// Probability of a residual that is less white, adjusted for the number of tests.
+    /// p-value of the test for a white residual, adjusted for the number of tests.
     pub whiteness_p_value: f64,
-    /// Mean square residual of the first samples over that of the others, a ratio.
+    /// Ratio of the mean square residuals of the first samples and of the others.
     pub onset_ratio: f64,
     /// Probability of a larger ratio, adjusted for the number of tests.
     pub onset_p_value: f64,
 }
 
 impl DecaySummary {
-    /// Sums up an estimate that begins with `first_sample` of the record, counted from 1.
+    /// Summarises an estimate that begins at `first_sample` of the record, counted from 1.
     pub(super) fn new(
         measurement: &Measurement,
         whole: &Block,
@@ -122,7 +126,7 @@ impl DecaySummary {
             })
         });
         let columns = whole.names.response(kind);
-        // What modes that are missing leave is not the response to a second hit.
+        // The residual of missing modes must not be reported as a second hit.
         let may_be_more = how.modes.is_none() && estimate.modes().len() == how.max_modes;
         let mut summary = Self {
             file: whole.file.clone(),
@@ -144,16 +148,16 @@ impl DecaySummary {
             analysis: *how,
         };
         summary.name_harmonics(&identified);
-        summary.remarks.extend(summary.of_model());
-        summary.remarks.extend(summary.of_channels());
+        summary.remarks.extend(summary.model_remarks());
+        summary.remarks.extend(summary.channel_remarks());
         for (number, mode) in (1..).zip(estimate.modes()) {
-            summary.remarks.extend(summary.of_mode(number, mode));
+            summary.remarks.extend(summary.mode_remarks(number, mode));
         }
         Ok(summary)
     }
 
-    /// What speaks against the fit of the channels.
-    fn of_channels(&self) -> Vec<String> {
+    /// Returns remarks about the fit of the channels.
+    fn channel_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         for channel in &self.channels {
             let column = &channel.column;
@@ -192,8 +196,8 @@ impl DecaySummary {
         remarks
     }
 
-    /// What speaks against a mode.
-    fn of_mode(&self, number: usize, mode: &DecayMode) -> Vec<String> {
+    /// Returns remarks about a mode.
+    fn mode_remarks(&self, number: usize, mode: &DecayMode) -> Vec<String> {
         let (hz, growth) = (mode.mode.damped_frequency_hz.value, mode.mode.growth_rate);
         let name = format!("mode {number} ({} Hz)", significant(hz, 4));
         let mut remarks = Vec::new();
@@ -267,7 +271,7 @@ impl DecaySummary {
         text_table(&rows)
     }
 
-    /// Returns the result as a person reads it.
+    /// Returns the result as text for people.
     fn text(&self) -> String {
         let mut text = format!(
             "{}: {} of {}, samples {} to {} at {} Hz",
@@ -300,7 +304,7 @@ impl DecaySummary {
 }
 
 fn channel_rows(columns: &[String], channels: &[DecayChannel]) -> Vec<DecayChannelRow> {
-    // One family of tests: Holm's adjustment.
+    // All tests of all channels are one family for the adjustment of Holm.
     let raw = channels.iter().flat_map(|c| [c.whiteness.p_value, c.onset.p_value]);
     let adjusted = adjusted(&raw.collect::<Vec<f64>>());
     let rows = columns.iter().zip(channels).zip(adjusted.chunks_exact(2));
@@ -317,7 +321,7 @@ fn channel_rows(columns: &[String], channels: &[DecayChannel]) -> Vec<DecayChann
     rows.map(row).collect()
 }
 
-/// Probabilities adjusted for their number.
+/// Returns p-values adjusted for the number of tests.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.

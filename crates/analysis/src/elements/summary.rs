@@ -55,7 +55,8 @@ pub struct ElementSummary {
     pub minima: Vec<FoundMinimum>,
     /// Number of searches.
     pub searches: usize,
-    /// Ratio of the power of the residual to its expectation; `None` where the noise comes from the residual.
+    /// Ratio of the power of the residual to its expectation; `None` where the noise comes from the
+    /// residual.
     pub misfit_ratio: Option<f64>,
     /// Probability of a larger misfit if model and noise are right.
     pub misfit_p_value: Option<f64>,

@@ -11,8 +11,8 @@ const LEAST: usize = 4;
 /// Number of orders at random behind a p-value. The least p-value is one over this.
 const ORDERS: usize = 9999;
 
-/// Number of orders that look as changed after which a p-value is known well enough; it is then about this over the number of
-/// orders tried.
+/// Number of orders that look as changed after which a p-value is known well enough; it is then
+/// about this over the number of orders tried.
 ///
 /// # Source
 /// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).
@@ -58,8 +58,8 @@ pub(super) struct Change {
     pub size: f64,
 }
 
-/// Finds the changes of values in order: the largest, then those within its parts. `tests` is the number of lists that
-/// are looked at, for which each p-value is adjusted.
+/// Finds the changes of values in order: the largest, then those within its parts. `tests` is the
+/// number of lists that are looked at, for which each p-value is adjusted.
 pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut parts = vec![(0, values.len())];
@@ -81,7 +81,8 @@ pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
     changes
 }
 
-/// Returns for each value the level that it would have without noise: the medians between steps, and the line of a drift.
+/// Returns for each value the level that it would have without noise: the medians between steps,
+/// and the line of a drift.
 pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
     let mut levels = Vec::with_capacity(values.len());
     let mut start = 0;
@@ -100,13 +101,15 @@ pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
     levels
 }
 
-/// The step or drift that explains most of some values, with the share of orders at random whose ranks one would explain as
-/// well. Both have one size and one beginning, so that the larger share is the likelier.
+/// The step or drift that explains most of some values, with the share of orders at random whose
+/// ranks one would explain as well. Both have one size and one beginning, so that the larger share
+/// is the likelier.
 fn largest(values: &[f64]) -> Option<Change> {
     if values.len() < 2 * LEAST {
         return None;
     }
-    // Ranks show whether there is a change, but squeeze its ends; values without single outliers show where.
+    // Ranks show whether there is a change, but squeeze its ends; values without single outliers
+    // show where.
     let (kind, begins, _) = best(&running_medians(values), LEAST)?;
     let ranks = ranks(values);
     let mut shuffled = means_of_neighbours(&ranks);
@@ -148,7 +151,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Medians of five neighbours, less their mean: a step stays where it is, one or two outliers are gone.
+/// Medians of five neighbours, less their mean: a step stays where it is, one or two outliers are
+/// gone.
 fn running_medians(values: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
     let of_five =
@@ -166,7 +170,8 @@ fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
     means.into_iter().map(|value| value - middle).collect()
 }
 
-/// The change that explains the largest share of the variance of values whose sum is zero: kind, beginning, share.
+/// The change that explains the largest share of the variance of values whose sum is zero: kind,
+/// beginning, share.
 fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     let len = values.len();
     let total: f64 = values.iter().map(|value| value * value).sum();

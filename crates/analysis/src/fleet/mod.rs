@@ -11,8 +11,8 @@
 //! | `summary` | how many records, how fast, and which failed why |
 //!
 //! The folder of results is the whole state: a part is computed where its file is missing, and its
-//! file appears complete or not at all. Whoever computes a part, in whatever order and process, writes
-//! the same rows.
+//! file appears complete or not at all. Whoever computes a part, in whatever order and process,
+//! writes the same rows.
 
 mod changes;
 mod failures;
@@ -79,15 +79,16 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Divides records into parts of `records_per_part`, by rising path. A folder stands for the files in
-    /// it, and a file with a [`Reading::record_column`](crate::measurement::Reading::record_column) for
-    /// the records in it, in the order of its rows; a record named twice is taken once. Named pipes,
-    /// sockets and devices are left out.
+    /// Divides records into parts of `records_per_part`, by rising path. A folder stands for the
+    /// files in it, and a file with a
+    /// [`Reading::record_column`](crate::measurement::Reading::record_column) for the records in
+    /// it, in the order of its rows; a record named twice is taken once. Named pipes, sockets and
+    /// devices are left out.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], [`AnalysisError::Setting`] for parts
-    /// without records and for results in a folder of records, and [`AnalysisError::Io`] if a folder
-    /// cannot be listed.
+    /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], [`AnalysisError::Setting`]
+    /// for parts without records and for results in a folder of records, and [`AnalysisError::Io`]
+    /// if a folder cannot be listed.
     pub fn new(
         analysis: SavedAnalysis,
         records: &[PathBuf],
@@ -139,11 +140,12 @@ impl Fleet {
         &self.left_out
     }
 
-    /// Computes the parts that are missing, each record in a process that it may end, with `workers` of
-    /// them at a time, and calls `done` after each part.
+    /// Computes the parts that are missing, each record in a process that it may end, with
+    /// `workers` of them at a time, and calls `done` after each part.
     ///
     /// # Errors
-    /// Those of [`Fleet::run`] and [`Isolation::check`], and [`AnalysisError::RecordProcess`] if a process cannot be started.
+    /// Those of [`Fleet::run`] and [`Isolation::check`], and [`AnalysisError::RecordProcess`] if a
+    /// process cannot be started.
     pub fn run_isolated(
         &self,
         workers: usize,
@@ -157,19 +159,20 @@ impl Fleet {
         })
     }
 
-    /// Computes the parts that are missing, with `workers` threads of one record each at a time, and
-    /// calls `done` after each part.
+    /// Computes the parts that are missing, with `workers` threads of one record each at a time,
+    /// and calls `done` after each part.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if a part cannot be written, [`AnalysisError::Setting`] if the system does
-    /// not give the threads. What was written stays; a later call goes on from there.
+    /// [`AnalysisError::Io`] if a part cannot be written, [`AnalysisError::Setting`] if the system
+    /// does not give the threads. What was written stays; a later call goes on from there.
     pub fn run(
         &self,
         workers: usize,
         done: &(dyn Fn(&PartDone) + Sync),
     ) -> Result<FleetSummary, AnalysisError> {
         self.run_by(workers, done, &|| {
-            // A pool of one thread: an identification that divides its work does so within its worker.
+            // A pool of one thread: an identification that divides its work does so within its
+            // worker.
             let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| {
                 AnalysisError::Setting { setting: "workers", why: error.to_string() }
             })?;
@@ -177,7 +180,8 @@ impl Fleet {
         })
     }
 
-    /// Computes the parts that are missing, with `workers` threads, each with what `make` makes for it.
+    /// Computes the parts that are missing, with `workers` threads, each with what `make` makes for
+    /// it.
     fn run_by<'a>(
         &'a self,
         workers: usize,
@@ -221,8 +225,8 @@ impl Fleet {
 /// What a thread computes a part with.
 type Compute<'a> = dyn FnMut(&Part) -> Result<PartDone, AnalysisError> + 'a;
 
-/// Refuses a folder of results as a record, and as the folder of one: a later run would take the results
-/// for records.
+/// Refuses a folder of results as a record, and as the folder of one: a later run would take the
+/// results for records.
 fn refuse_results(record: &Path, results: &Path) -> Result<(), AnalysisError> {
     let Ok(results) = results.canonicalize() else { return Ok(()) };
     let Ok(record) = record.canonicalize() else { return Ok(()) };

@@ -26,8 +26,8 @@ pub struct FleetRecord {
 }
 
 impl FleetRecord {
-    /// Returns the records of a file as the analysis reads it: those that a column tells apart, or the file
-    /// itself; so, too, where the file cannot be read, which its row will tell.
+    /// Returns the records of a file as the analysis reads it: those that a column tells apart, or
+    /// the file itself; so, too, where the file cannot be read, which its row will tell.
     pub(super) fn of_file(path: PathBuf, analysis: &SavedAnalysis) -> Vec<Self> {
         let column = analysis.reading.record_column.as_ref();
         let column = column.filter(|_| analysis.reading.record_id.is_none());
@@ -96,7 +96,8 @@ impl Part {
     /// Computes the rows and writes them into `folder`, unless the file is there.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if the file cannot be written. What is wrong with a record is in its row.
+    /// [`AnalysisError::Io`] if the file cannot be written. What is wrong with a record is in its
+    /// row.
     pub fn run(&self, analysis: &SavedAnalysis, folder: &Path) -> Result<PartDone, AnalysisError> {
         self.written(folder, &mut |path, records, rows| {
             rows_of(path, records, analysis, &mut |row| {
@@ -157,7 +158,8 @@ impl Part {
         Ok(done)
     }
 
-    /// Returns what the existing file says of itself; `None` if there is none, or it is no part of a fleet.
+    /// Returns what the existing file says of itself; `None` if there is none, or it is no part of
+    /// a fleet.
     fn done(&self, path: &Path) -> Option<PartDone> {
         let pairs = read_parquet_metadata(path).ok()?;
         let (_, done) = pairs.iter().find(|(key, _)| key == DONE)?;

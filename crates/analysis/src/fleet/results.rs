@@ -15,16 +15,17 @@ use crate::{AnalysisError, ResultRow};
 pub struct Results {
     /// The rows, by rising record.
     pub rows: Vec<ResultRow>,
-    /// Number of older rows of the same records, in parts from before a record or the analysis changed.
+    /// Number of older rows of the same records, in parts from before a record or the analysis
+    /// changed.
     pub superseded: usize,
 }
 
-/// Reads the rows of all parts in a folder of results, by rising record, as they were written. Of several rows
-/// of one record, the one in the part written last counts.
+/// Reads the rows of all parts in a folder of results, by rising record, as they were written. Of
+/// several rows of one record, the one in the part written last counts.
 ///
 /// # Errors
-/// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if it holds
-/// no row.
+/// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if it
+/// holds no row.
 pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> {
     let mut parts: Vec<(u128, PathBuf)> = Vec::new();
     for path in files_of(folder.as_ref())? {

@@ -10,8 +10,8 @@ use crate::{AnalysisError, ResultRow, SavedAnalysis};
 /// Number of rows read at a time of a file that holds many records, unless one of them has more.
 const ROWS_AT_ONCE: usize = 1 << 20;
 
-/// Identifies records of a file, all of it where `records` is empty, and passes their rows to `take` in
-/// their order.
+/// Identifies records of a file, all of it where `records` is empty, and passes their rows to
+/// `take` in their order.
 ///
 /// # Errors
 /// Those of `take`. What is wrong with a record is in its row.
@@ -47,7 +47,8 @@ fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> 
     })
 }
 
-/// Opens records of a file that follow one another; where their rows cannot be read together, one by one.
+/// Opens records of a file that follow one another; where their rows cannot be read together, one
+/// by one.
 fn open(
     path: &Path,
     records: &[RecordRows],

@@ -98,7 +98,8 @@ pub fn serve(
     })
 }
 
-/// Takes no more than so many bytes of memory from now on: an allocation beyond them ends the process.
+/// Takes no more than so many bytes of memory from now on: an allocation beyond them ends the
+/// process.
 fn limit_memory(bytes: Option<u64>) -> io::Result<()> {
     #[cfg(target_os = "linux")]
     if let Some(bytes) = bytes {

@@ -67,7 +67,8 @@ pub struct TrendSeries {
     pub unit: String,
     /// Median of the values, in the unit.
     pub median: f64,
-    /// Robust standard deviation of the values (1.4826 × the median absolute deviation), in the unit.
+    /// Robust standard deviation of the values (1.4826 × the median absolute deviation), in the
+    /// unit.
     pub spread: f64,
     /// Median of the standard errors, in the unit; `None` if no value has one.
     pub standard_error: Option<f64>,
@@ -86,9 +87,11 @@ pub struct TrendChange {
     pub record: String,
     /// Place of that record on the axis, a pure number.
     pub at: f64,
-    /// Change of the level by a step, or from the beginning of a drift to the last record, in the unit of the series.
+    /// Change of the level by a step, or from the beginning of a drift to the last record, in the
+    /// unit of the series.
     pub size: f64,
-    /// Probability that records in an order at random look as changed, adjusted for the number of series.
+    /// Probability that records in an order at random look as changed, adjusted for the number of
+    /// series.
     pub p_value: f64,
 }
 
@@ -97,7 +100,8 @@ pub struct TrendChange {
 pub struct TrendPoint {
     /// Name of the record.
     pub record: String,
-    /// Place of the record on the axis, a pure number: that in its name, or its position counted from 1.
+    /// Place of the record on the axis, a pure number: that in its name, or its position counted
+    /// from 1.
     pub at: f64,
     /// Value, in the unit of the series.
     pub value: f64,
@@ -105,8 +109,8 @@ pub struct TrendPoint {
     pub standard_error: Option<f64>,
     /// Ends of the 95 % interval, in the same unit.
     pub interval: Option<[f64; 2]>,
-    /// `true` if the value is farther from the median than [`OUTLIER`] standard deviations, those of the
-    /// series and of the value together.
+    /// `true` if the value is farther from the median than [`OUTLIER`] standard deviations, those
+    /// of the series and of the value together.
     pub is_outlier: bool,
 }
 
@@ -181,8 +185,8 @@ impl Trends {
 }
 
 impl TrendSeries {
-    /// Finds changes, computes median and spread, and marks the outliers: values far from the level of their records, not
-    /// from that of all.
+    /// Finds changes, computes median and spread, and marks the outliers: values far from the level
+    /// of their records, not from that of all.
     fn judge(&mut self, tests: usize) {
         let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
         self.median = median(values.clone());
@@ -215,7 +219,8 @@ impl TrendSeries {
         }
     }
 
-    /// Returns the category of the quantity: frequency, damping ratio, or the letter of a parameter.
+    /// Returns the category of the quantity: frequency, damping ratio, or the letter of a
+    /// parameter.
     pub fn category(&self) -> &str {
         ["frequency", "damping ratio"]
             .into_iter()
@@ -251,8 +256,9 @@ impl Trends {
         self.series.iter().flat_map(|one| one.changes.iter().map(move |change| (one, change)))
     }
 
-    /// Returns a table with one row per value: quantity, unit, record, place on the axis, value, standard error, whether it is
-    /// an outlier, and the kind, size and p-value of a change that begins there.
+    /// Returns a table with one row per value: quantity, unit, record, place on the axis, value,
+    /// standard error, whether it is an outlier, and the kind, size and p-value of a change that
+    /// begins there.
     pub fn csv(&self) -> String {
         let header = "quantity,unit,record,at,value,standard_error,outlier,change,change_size,change_p_value";
         let mut text = format!("{header}\n");

@@ -1,5 +1,5 @@
-//! Processes that work for a fleet, so that a record that exhausts memory, aborts or hangs ends only its
-//! own.
+//! Processes that work for a fleet, so that a record that exhausts memory, aborts or hangs ends
+//! only its own.
 
 use std::ffi::OsString;
 use std::io::{self, Read as _};
@@ -53,7 +53,8 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    /// Creates the isolation by a program, with the limits [`RECORD_MEMORY_GB`] and [`RECORD_SECONDS`].
+    /// Creates the isolation by a program, with the limits [`RECORD_MEMORY_GB`] and
+    /// [`RECORD_SECONDS`].
     pub fn new(program: impl Into<PathBuf>, arguments: Vec<OsString>) -> Self {
         Self {
             program: program.into(),
@@ -110,11 +111,12 @@ impl Worker {
 
     /// Returns the rows of records of a file, all of it if there are none, in their order.
     ///
-    /// A process that ends while it reads several records together is started again for each of them: the
-    /// row of a record is an error only where the record alone ends the process.
+    /// A process that ends while it reads several records together is started again for each of
+    /// them: the row of a record is an error only where the record alone ends the process.
     ///
     /// # Errors
-    /// [`AnalysisError::RecordProcess`] or [`AnalysisError::RecordMemory`] if no process can be started.
+    /// [`AnalysisError::RecordProcess`] or [`AnalysisError::RecordMemory`] if no process can be
+    /// started.
     pub(super) fn rows(
         &mut self,
         path: &Path,

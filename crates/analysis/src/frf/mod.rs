@@ -36,14 +36,15 @@ pub struct FrfSettings {
     /// Segments that are averaged.
     #[serde(deserialize_with = "words::written::one")]
     pub segments: Segmentation,
-    /// Rule by which the record of a hammer test is cut into hits, which are averaged instead of segments.
+    /// Rule by which the record of a hammer test is cut into hits, which are averaged instead of
+    /// segments.
     #[serde(
         skip_serializing_if = "Option::is_none",
         deserialize_with = "words::written::optional"
     )]
     pub hits: Option<HitRule>,
-    /// Weight at the end of a hit of an exponential window on force and response, in per cent of that at its
-    /// beginning; `None`: no window.
+    /// Weight at the end of a hit of an exponential window on force and response, in per cent of
+    /// that at its beginning; `None`: no window.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exponential_percent: Option<f64>,
 }
@@ -53,24 +54,25 @@ pub struct FrfSettings {
 /// With a periodic excitation the periods of the window are the segments that are averaged.
 ///
 /// # Errors
-/// [`AnalysisError::NoHit`] and [`AnalysisError::Setting`] of a hammer test without a good hit and for settings
-/// that make no sense, [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`] or [`AnalysisError::EmptyBand`] if
-/// no chosen line carries force, [`AnalysisError::Estimate`] if the segments are too few or too long,
-/// and if a file cannot be read again.
+/// [`AnalysisError::NoHit`] and [`AnalysisError::Setting`] of a hammer test without a good hit and
+/// for settings that make no sense, [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`]
+/// or [`AnalysisError::EmptyBand`] if no chosen line carries force, [`AnalysisError::Estimate`] if
+/// the segments are too few or too long, and if a file cannot be read again.
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
     frf_of_records(std::slice::from_ref(measurement), how)
 }
 
-/// Estimates the frequency responses and the coherence of one or several records of the same machine, which
-/// are averaged together: auto- and cross-spectra of the segments of all of them.
+/// Estimates the frequency responses and the coherence of one or several records of the same
+/// machine, which are averaged together: auto- and cross-spectra of the segments of all of them.
 ///
-/// The records need the same columns and time step, and periods or segments of the same length; one may be
-/// longer than another. Without either, records that end at rest or repeat one another are averaged whole; others are
-/// cut into segments as one record is. Each force need act in one of them only.
+/// The records need the same columns and time step, and periods or segments of the same length; one
+/// may be longer than another. Without either, records that end at rest or repeat one another are
+/// averaged whole; others are cut into segments as one record is. Each force need act in one of
+/// them only.
 ///
 /// # Errors
-/// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the records
-/// do not belong together.
+/// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the
+/// records do not belong together.
 pub fn frf_of_records(
     measurements: &[Measurement],
     how: &FrfSettings,
@@ -135,7 +137,8 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
     Ok(records)
 }
 
-/// Amplitude of the other forces over that of the one that drives a line, below which they are idle there.
+/// Amplitude of the other forces over that of the one that drives a line, below which they are idle
+/// there.
 const IDLE: f64 = 0.1;
 
 /// Frequency responses to forces that have lines of their own.
@@ -145,8 +148,8 @@ pub(crate) struct Interleaved {
     crosstalk: Vec<Crosstalk>,
 }
 
-/// Frequency responses to each force on the lines that it alone drives, and what the others do there; `None` unless
-/// several forces have every line of whole periods to themselves, in turn.
+/// Frequency responses to each force on the lines that it alone drives, and what the others do
+/// there; `None` unless several forces have every line of whole periods to themselves, in turn.
 fn interleaved(
     recorded: &Windowed,
     how: &FrfSettings,
@@ -226,8 +229,8 @@ impl Estimator {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Segmentation {
-    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments or, of records
-    /// without a period, as many as the coherence asks for.
+    /// Number of samples in a segment, for a random excitation; `None`: the periods are the
+    /// segments or, of records without a period, as many as the coherence asks for.
     pub segment: Option<usize>,
     /// Window that weights the samples of a segment.
     pub window: Weight,
@@ -244,7 +247,8 @@ impl Default for Segmentation {
 impl FromStr for Segmentation {
     type Err = String;
 
-    /// Reads `SAMPLES`, `SAMPLES:OVERLAP` with the overlap in per cent, or `SAMPLES:OVERLAP:WINDOW`.
+    /// Reads `SAMPLES`, `SAMPLES:OVERLAP` with the overlap in per cent, or
+    /// `SAMPLES:OVERLAP:WINDOW`.
     fn from_str(text: &str) -> Result<Self, String> {
         let parts: Vec<&str> = text.split(':').collect();
         let usual = Self::default();
@@ -308,7 +312,8 @@ impl Segmentation {
         self.segment.is_none()
     }
 
-    /// Returns how much of a record must be held in memory: segments are averaged one after another.
+    /// Returns how much of a record must be held in memory: segments are averaged one after
+    /// another.
     pub(crate) fn hold(&self) -> Hold {
         self.segment.map_or(Hold::Periods, Hold::Samples)
     }
@@ -342,8 +347,8 @@ pub(crate) struct Responses {
     pub driven: Vec<usize>,
     /// Degrees of freedom whose force channels show noise only, counted from 0.
     pub idle: Vec<usize>,
-    /// Forces that follow another one, so that nothing tells the responses to them, by degrees of freedom counted
-    /// from 0.
+    /// Forces that follow another one, so that nothing tells the responses to them, by degrees of
+    /// freedom counted from 0.
     pub following: Vec<Crosstalk>,
     pub segments: Segments,
     /// Number of segments of each record.
@@ -351,8 +356,8 @@ pub(crate) struct Responses {
 }
 
 impl Responses {
-    /// Estimates them from the forces that act in one of the records to the first kind of response measured, on
-    /// the lines that `rule` finds in a segment of a force.
+    /// Estimates them from the forces that act in one of the records to the first kind of response
+    /// measured, on the lines that `rule` finds in a segment of a force.
     pub fn of(
         records: &[Windowed],
         segments: &Segmentation,
@@ -417,8 +422,8 @@ impl Responses {
         format!("{} of {samples}", message::count(self.counts.iter().sum(), piece))
     }
 
-    /// Returns the remarks on force channels that show noise only, or only what another force does, of a record that
-    /// is named or not.
+    /// Returns the remarks on force channels that show noise only, or only what another force does,
+    /// of a record that is named or not.
     pub fn of_channels(&self, record: Option<&str>) -> Vec<String> {
         let listed: Vec<String> = self.idle.iter().map(|dof| (dof + 1).to_string()).collect();
         let of_record = record.map(|record| format!("{record}: ")).unwrap_or_default();
@@ -443,8 +448,8 @@ impl Responses {
     }
 }
 
-/// Averages from the forces that act to the first kind of response, on some lines of a segment, over all
-/// of the window.
+/// Averages from the forces that act to the first kind of response, on some lines of a segment,
+/// over all of the window.
 pub(crate) fn average(
     recorded: &Windowed,
     lines: &Lines,

@@ -17,8 +17,8 @@ use crate::text::significant;
 /// Number of parts of a window by which it is told whether the response has died out.
 pub(super) const PARTS: usize = 20;
 
-/// RMS of the last part, or before the pulse, over that of the largest part, from which the response has not
-/// died out.
+/// RMS of the last part, or before the pulse, over that of the largest part, from which the
+/// response has not died out.
 const DIED_OUT: f64 = 0.02;
 
 /// Frequency responses from hits, and what there is to tell of them.
@@ -47,12 +47,13 @@ pub(crate) struct AverageOfHits {
 
 /// Averages the responses to some hits, each cut to the length of the shortest.
 ///
-/// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM and
-/// K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the machine at
-/// iω + σ.
+/// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM
+/// and K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the
+/// machine at iω + σ.
 ///
 /// # Source
-/// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
+/// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential
+/// window).
 pub(crate) fn average_of_hits(
     hits: &[Windowed],
     lines: LineRule<'_>,
@@ -141,7 +142,8 @@ pub(super) fn of_hits(
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 
-/// RMS of some samples of a response over that of its largest part, of the channel where that is largest.
+/// RMS of some samples of a response over that of its largest part, of the channel where that is
+/// largest.
 pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()

@@ -17,7 +17,8 @@ pub(super) struct Peak {
 }
 
 impl Peak {
-    /// The narrowest of the largest peaks of all responses; `None` if all of them are at an end of the band.
+    /// The narrowest of the largest peaks of all responses; `None` if all of them are at an end of
+    /// the band.
     pub(super) fn narrowest(frf: &Frf) -> Option<Self> {
         let (motions, inputs) = frf.omega().first().map_or((0, 0), |_| frf.response(0).shape());
         let pairs = (0..motions).flat_map(|motion| (0..inputs).map(move |input| (motion, input)));

@@ -15,21 +15,23 @@ const SHORTEST: usize = 64;
 /// Independent averages beyond the number of forces at least.
 const AVERAGES: f64 = 5.0;
 
-/// Number of lines within half the power of a peak from which it is more than the window makes of any.
+/// Number of lines within half the power of a peak from which it is more than the window makes of
+/// any.
 const TOLD: usize = 3;
 
-/// Part of the most information that is enough: of segments that say nearly as much the shorter ones have more
-/// averages.
+/// Part of the most information that is enough: of segments that say nearly as much the shorter
+/// ones have more averages.
 const ENOUGH: f64 = 0.9;
 
 impl Segmentation {
-    /// Returns these segments with a length, and a remark on how it was chosen; `None` where it is given, and
-    /// where no segments would have averages enough.
+    /// Returns these segments with a length, and a remark on how it was chosen; `None` where it is
+    /// given, and where no segments would have averages enough.
     ///
-    /// The length is the shortest of the powers of two, as far as they leave averages enough, whose responses say at
-    /// least nine tenths of what the best say, by their coherence, averages and number of lines
-    /// ([`Frf::information`](mechid_spectra::frf::Frf::information)); or a longer one in which the narrowest of the largest
-    /// peaks is three lines wide, if there is one. The samples held in memory are looked at.
+    /// The length is the shortest of the powers of two, as far as they leave averages enough, whose
+    /// responses say at least nine tenths of what the best say, by their coherence, averages and
+    /// number of lines ([`Frf::information`](mechid_spectra::frf::Frf::information)); or a longer
+    /// one in which the narrowest of the largest peaks is three lines wide, if there is one. The
+    /// samples held in memory are looked at.
     ///
     /// # Errors
     /// The errors of an average over segments.

@@ -100,8 +100,8 @@ pub struct Response {
     pub motion: usize,
     /// Degree of freedom that is driven, counted from 1.
     pub force: usize,
-    /// Real part, one value per frequency, in the unit of the table; as the other values not a number where
-    /// another force has the line to itself.
+    /// Real part, one value per frequency, in the unit of the table; as the other values not a
+    /// number where another force has the line to itself.
     pub real: Vec<f64>,
     /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
@@ -109,8 +109,8 @@ pub struct Response {
     pub magnitude: Vec<f64>,
     /// Phase, one value per frequency, in degrees.
     pub phase_deg: Vec<f64>,
-    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2), one value per
-    /// frequency, in the unit of the table.
+    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2), one
+    /// value per frequency, in the unit of the table.
     pub standard_error: Vec<f64>,
 }
 
@@ -242,7 +242,8 @@ impl FrfTable {
         }
     }
 
-    /// Returns a remark on a peak that the window widens; `averaged` are the responses of the table.
+    /// Returns a remark on a peak that the window widens; `averaged` are the responses of the
+    /// table.
     pub(super) fn blunt(&self, averaged: &Responses) -> Option<String> {
         let peak = Peak::narrowest(&averaged.frf).filter(|peak| peak.lines < WIDE)?;
         let force = averaged.driven[peak.input] + 1;
@@ -328,13 +329,13 @@ impl FrfTable {
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
-    /// Returns the responses as they are written into files of other programs; `points` names the place
-    /// and direction of each degree of freedom, such as `12+Z`. Empty: node and degree of freedom have
-    /// the same number, and the direction is +X.
+    /// Returns the responses as they are written into files of other programs; `points` names the
+    /// place and direction of each degree of freedom, such as `12+Z`. Empty: node and degree of
+    /// freedom have the same number, and the direction is +X.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and if every force has
-    /// lines of its own.
+    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and if every
+    /// force has lines of its own.
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
         if self.is_interleaved() {
@@ -392,8 +393,9 @@ impl FrfTable {
         AveragedSegments { samples, hop, count, window, sample_rate_hz: self.sample_rate_hz }
     }
 
-    /// One row per frequency; fields are empty where another force has the line to itself. What was measured,
-    /// the decay that an exponential window adds, and the segments are the same numbers in every row.
+    /// One row per frequency; fields are empty where another force has the line to itself. What was
+    /// measured, the decay that an exponential window adds, and the segments are the same numbers
+    /// in every row.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
         for r in &self.responses {

@@ -3,14 +3,16 @@
 use super::of_hits::{PARTS, over_largest};
 use crate::measurement::Windowed;
 
-/// RMS of the last part of a record over that of its largest part, noise included, up to which it ends at rest.
+/// RMS of the last part of a record over that of its largest part, noise included, up to which it
+/// ends at rest.
 const AT_REST: f64 = 0.05;
 
 /// RMS difference of two forces over their RMS, noise included, up to which they are one.
 const ALIKE: f64 = 0.1;
 
-/// Returns whether several records close on themselves, so that no sample needs the ones before it: bursts, at
-/// whose end force and response are at rest, or one period after another of the same force.
+/// Returns whether several records close on themselves, so that no sample needs the ones before it:
+/// bursts, at whose end force and response are at rest, or one period after another of the same
+/// force.
 ///
 /// One record is cut into segments whatever it is, for it gives no average as a whole.
 pub(super) fn close(records: &[Windowed]) -> bool {

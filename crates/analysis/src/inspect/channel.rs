@@ -100,7 +100,8 @@ pub struct Measured {
 }
 
 impl Gathered {
-    /// Creates statistics without a sample of a channel that may be drawn, over a window of `window` samples.
+    /// Creates statistics without a sample of a channel that may be drawn, over a window of
+    /// `window` samples.
     pub(crate) fn of(window: usize, drawn: bool) -> Self {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }

@@ -48,8 +48,8 @@ pub struct Inspected {
 /// those of its first [`IN_MEMORY_SAMPLES`].
 ///
 /// # Errors
-/// [`AnalysisError::Io`] if the file cannot be read or has no such columns, [`AnalysisError::Window`]
-/// if the record does not have all of the window.
+/// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
+/// [`AnalysisError::Window`] if the record does not have all of the window.
 pub fn inspect(
     path: impl AsRef<Path>,
     reading: &Reading,
@@ -161,8 +161,9 @@ impl Inspection<'_> {
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
     }
 
-    /// Gathers the columns of a text while its samples are counted, so that it is read only once: where the
-    /// window ends with the record, and neither its length nor a mean is needed beforehand.
+    /// Gathers the columns of a text while its samples are counted, so that it is read only once:
+    /// where the window ends with the record, and neither its length nor a mean is needed
+    /// beforehand.
     fn on_the_way(
         &self,
         file: &RecordFile,

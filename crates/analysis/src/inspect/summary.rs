@@ -56,8 +56,8 @@ pub struct SamplingRow {
     pub step_s: f64,
     /// Length, in s.
     pub duration_s: f64,
-    /// Number in the file that states the rate or the step, such as `Fs = 25600`; `None` if the time axis
-    /// comes from elsewhere.
+    /// Number in the file that states the rate or the step, such as `Fs = 25600`; `None` if the
+    /// time axis comes from elsewhere.
     pub stated_by: Option<String>,
 }
 

@@ -59,8 +59,9 @@ impl Channels {
         self
     }
 
-    /// Returns the same channels with a force for each response, where fewer are measured: the others do not act.
-    /// Frequency responses need no place of a force, and take forces and responses as two lists.
+    /// Returns the same channels with a force for each response, where fewer are measured: the
+    /// others do not act. Frequency responses need no place of a force, and take forces and
+    /// responses as two lists.
     #[must_use]
     pub fn with_a_force_each(mut self) -> Self {
         let responses = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
@@ -97,25 +98,27 @@ impl Channels {
         }
     }
 
-    /// Returns the name of the force on a degree of freedom, counted from 0: `force 2` where it has no column.
+    /// Returns the name of the force on a degree of freedom, counted from 0: `force 2` where it has
+    /// no column.
     pub fn force_name(&self, dof: usize) -> String {
         named(&self.force, "force", dof)
     }
 
-    /// Returns the name of a response of a degree of freedom, counted from 0: `velocity 2` where it has no
-    /// column.
+    /// Returns the name of a response of a degree of freedom, counted from 0: `velocity 2` where it
+    /// has no column.
     pub fn response_name(&self, kind: ResponseQuantity, dof: usize) -> String {
         named(self.response(kind), &kind.to_string(), dof)
     }
 
-    /// Returns the kind of response that is named first, of displacement, velocity and acceleration.
+    /// Returns the kind of response that is named first, of displacement, velocity and
+    /// acceleration.
     pub fn first_response(&self) -> Option<ResponseQuantity> {
         ResponseQuantity::ALL.into_iter().find(|kind| !self.response(*kind).is_empty())
     }
 
-    /// Returns the names in several records of the same machine put together: a force has the name from the first
-    /// record in which it acts, and one that acts at several places in turn, as a hammer does, that of its place,
-    /// too: `force at a1`.
+    /// Returns the names in several records of the same machine put together: a force has the name
+    /// from the first record in which it acts, and one that acts at several places in turn, as a
+    /// hammer does, that of its place, too: `force at a1`.
     pub(crate) fn together(records: &[&Self]) -> Self {
         let mut all = records.first().map(|first| Self::clone(first)).unwrap_or_default();
         for (dof, name) in all.force.iter_mut().enumerate() {
@@ -136,12 +139,12 @@ impl Channels {
         Self { force: force.collect(), ..all.clone() }
     }
 
-    /// Returns the columns of some records in which one force acts, each on another degree of freedom (`dofs`,
-    /// one per record, counted from 1), as that of a hammer does.
+    /// Returns the columns of some records in which one force acts, each on another degree of
+    /// freedom (`dofs`, one per record, counted from 1), as that of a hammer does.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] unless there are one force column and a degree of freedom for each record,
-    /// which has a response.
+    /// [`AnalysisError::Setting`] unless there are one force column and a degree of freedom for
+    /// each record, which has a response.
     pub fn struck(&self, dofs: &[usize], records: usize) -> Result<Vec<Self>, AnalysisError> {
         let wrong = |why: String| AnalysisError::Setting { setting: "struck", why };
         let [force] = &self.force[..] else {
@@ -184,8 +187,8 @@ impl Channels {
         self.roles().into_iter().map(|role| role.column).collect()
     }
 
-    /// Checks that there are a force and a response for every degree of freedom, as an identification
-    /// needs them.
+    /// Checks that there are a force and a response for every degree of freedom, as an
+    /// identification needs them.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`].

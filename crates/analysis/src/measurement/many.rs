@@ -50,7 +50,8 @@ pub(super) fn open_one(
     Ok(RecordFile::of_table(table).with_memory(file.memory()))
 }
 
-/// Opens records that follow one another in a file, of which only the columns used are read, and once.
+/// Opens records that follow one another in a file, of which only the columns used are read, and
+/// once.
 pub(crate) fn open_all(
     path: &Path,
     channels: &Channels,

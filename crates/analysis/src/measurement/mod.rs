@@ -33,8 +33,8 @@ pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 /// Number of samples read at a time from a window that is not held in memory.
 pub const CHUNK_SAMPLES: usize = 1 << 16;
 
-/// Forces and responses of a machine, in a file of any length or in memory, and the window of them to
-/// use.
+/// Forces and responses of a machine, in a file of any length or in memory, and the window of them
+/// to use.
 ///
 /// Columns in other units are converted to SI units, wherever they come from.
 ///
@@ -126,8 +126,8 @@ impl Measurement {
         Self::open_with(path, channels, &Reading::default())
     }
 
-    /// Opens a record file as [`Measurement::open`] does, with a time axis, lines to skip or a mean to
-    /// subtract.
+    /// Opens a record file as [`Measurement::open`] does, with a time axis, lines to skip or a mean
+    /// to subtract.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
@@ -185,8 +185,8 @@ impl Measurement {
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }
 
-    /// Takes a force and one or several kinds of response from memory, in SI units, samples × degrees
-    /// of freedom each.
+    /// Takes a force and one or several kinds of response from memory, in SI units, samples ×
+    /// degrees of freedom each.
     ///
     /// # Errors
     /// [`AnalysisError::ArrayShape`] if a response is not as long as the force or has not as many
@@ -278,8 +278,8 @@ impl Measurement {
     /// Uses whole periods of this many samples, from the first sample of the window on.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record is shorter than one period, [`AnalysisError::Setting`] for a
-    /// period of no sample.
+    /// [`AnalysisError::Window`] if the record is shorter than one period,
+    /// [`AnalysisError::Setting`] for a period of no sample.
     pub fn period(mut self, samples: usize) -> Result<Self, AnalysisError> {
         self.window.period = Some(samples);
         self.span().map(|_| self)
@@ -288,8 +288,8 @@ impl Measurement {
     /// Uses a part of the record.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of it, [`AnalysisError::Setting`] for a
-    /// period of no sample.
+    /// [`AnalysisError::Window`] if the record does not have all of it, [`AnalysisError::Setting`]
+    /// for a period of no sample.
     pub fn window(mut self, window: Window) -> Result<Self, AnalysisError> {
         self.window = window;
         self.span().map(|_| self)
@@ -410,14 +410,15 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
 }
 
 impl RecordSource {
-    /// Refuses work on so many samples of the columns used, of `bytes` bytes a number, that takes too
-    /// much memory.
+    /// Refuses work on so many samples of the columns used, of `bytes` bytes a number, that takes
+    /// too much memory.
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
         let numbers = samples.saturating_mul(self.channels.roles().len());
         check_memory(&self.name, numbers, bytes, self.memory)
     }
 
-    /// Refuses work on the noise of so many spectral lines of all columns used that takes too much memory.
+    /// Refuses work on the noise of so many spectral lines of all columns used that takes too much
+    /// memory.
     pub fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
         let channels = self.channels.roles().len();
         if channels <= FEW_CHANNELS {

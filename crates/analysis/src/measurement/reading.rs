@@ -32,12 +32,12 @@ pub struct Reading {
     /// Units of columns, by their names or numbers, whatever their headers say: `g`, `lbf`, `ms`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
-    /// Factors that take columns to SI units, by their names or numbers, whatever their headers say; in SI units per
-    /// unit of the column.
+    /// Factors that take columns to SI units, by their names or numbers, whatever their headers
+    /// say; in SI units per unit of the column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scales: BTreeMap<String, f64>,
-    /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
-    /// `None`: 1.
+    /// Factor by which to raise the limits on what a file may ask of memory
+    /// ([`mechid_io::Limits`]); `None`: 1.
     pub limits_factor: Option<usize>,
     /// Memory that the numbers of a file and the work on them may take, in units of GB; `None`:
     /// 0.27 GB and 512 bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
@@ -60,8 +60,8 @@ impl Reading {
     /// Opens a record file, of whose text at most `rows` rows are held in memory.
     ///
     /// # Errors
-    /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
-    /// for, or several and none is asked for.
+    /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold
+    /// the record asked for, or several and none is asked for.
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
         let mut file = self.open_as_written(path, rows)?;
         self.state_units(&mut file)?;

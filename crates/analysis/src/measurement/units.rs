@@ -8,7 +8,8 @@ use super::Reading;
 use crate::AnalysisError;
 use crate::text::{compact, significant};
 
-/// Use of a column: its name or number, the quantity that it must hold, and the setting that names it.
+/// Use of a column: its name or number, the quantity that it must hold, and the setting that names
+/// it.
 #[derive(Debug, Clone, Copy)]
 pub struct Role<'a> {
     /// Column.
@@ -98,7 +99,8 @@ pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Opti
     })
 }
 
-/// Returns a remark on a text in the header of a column that may be a unit, whatever the column measures.
+/// Returns a remark on a text in the header of a column that may be a unit, whatever the column
+/// measures.
 pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     let stated = table.stated_unit(column, None)?;
     if stated.evidence == Evidence::Stated || table.values(column).is_err() {
@@ -123,11 +125,12 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     ))
 }
 
-/// Relative difference of two sampling rates that are one: a time column is printed with some digits.
+/// Relative difference of two sampling rates that are one: a time column is printed with some
+/// digits.
 const SAME_RATE: f64 = 1e-4;
 
-/// Returns a remark if the sampling rate that was asked for is not that of the file: of its time column, or of a number
-/// that states it by its name (`Fs`).
+/// Returns a remark if the sampling rate that was asked for is not that of the file: of its time
+/// column, or of a number that states it by its name (`Fs`).
 pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<String> {
     let rate_hz = reading.sample_rate_hz?;
     let of_file = Reading { sample_rate_hz: None, ..reading.clone() };
@@ -146,8 +149,8 @@ pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<Stri
 }
 
 /// Sampling rate, in Hz, below which a time column without a unit is doubtful whatever its length:
-/// structures that need no more swing in minutes. Milliseconds taken as seconds look so at all rates
-/// up to 2 kHz, numbers of samples at any.
+/// structures that need no more swing in minutes. Milliseconds taken as seconds look so at all
+/// rates up to 2 kHz, numbers of samples at any.
 const SLOW_HZ: f64 = 2.0;
 
 /// Sampling rate, in Hz, below which records longer than [`LONG_S`] are doubtful: buildings are
@@ -158,11 +161,12 @@ const RATHER_SLOW_HZ: f64 = 20.0;
 /// Duration, in s, from which [`RATHER_SLOW_HZ`] holds.
 const LONG_S: f64 = 1000.0;
 
-/// Sampling rate, in Hz, above which a time column without a unit is doubtful: no channel of a force or a response is
-/// sampled so fast, but day numbers look so.
+/// Sampling rate, in Hz, above which a time column without a unit is doubtful: no channel of a
+/// force or a response is sampled so fast, but day numbers look so.
 const FAST_HZ: f64 = 1e7;
 
-/// Sampling rate, in Hz, above which instants behind [`DAY_NUMBERS`] are doubtful: that of day numbers at 1 Hz.
+/// Sampling rate, in Hz, above which instants behind [`DAY_NUMBERS`] are doubtful: that of day
+/// numbers at 1 Hz.
 const RATHER_FAST_HZ: f64 = 86_400.0;
 
 /// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.
@@ -171,8 +175,8 @@ const DAY_NUMBERS: f64 = 20_000.0;
 /// Size of a day, in s.
 const DAY_S: f64 = 86_400.0;
 
-/// Returns a finding if a time column without a unit gives a record so slow and long that it may be in
-/// milliseconds, or so fast that it may be in days.
+/// Returns a finding if a time column without a unit gives a record so slow and long that it may be
+/// in milliseconds, or so fast that it may be in days.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
@@ -195,14 +199,15 @@ pub(crate) fn doubtful_time(
     Some(Finding::TimeUnit(TimeUnit { column, rate_hz, duration_s, unit, factor }))
 }
 
-/// Error of a sampling rate by the digits of its time column, relative to the rate, from which frequencies may be known
-/// less well for it than for the noise.
+/// Error of a sampling rate by the digits of its time column, relative to the rate, from which
+/// frequencies may be known less well for it than for the noise.
 const RATE_ERROR: f64 = 1e-5;
 
 /// Rounding over the time step, below which instants are rounded ones.
 const EVEN: f64 = 0.99;
 
-/// Returns a remark if the digits of a time column leave the sampling rate so uncertain that frequencies suffer.
+/// Returns a remark if the digits of a time column leave the sampling rate so uncertain that
+/// frequencies suffer.
 pub(crate) fn coarse_time(
     table: &Table,
     time: &TimeAxis<'_>,

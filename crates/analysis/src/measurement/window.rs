@@ -34,8 +34,8 @@ impl Window {
     /// record of `samples` samples called `file`.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of them, [`AnalysisError::Setting`] for a
-    /// period of no sample.
+    /// [`AnalysisError::Window`] if the record does not have all of them,
+    /// [`AnalysisError::Setting`] for a period of no sample.
     pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), AnalysisError> {
         if self.period == Some(0) {
             let why = "a period has one sample or more, not 0".into();
@@ -89,7 +89,8 @@ impl Hold {
     }
 }
 
-/// The window of a measurement, which can be gone through from beginning to end, however long it is.
+/// The window of a measurement, which can be gone through from beginning to end, however long it
+/// is.
 #[derive(Debug, Clone)]
 pub struct Windowed {
     /// Samples held in memory, from the first one on.
@@ -151,7 +152,8 @@ impl Windowed {
         self.held
     }
 
-    /// Returns some samples of a window that is held as a whole, counted from its first, under another force.
+    /// Returns some samples of a window that is held as a whole, counted from its first, under
+    /// another force.
     ///
     /// # Errors
     /// [`AnalysisError::Signal`] if the window does not have them.
@@ -187,9 +189,9 @@ impl Windowed {
         }
     }
 
-    /// Passes the window to `take` in chunks of `samples` samples, each beginning `advance` samples after
-    /// the one before; the last may be shorter. A window that is held and fits into one chunk is not
-    /// read again.
+    /// Passes the window to `take` in chunks of `samples` samples, each beginning `advance` samples
+    /// after the one before; the last may be shorter. A window that is held and fits into one chunk
+    /// is not read again.
     pub(crate) fn chunks(
         &self,
         samples: usize,

@@ -1,5 +1,4 @@
-//! Responses that are averages over segments of records: what ties their lines together, and what the
-//! window of the segments blunts.
+//! Responses averaged over segments of records: correlation of their lines, and bias of the window.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,28 +15,28 @@ use crate::limits::{
     SHARPENING_SETTLED,
 };
 
-/// Deviation of a frequency from a line, in lines, up to which it is one in spite of the digits of a
-/// file.
+/// Maximum deviation of a frequency from a spectral line, in lines: the rounding of a file.
 const OF_LINE: f64 = 1e-3;
 
-/// Segments that the responses of a table are averages over.
+/// Segments of averaged responses of a table.
 #[derive(Debug, Clone)]
 pub(super) struct Averaged {
     /// Number of the spectral line of each row of the table.
     lines: Vec<usize>,
-    /// Distance of the lines of a segment, in Hz.
+    /// Line spacing of a segment, in Hz.
     pub spacing_hz: f64,
-    /// Distance, in lines, from which on errors are independent.
+    /// Minimum distance, in lines, of independent errors.
     step: usize,
-    /// Ratio of a standard error to that of independent lines, of lines `step` apart.
+    /// Ratio of the standard error for lines `step` apart to that of independent lines.
     pub inflation: f64,
-    /// Weights by which the window smooths the responses; empty where it does not.
+    /// Weights of the smoothing by the window; empty without smoothing.
     smoothing: Vec<f64>,
 }
 
 impl Averaged {
-    /// Returns the segments that a table states; `None` if it states none, has other frequencies than
-    /// their lines, or states segments so long that their window costs more than the table.
+    /// Returns the segments that a table states; `None` if it states none, if its frequencies are
+    /// not their lines, or if the segments are so long that the weights of their window take too
+    /// much time.
     pub fn new(table: &FrequencyResponses) -> Option<Self> {
         let stated = table.segments?;
         if stated.samples.saturating_mul(stated.samples.div_ceil(stated.hop)) > MOST_SEGMENT_WORK {
@@ -53,21 +52,21 @@ impl Averaged {
             Some(window) => Segments::Windowed { len: stated.samples, hop: stated.hop, window },
         };
         let correlation = segments.line_correlation(stated.count);
-        let tied = |apart: usize| correlation.get(apart).copied().unwrap_or(0.0);
-        let step = (1..).find(|apart| tied(*apart) < LINE_CORRELATION).unwrap_or(1);
-        let rest: f64 = (1..).map_while(|k| correlation.get(k * step)).sum();
+        let correlated = |apart: usize| correlation.get(apart).copied().unwrap_or(0.0);
+        let step = (1..).find(|apart| correlated(*apart) < LINE_CORRELATION).unwrap_or(1);
+        let remaining: f64 = (1..).map_while(|k| correlation.get(k * step)).sum();
         let lines = lines.into_iter().map(|line| line.round() as usize).collect();
-        let inflation = (1.0 + 2.0 * rest).sqrt();
+        let inflation = (1.0 + 2.0 * remaining).sqrt();
         let smoothing = segments.smoothing();
         Some(Self { lines, spacing_hz, step, inflation, smoothing })
     }
 
-    /// Returns whether the window of the segments blunts resonances.
+    /// Returns whether the window of the segments smooths resonances.
     pub fn is_smoothed(&self) -> bool {
         !self.smoothing.is_empty()
     }
 
-    /// Returns those of some rows whose errors are independent of one another.
+    /// Selects rows with mutually independent errors.
     pub fn independent(&self, rows: impl Iterator<Item = usize>) -> Vec<usize> {
         let mut next = 0;
         rows.filter(|row| {
@@ -80,10 +79,10 @@ impl Averaged {
         .collect()
     }
 
-    /// Returns what the averages add to the responses of modes on some rows.
+    /// Returns the bias of the averages in the responses of modes on some rows.
     ///
-    /// What lies outside of the band is smooth there, so its bias is nothing; beyond the edges of the band
-    /// its residual terms are no response at all.
+    /// Modes outside the band are smooth within it, so their bias is negligible; their residual
+    /// terms are not valid outside the band.
     pub fn bias(
         &self,
         rows: &[usize],
@@ -115,17 +114,19 @@ fn modal_response(modes: &[&IdentifiedMode], omega: f64) -> DMatrix<Complex<f64>
     })
 }
 
-/// Modes of tables, the lines that they were fitted to, and whether what a window blunts was separated
-/// from them.
+/// Modes of tables, corrected for the bias of the window.
 pub(super) struct Sharpened {
+    /// Corrected lines.
     pub data: LineData,
     pub estimate: ModalEstimate,
+    /// True if the correction converged.
     pub settled: bool,
 }
 
 impl Sharpened {
-    /// Fits the modes, and as many again to the responses less what their window blunts of these modes,
-    /// until they stay. Where a later fit fails, the one before it is kept and nothing has settled.
+    /// Alternates between a fit of the modes and the correction of the responses for the window
+    /// bias of these modes, until the modes no longer change. If a later fit fails, the last fit is
+    /// the result and has not settled.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias by a window).
@@ -172,8 +173,8 @@ fn largest_change(before: &[IdentifiedMode], after: &[IdentifiedMode]) -> f64 {
     before.iter().zip(after).map(change).fold(0.0, f64::max)
 }
 
-/// Returns a mode without the decay rate (1/s) that an exponential window adds, and with standard
-/// errors `inflation` times as large.
+/// Returns a mode without the decay rate (1/s) of an exponential window, and with standard errors
+/// multiplied by `inflation`.
 pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64) -> IdentifiedMode {
     let mut mode = mode.clone();
     let scaled = |errors: &mut Vec<Complex<f64>>| errors.iter_mut().for_each(|e| *e *= inflation);
@@ -196,16 +197,16 @@ pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64)
     mode
 }
 
-/// Derivatives of natural frequency (Hz) and damping ratio (rows) by real and imaginary part of the
-/// pole (columns).
+/// Returns the derivatives of natural frequency (Hz) and damping ratio (rows) with respect to the
+/// real and imaginary part of the pole (columns).
 fn frequency_and_damping_slopes(pole: Complex<f64>) -> nalgebra::Matrix2<f64> {
     let (re, im, size) = (pole.re, pole.im, pole.norm());
     let cubed = size.powi(3);
     nalgebra::Matrix2::new(re / size / TAU, im / size / TAU, -im * im / cubed, re * im / cubed)
 }
 
-/// Derivatives of real and imaginary part of a pole (rows) by natural frequency (Hz) and damping ratio
-/// (columns).
+/// Returns the derivatives of the real and imaginary part of a pole (rows) with respect to natural
+/// frequency (Hz) and damping ratio (columns).
 fn pole_slopes(natural_frequency_hz: f64, damping_ratio: f64) -> nalgebra::Matrix2<f64> {
     let omega = TAU * natural_frequency_hz;
     let root = (1.0 - damping_ratio * damping_ratio).sqrt();

@@ -28,8 +28,8 @@ pub struct ModeComparison {
     pub only_first: Vec<LoneRow>,
     /// Modes of the second set without a partner.
     pub only_second: Vec<LoneRow>,
-    /// Modal assurance criterion of each mode of the first set (rows) with each of the second, a pure
-    /// number from 0 to 1.
+    /// Modal assurance criterion of each mode of the first set (rows) with each of the second, a
+    /// pure number from 0 to 1.
     pub mac: Vec<Vec<f64>>,
 }
 
@@ -48,8 +48,8 @@ pub struct PairRow {
     pub mac: f64,
     /// Standard error of the criterion, a pure number.
     pub mac_standard_error: f64,
-    /// Probability of a difference of the shapes as large by their errors alone, adjusted for all tests;
-    /// `None` without errors, or at a single point.
+    /// Probability of a difference of the shapes as large by their errors alone, adjusted for all
+    /// tests; `None` without errors, or at a single point.
     pub shape_p_value: Option<f64>,
 }
 

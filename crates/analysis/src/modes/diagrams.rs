@@ -31,8 +31,8 @@ pub struct StabilisationRows {
     pub frequency_hz: Vec<f64>,
     /// Damping ratios, pure numbers, one for each pole.
     pub damping_ratio: Vec<f64>,
-    /// Flags, one for each pole: frequency and damping (and the shape, of ambient records) repeat those of
-    /// a pole of the order below.
+    /// Flags, one for each pole: frequency and damping (and the shape, of ambient records) repeat
+    /// those of a pole of the order below.
     pub is_stable: Vec<bool>,
 }
 
@@ -46,8 +46,8 @@ pub struct ModeIndicator {
     pub is_measured: bool,
     /// Frequencies, in Hz, one per singular value of a list.
     pub frequency_hz: Vec<f64>,
-    /// Singular values, falling, each a list with one value for each frequency; responses over their
-    /// RMS in the band per force over its RMS; pure numbers.
+    /// Singular values, falling, each a list with one value for each frequency; responses over
+    /// their RMS in the band per force over its RMS; pure numbers.
     pub singular_values: Vec<Vec<f64>>,
 }
 
@@ -144,8 +144,8 @@ impl ModeIndicator {
 /// Frequencies (rad/s), and the response at each.
 type MeasuredResponses = (Vec<f64>, Vec<DMatrix<Complex<f64>>>);
 
-/// Returns the frequencies (rad/s) and responses, outputs × inputs, of a table in which every force has
-/// one record on the same lines; `None` of others.
+/// Returns the frequencies (rad/s) and responses, outputs × inputs, of a table in which every force
+/// has one record on the same lines; `None` of others.
 fn measured_responses(data: &LineData) -> Option<MeasuredResponses> {
     let (inputs, outputs) = (data.inputs().ncols(), data.outputs().ncols());
     let records = data.records();

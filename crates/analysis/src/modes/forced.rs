@@ -87,7 +87,7 @@ impl Test {
 }
 
 /// Fits the modes of tables of frequency responses.
-pub(super) fn of_tables(
+pub(super) fn modes_of_tables(
     tables: &Tables,
     band_hz: [f64; 2],
     settings: &ModesSettings,

@@ -38,7 +38,7 @@ use self::tables::Tables;
 use crate::AnalysisError;
 use crate::measurement::Measurement;
 
-/// Modes of a structure with their uncertainty, and how well they explain the records.
+/// Modes of a structure with their uncertainty, and their fit to the records.
 #[derive(Debug)]
 pub struct Modes {
     summary: ModesSummary,
@@ -46,37 +46,37 @@ pub struct Modes {
     source: DiagramData,
 }
 
-/// Responses over frequency, measured and explained: root of the sum over all responses, each over its
-/// own RMS in the band.
+/// Measured and modelled responses over frequency: the root of the sum of squares over all
+/// responses, each divided by its RMS in the band.
 #[derive(Debug, Clone, Default)]
 pub struct ModesSpectrum {
     /// Frequencies of the lines of the first record or force, in Hz.
     pub frequency_hz: Vec<f64>,
-    /// Measured, a ratio, one for each frequency.
+    /// Measured response, a ratio, one for each frequency.
     pub measured: Vec<f64>,
-    /// Explained by modes and residual terms, a ratio, one for each frequency.
+    /// Response of modes and residual terms, a ratio, one for each frequency.
     pub modelled: Vec<f64>,
-    /// Difference of the two, a ratio, one for each frequency.
+    /// Difference of measured and modelled response, a ratio, one for each frequency.
     pub residual: Vec<f64>,
 }
 
-/// Finds the modes of a structure from records of one test, which are fitted together.
+/// Identifies the modes of a structure from the records of one test, all together.
 ///
-/// With measured forces any number of forces and responses, of any kinds, is possible: a shaker, several
-/// of them, a hammer at one point or at a different one in each record. Frequencies, damping ratios and
-/// shapes are those of maximum likelihood on the spectral lines of the open records, without a window;
-/// what the ends of the records add is part of the model, and so are unmeasured forces and the modes
-/// outside of the band. Of an ambient record the forces are taken as white over the band.
+/// With measured forces any number of forces and responses, of any kinds, is possible: one or
+/// several shakers, a hammer at one point or at a different point in each record. Frequencies,
+/// damping ratios and shapes are maximum-likelihood estimates from the spectral lines of the open
+/// records, without a window; the model includes the transients of the records, unmeasured forces
+/// and modes outside the band. The forces of an ambient record are assumed to be white over the
+/// band.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`],
-/// [`AnalysisError::Setting`] for places that do not belong to the columns,
-/// [`AnalysisError::Modal`] or [`AnalysisError::Ambient`] if nothing can be fitted, and if a file
-/// cannot be read.
+/// [`AnalysisError::Setting`] for places that do not match the columns, [`AnalysisError::Modal`] or
+/// [`AnalysisError::Ambient`] if the fit fails, and an error if a file cannot be read.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 9
-/// and 12; Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapters 9 and 12; Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432.
 pub fn modes(
     measurements: &[Measurement],
     settings: &ModesSettings,
@@ -99,18 +99,18 @@ pub fn modes(
     Test { recorded, band_hz }.modes(records, checks, settings)
 }
 
-/// Finds the modes of a structure from tables of its frequency responses, which are fitted together;
-/// any number of points and references is possible.
+/// Identifies the modes of a structure from tables of its frequency responses, all together, with
+/// any number of points and references.
 ///
-/// Of averages over segments that a table states, lines whose errors are tied by the window are left
-/// out, and what the window blunts is subtracted by the modes themselves, round by round; the decay of an
-/// exponential window is subtracted, too.
+/// If a table states that it has averages over segments, lines with errors correlated by the window
+/// are excluded, and the bias of the window is computed from the identified modes and subtracted,
+/// round by round; the decay of an exponential window is subtracted, too.
 ///
 /// # Errors
 /// As [`modes`], and [`AnalysisError::MissingResponse`] if a response is missing.
 ///
 /// # Source
-/// That of [`modes`].
+/// As [`modes`].
 pub fn modes_of_responses(
     tables: &[FrequencyResponses],
     settings: &ModesSettings,
@@ -118,7 +118,7 @@ pub fn modes_of_responses(
     settings.check()?;
     let tables = Tables::new(tables, settings.quantity)?;
     let band_hz = settings.band_hz.unwrap_or_else(|| tables.range_hz());
-    forced::of_tables(&tables, band_hz, settings)
+    forced::modes_of_tables(&tables, band_hz, settings)
 }
 
 impl Modes {
@@ -127,7 +127,7 @@ impl Modes {
         &self.summary
     }
 
-    /// Returns the stabilisation diagram and the mode indicator, which take a part of the time of the
+    /// Computes the stabilisation diagram and the mode indicator, in a part of the time of the
     /// identification.
     ///
     /// # Errors
@@ -145,7 +145,7 @@ impl Modes {
         Ok(())
     }
 
-    /// Returns the responses over frequency, measured and explained.
+    /// Returns the measured and modelled responses over frequency.
     pub fn spectrum(&self) -> &ModesSpectrum {
         &self.spectrum
     }

@@ -95,8 +95,8 @@ impl SavedValue {
 }
 
 impl ModeSet {
-    /// Reads modes: what `mechid modes --json` or `mechid identify --json` printed, the description of a
-    /// machine, or the datasets 55 of a universal file.
+    /// Reads modes: what `mechid modes --json` or `mechid identify --json` printed, the description
+    /// of a machine, or the datasets 55 of a universal file.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read or understood,

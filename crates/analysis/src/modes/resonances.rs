@@ -15,8 +15,8 @@ use crate::text::compact;
 /// Number of natural frequencies that the sentence lists.
 const LISTED: usize = 8;
 
-/// Returns a sentence if records show more modes, each significant by the likelihood, than they have
-/// responses: M, C and K of that size cannot describe them.
+/// Returns a sentence if records show more modes, each significant by the likelihood, than they
+/// have responses: M, C and K of that size cannot describe them.
 pub(crate) fn surplus(measurements: &[Measurement]) -> Option<String> {
     let recorded = Recorded::from_forced(measurements, None, &Places::default()).ok()?;
     let responses = recorded.outputs.len();

@@ -11,8 +11,8 @@ use crate::limits::NOTED_UNMEASURED;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
-/// Returns the row of a mode; masses follow from `fitted`, the mode as it was fitted, which has the decay
-/// of an exponential window.
+/// Returns the row of a mode; masses follow from `fitted`, the mode as it was fitted, which has the
+/// decay of an exponential window.
 pub(super) fn row(
     mode: &IdentifiedMode,
     fitted: &IdentifiedMode,

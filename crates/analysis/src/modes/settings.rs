@@ -29,8 +29,8 @@ pub struct ModesSettings {
     /// Places of the forces, one each (of a roving hammer one per record), and of the responses, by
     /// which a driving point is known; empty: not stated.
     pub places: Places,
-    /// Share of each record, at its end, from 0 to 0.8, that is kept out of a second fit and predicted by it; 0 for
-    /// no such test.
+    /// Share of each record, at its end, from 0 to 0.8, that is kept out of a second fit and
+    /// predicted by it; 0 for no such test.
     pub validate: f64,
 }
 

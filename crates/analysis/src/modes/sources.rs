@@ -99,8 +99,8 @@ impl Recorded {
     }
 }
 
-/// Returns the band, in Hz, that forces or other inputs drive: from the first to the last group of lines in
-/// which one of them has a power worth mentioning.
+/// Returns the band, in Hz, that forces or other inputs drive: from the first to the last group of
+/// lines in which one of them has a power worth mentioning.
 pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [f64; 2] {
     let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
     for forces in inputs {

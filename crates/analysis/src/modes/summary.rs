@@ -47,12 +47,12 @@ pub struct ModesSummary {
     /// Sinusoids of machines nearby, in the records of ambient tests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<HarmonicRow>,
-    /// Share of the variance that the model explains, in the mean over the responses; `None` without
-    /// forces.
+    /// Share of the variance that the model explains, in the mean over the responses; `None`
+    /// without forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_explained: Option<f64>,
-    /// Share that a fit to the first part of the records explains of the rest, or the modes of another
-    /// record, where that was tried.
+    /// Share that a fit to the first part of the records explains of the rest, or the modes of
+    /// another record, where that was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
     /// Checks of the data and of the fit.
@@ -155,7 +155,8 @@ pub struct OutputRow {
     /// Share that a fit to the first part of the records explains of the rest, where it was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
-    /// RMS of the sensor noise in the band over that of the response, a ratio; `None` without forces.
+    /// RMS of the sensor noise in the band over that of the response, a ratio; `None` without
+    /// forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_share: Option<f64>,
 }
@@ -171,8 +172,8 @@ pub struct ModalModeRow {
     /// Modal phase collinearity of the shape, a pure number: 1 if all entries have one phase or its
     /// opposite.
     pub phase_collinearity: f64,
-    /// Share of the motion of this mode that the measured forces drive; the rest answers forces that
-    /// were not measured. `None` without measured forces.
+    /// Share of the motion of this mode that the measured forces drive; the rest answers forces
+    /// that were not measured. `None` without measured forces.
     pub driven_share: Option<f64>,
     /// Modal mass for the shape scaled to 1 at its largest entry, in kg, where a force acts at the
     /// place of a response.
@@ -217,8 +218,8 @@ pub struct ModalCheck {
 }
 
 impl ModesSummary {
-    /// Returns the modes with their shapes and the names of the entries: at the responses, or, where more
-    /// points are struck than measured, by reciprocity at the forces.
+    /// Returns the modes with their shapes and the names of the entries: at the responses, or,
+    /// where more points are struck than measured, by reciprocity at the forces.
     pub fn shapes(&self) -> (Vec<ShapedMode>, Vec<String>) {
         if self.inputs.len() <= self.outputs.len() {
             let modes = self.modes.iter().map(|row| row.mode.clone()).collect();
@@ -306,7 +307,8 @@ impl ModesSummary {
         text_table(&rows)
     }
 
-    /// A line for each candidate in the band, and one for all others, which no one would take for modes.
+    /// A line for each candidate in the band, and one for all others, which no one would take for
+    /// modes.
     fn dropped_lines(&self) -> String {
         let [low, high] = self.band_hz;
         let (inside, outside): (Vec<_>, Vec<_>) = self.dropped.iter().partition(|row| {

@@ -8,8 +8,8 @@ use super::Modes;
 use super::diagrams::{DiagramData, Forced};
 
 impl Modes {
-    /// Returns the frequency responses of modes and residual terms at the lines of the first record,
-    /// in m/N, m/(s·N) or m/(s²·N); `None` without measured forces.
+    /// Returns the frequency responses of modes and residual terms at the lines of the first
+    /// record, in m/N, m/(s·N) or m/(s²·N); `None` without measured forces.
     ///
     /// Places that are nodes of a universal file (`3`, `12+Z`) are the points. Others get numbers:
     /// responses from 1 on, then forces.

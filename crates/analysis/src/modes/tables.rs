@@ -101,12 +101,13 @@ impl Tables {
         self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
     }
 
-    /// Returns the lines in a band (Hz): each force in turn is a record with a unit input there. With
-    /// a `model` the responses are less what the windows of their segments make of those of the model.
+    /// Returns the lines in a band (Hz): each force in turn is a record with a unit input there.
+    /// With a `model` the responses are less what the windows of their segments make of those of
+    /// the model.
     ///
     /// # Errors
-    /// [`AnalysisError::MissingResponse`] if a table has the response of one point to a force, and not
-    /// that of another; those of [`LineData`] if the band has no line.
+    /// [`AnalysisError::MissingResponse`] if a table has the response of one point to a force, and
+    /// not that of another; those of [`LineData`] if the band has no line.
     pub fn lines(
         &self,
         band_hz: [f64; 2],

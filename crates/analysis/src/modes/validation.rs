@@ -10,13 +10,13 @@ use crate::AnalysisError;
 use crate::measurement::Measurement;
 
 impl Modes {
-    /// Predicts other records of the same structure from their forces; returns the share of the variance of
-    /// each response in the band that the modes explain. The state at the beginning of each record is
-    /// estimated.
+    /// Predicts other records of the same structure from their forces; returns the share of the
+    /// variance of each response in the band that the modes explain. The state at the beginning of
+    /// each record is estimated.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] of modes without measured forces, [`AnalysisError::Modal`] for other numbers
-    /// of forces or responses, and if a file cannot be read.
+    /// [`AnalysisError::Setting`] of modes without measured forces, [`AnalysisError::Modal`] for
+    /// other numbers of forces or responses, and if a file cannot be read.
     pub fn predict(&self, measurements: &[Measurement]) -> Result<Vec<f64>, AnalysisError> {
         let ModesSummary { analysis, band_hz, .. } = self.summary();
         let (DiagramData::Forced(forced), ModalTest::Forced { hits }) =

@@ -1,4 +1,5 @@
-//! Consistency of velocity with the rate of displacement, and of acceleration with that of velocity.
+//! Consistency of velocity with the rate of displacement, and of acceleration with that of
+//! velocity.
 
 use mechid_force::{Channel, Measurement};
 use mechid_model::ResponseQuantity;

@@ -55,8 +55,8 @@ pub struct How {
     pub chosen: Vec<(String, f64, &'static str)>,
     /// Unexplained part of each measured channel; `None` where there is no surplus channel.
     pub unexplained: Option<Vec<Unexplained>>,
-    /// Frequency, in Hz, below which the responses show less of a force than noise; `None` where the
-    /// method does not tell, or they show it nowhere.
+    /// Frequency, in Hz, below which the responses show less of a force than noise; `None` where
+    /// the method does not tell, or they show it nowhere.
     pub seen_from_hz: Option<f64>,
     /// Frequencies between which force and standard error hold, in Hz; `None`: all.
     pub band_hz: Option<[f64; 2]>,
@@ -67,8 +67,8 @@ pub struct How {
 /// The method for a record of these channels, and the reason for it.
 ///
 /// # Errors
-/// [`AnalysisError::NonlinearMachine`] where the machine is not linear and the motion not complete, or
-/// another method was asked for than its equation of motion.
+/// [`AnalysisError::NonlinearMachine`] where the machine is not linear and the motion not complete,
+/// or another method was asked for than its equation of motion.
 pub fn choose(
     request: &Request,
     machine: &Machine,
@@ -324,8 +324,8 @@ fn filtered(
     })
 }
 
-/// The measurement, with the band in which the force was found as the one asked for: a change of the
-/// machine must not choose another.
+/// The measurement, with the band in which the force was found as the one asked for: a change of
+/// the machine must not choose another.
 fn of_this_band(
     motion: &Measurement,
     force: &IdentifiedForce,
@@ -339,8 +339,8 @@ fn of_this_band(
 /// Part of the power of a response on the lines of the force below which it has another cause.
 const FEW: f64 = 0.5;
 
-/// Returns a remark on the channel of which the lines given hold least, if that is little: they may have been
-/// counted in another period than that of the window.
+/// Returns a remark on the channel of which the lines given hold least, if that is little: they may
+/// have been counted in another period than that of the window.
 fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;
     let spectrum = Spectrum::of(motion.record());
@@ -363,7 +363,8 @@ fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     ))
 }
 
-/// The noise of every channel as it was measured, in its own unit, from that of the mean of periods.
+/// The noise of every channel as it was measured, in its own unit, from that of the mean of
+/// periods.
 fn noise_levels<'a>(
     motion: &'a Measurement,
     noise: &'a [f64],

@@ -100,8 +100,8 @@ pub fn numbered(base: &str, dof: usize, dofs: usize) -> String {
 ///
 /// # Errors
 /// [`AnalysisError::MotionCount`] or [`AnalysisError::NoMotion`] if the responses do not fit the
-/// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], what the method cannot be done
-/// with ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
+/// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], what the method cannot be
+/// done with ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
 /// [`AnalysisError::KalmanIsOpen`], [`AnalysisError::BandMethod`]), and its own failure.
 pub fn reconstruct(
     run: &Measurement,

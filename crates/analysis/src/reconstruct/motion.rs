@@ -78,8 +78,8 @@ impl Recorded {
         &self.columns
     }
 
-    /// Returns the levels stated of the columns, in their units, as the held samples have them: in SI units, and
-    /// of the mean of periods.
+    /// Returns the levels stated of the columns, in their units, as the held samples have them: in
+    /// SI units, and of the mean of periods.
     pub fn levels(&self, stated: &[f64]) -> Vec<f64> {
         let mean = (self.periods as f64).sqrt();
         let stated = stated.iter().enumerate();
@@ -121,8 +121,8 @@ impl Recorded {
         Ok(Held { motion: self.measurement(mean)?, scatter })
     }
 
-    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples after
-    /// the one before; the last may be shorter.
+    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples
+    /// after the one before; the last may be shorter.
     pub fn chunks(
         &self,
         samples: usize,
@@ -159,8 +159,8 @@ fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Opti
     (0..dofs).map(find).collect()
 }
 
-/// Returns whether displacement and velocity of every degree of freedom were measured, and, if asked for,
-/// acceleration.
+/// Returns whether displacement and velocity of every degree of freedom were measured, and, if
+/// asked for, acceleration.
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
     let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];
     needed.extend(with_acceleration.then_some(ResponseQuantity::Acceleration));

@@ -35,14 +35,16 @@ pub enum Method {
     /// The method that suits the record.
     #[default]
     Auto,
-    /// Equation of motion, sample by sample: displacement, velocity and acceleration of every degree
-    /// of freedom.
+    /// Equation of motion, sample by sample: displacement, velocity and acceleration of every
+    /// degree of freedom.
     Continuous,
-    /// Exact step from each sample to the next, the force linear between them: displacement and velocity.
+    /// Exact step from each sample to the next, the force linear between them: displacement and
+    /// velocity.
     Discretised,
     /// Dynamic stiffness, line by line: whole periods.
     FrequencyDomain,
-    /// Empirical-Bayes shrinkage, the posterior mean of the force: whole periods, or a short record.
+    /// Empirical-Bayes shrinkage, the posterior mean of the force: whole periods, or a short
+    /// record.
     Shrinkage,
     /// Tikhonov regularisation: whole periods, or a short record.
     Tikhonov,

@@ -8,8 +8,8 @@ use crate::text::significant;
 /// Periods that differ less than this share of their mean count as alike.
 const ALIKE: f64 = 0.1;
 
-/// Correlation from one sample to the next that white noise does not reach, and the response of a machine that
-/// is sampled five times a period or more is.
+/// Correlation from one sample to the next that white noise does not reach, and the response of a
+/// machine that is sampled five times a period or more is.
 const NOT_WHITE: f64 = 0.3;
 
 /// Returns a remark on the channel whose periods differ most from their mean, if they do.

@@ -34,8 +34,8 @@ pub struct ForceSummary {
     pub chosen: Vec<Chosen>,
     /// Channels, one each.
     pub channels: Vec<Measured>,
-    /// Lowest and highest frequency, in Hz, between which forces and standard errors hold; `None`: at
-    /// all frequencies.
+    /// Lowest and highest frequency, in Hz, between which forces and standard errors hold; `None`:
+    /// at all frequencies.
     pub band_hz: Option<[f64; 2]>,
     /// Forces, one per degree of freedom.
     pub forces: Vec<ForceRow>,
@@ -67,7 +67,8 @@ pub struct ForceRow {
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// RMS of the standard error over the record, in the unit of the channel; `None` where it is not known.
+    /// RMS of the standard error over the record, in the unit of the channel; `None` where it is
+    /// not known.
     pub standard_error: Option<f64>,
     /// Frequency of the strongest line, in Hz.
     pub strongest_hz: f64,

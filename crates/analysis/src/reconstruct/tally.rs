@@ -43,7 +43,8 @@ impl<'a> Tally<'a> {
         Ok(Self { sampling, levels, strongest, take })
     }
 
-    /// Takes all samples; `counts_noise` says whether the standard error counts the noise of the record.
+    /// Takes all samples; `counts_noise` says whether the standard error counts the noise of the
+    /// record.
     pub fn push_all(
         &mut self,
         force: &IdentifiedForce,

@@ -14,16 +14,16 @@ pub struct Measured {
     pub channel: usize,
     /// Name of the column.
     pub column: String,
-    /// RMS of the unexplained part over the RMS of the response, a ratio; `None` where as many forces are sought
-    /// as channels were measured, or where none was compared.
+    /// RMS of the unexplained part over the RMS of the response, a ratio; `None` where as many
+    /// forces are sought as channels were measured, or where none was compared.
     pub unexplained: Option<f64>,
-    /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the noise is not
-    /// known apart from the fit.
+    /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the
+    /// noise is not known apart from the fit.
     pub expected: Option<f64>,
 }
 
-/// Factor over what noise and machine may leave that is too much: noise alone leaves three times its
-/// level of one complex line once in e⁹ times, of more lines more rarely.
+/// Factor over what noise and machine may leave that is too much: noise alone leaves three times
+/// its level of one complex line once in e⁹ times, of more lines more rarely.
 const TOO_MUCH: f64 = 3.0;
 
 /// A rest below this share moves no force by more than a machine is ever known to.

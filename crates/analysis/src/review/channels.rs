@@ -23,8 +23,8 @@ pub struct Channel {
     pub peak: f64,
     /// Peak over RMS, a ratio; `None` for a channel of zeros.
     pub crest_factor: Option<f64>,
-    /// RMS of the part that differs from period to period over the RMS of the part that repeats, both without
-    /// their mean; a ratio, `None` for one period.
+    /// RMS of the part that differs from period to period over the RMS of the part that repeats,
+    /// both without their mean; a ratio, `None` for one period.
     pub scatter: Option<f64>,
 }
 

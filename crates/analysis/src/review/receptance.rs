@@ -29,7 +29,8 @@ const ALONE: f64 = 1e-3;
 /// The same of others that have nothing to do with it: the noise of their load cells.
 const ALONE_BESIDE_NOISE: f64 = 0.1;
 
-/// Coherence from line to line from which a force is a part of another, and the fewest lines that tell.
+/// Coherence from line to line from which a force is a part of another, and the fewest lines that
+/// tell.
 const PART_OF_IT: f64 = 0.5;
 const FEWEST_LINES: usize = 8;
 
@@ -51,8 +52,8 @@ pub struct ActingAlone<'a> {
 }
 
 impl<'a> ActingAlone<'a> {
-    /// Tells noise in the channel of an idle force from a part of the force that acts, by its coherence from line to
-    /// line where one force acts.
+    /// Tells noise in the channel of an idle force from a part of the force that acts, by its
+    /// coherence from line to line where one force acts.
     pub fn of(data: &'a FrequencyData) -> Self {
         let n = data.dof();
         let limits = DMatrix::from_fn(n, n, |k, j| {
@@ -78,8 +79,8 @@ impl<'a> ActingAlone<'a> {
         Self { data, limits }
     }
 
-    /// Returns `true` if on a row of the data no force acts but the one on degree of freedom `dof`, both counted
-    /// from 0.
+    /// Returns `true` if on a row of the data no force acts but the one on degree of freedom `dof`,
+    /// both counted from 0.
     pub fn on(&self, row: usize, dof: usize) -> bool {
         let amplitude = self.data.force()[(row, dof)].norm();
         let absent =
@@ -89,8 +90,8 @@ impl<'a> ActingAlone<'a> {
 }
 
 impl Receptance {
-    /// Returns the data fitted in the frequency domain; otherwise those of whole periods, or averaged over
-    /// segments of open records.
+    /// Returns the data fitted in the frequency domain; otherwise those of whole periods, or
+    /// averaged over segments of open records.
     ///
     /// # Errors
     /// If the records show none.

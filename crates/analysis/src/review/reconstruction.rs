@@ -21,14 +21,14 @@ pub struct Reconstruction {
     pub measured: Record,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub forced: Vec<usize>,
-    /// RMS of the difference over the RMS of the measured force, a ratio per degree of freedom; `None` where
-    /// none acts.
+    /// RMS of the difference over the RMS of the measured force, a ratio per degree of freedom;
+    /// `None` where none acts.
     pub errors: Vec<Option<f64>>,
 }
 
 impl Reconstruction {
-    /// Reconstructs the force line by line on lines of the mean `period` where there are some, otherwise with
-    /// the method that suits an open record.
+    /// Reconstructs the force line by line on lines of the mean `period` where there are some,
+    /// otherwise with the method that suits an open record.
     ///
     /// # Errors
     /// [`AnalysisError::Force`] if the method refuses the record.

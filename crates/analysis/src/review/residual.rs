@@ -70,8 +70,8 @@ impl Residual {
     }
 }
 
-/// Returns the RMS of one channel of the measured response, and of its part that the prediction leaves, both
-/// in the unit of the channel.
+/// Returns the RMS of one channel of the measured response, and of its part that the prediction
+/// leaves, both in the unit of the channel.
 pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     let measured = compared.measured.channel(channel);
     let apart: Vec<f64> =

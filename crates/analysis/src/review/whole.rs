@@ -109,8 +109,8 @@ impl Gathered {
         Ok(())
     }
 
-    /// Returns the RMS, over all samples of one channel, of the deviation from the mean period, in the unit of
-    /// the channel; `None` for one period.
+    /// Returns the RMS, over all samples of one channel, of the deviation from the mean period, in
+    /// the unit of the channel; `None` for one period.
     pub fn scatter(&self, channel: usize) -> Option<f64> {
         self.periods.as_ref().map(|periods| periods.scatter(channel))
     }
@@ -132,8 +132,8 @@ impl Gathered {
 #[derive(Debug)]
 struct Periods {
     sums: DMatrix<f64>,
-    /// Sum of squares about the mean so far, over the scale: squares of the samples themselves would
-    /// lose it.
+    /// Sum of squares about the mean so far, over the scale: squares of the samples themselves
+    /// would lose it.
     squares: DMatrix<f64>,
     /// Scale of each channel: squares of large or small values leave the range of numbers.
     scales: Vec<f64>,

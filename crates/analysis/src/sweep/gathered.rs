@@ -73,7 +73,8 @@ pub(crate) enum Gathered {
 }
 
 impl Gathered {
-    /// Starts with no samples; they begin like these, and `period` of them are one of so many `periods`.
+    /// Starts with no samples; they begin like these, and `period` of them are one of so many
+    /// `periods`.
     pub(crate) fn new(
         estimator: Estimator,
         beginning: &Samples<'_>,
@@ -148,8 +149,8 @@ impl Decimated {
     /// Starts with no sample of a record of which this is held.
     ///
     /// # Errors
-    /// [`AnalysisError::DecimatedPeriod`] if one of several periods is no whole number of the samples
-    /// taken, and those of choosing lines.
+    /// [`AnalysisError::DecimatedPeriod`] if one of several periods is no whole number of the
+    /// samples taken, and those of choosing lines.
     pub fn new(
         estimator: Estimator,
         factor: usize,

@@ -56,8 +56,8 @@ pub struct Simulated {
 /// Callback that simulates an experiment; its error is a sentence.
 pub type Simulate<'a> = dyn Fn(&Experiment) -> Result<Simulated, String> + Sync + 'a;
 
-/// Identifies a described experiment at every setting; the machine described is the truth that errors
-/// are measured against.
+/// Identifies a described experiment at every setting; the machine described is the truth that
+/// errors are measured against.
 ///
 /// The number of samples in a period stays; with NPI a period holds that many cycles of the natural
 /// frequency, so that the step is 2π NPI / (samples · ωn). `progress` is called after each setting.
@@ -102,10 +102,10 @@ pub fn sweep_experiment(
 /// gone through once for all settings and not held. `progress` is called after each setting.
 ///
 /// # Errors
-/// [`AnalysisError::NpiOfRecord`], [`AnalysisError::SweepRate`] or [`AnalysisError::Decimation`] for
-/// settings that the record does not have, [`AnalysisError::DegreesOfFreedom`] if the reference has
-/// another number of them, [`AnalysisError::NoSetting`], [`AnalysisError::EmptySweep`] if no setting
-/// gives an estimate.
+/// [`AnalysisError::NpiOfRecord`], [`AnalysisError::SweepRate`] or [`AnalysisError::Decimation`]
+/// for settings that the record does not have, [`AnalysisError::DegreesOfFreedom`] if the reference
+/// has another number of them, [`AnalysisError::NoSetting`], [`AnalysisError::EmptySweep`] if no
+/// setting gives an estimate.
 pub fn sweep_record(
     measurement: &Measurement,
     how: &SweepSettings,

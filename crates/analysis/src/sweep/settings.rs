@@ -39,8 +39,8 @@ pub(crate) fn whole(value: f64) -> Option<usize> {
     is_whole.then_some(nearest as usize)
 }
 
-/// Settings of a sweep, a list of positive numbers: rates in Hz, or pure numbers such as samples per
-/// period; written as numbers and ranges first:step:last, separated by commas.
+/// Settings of a sweep, a list of positive numbers: rates in Hz, or pure numbers such as samples
+/// per period; written as numbers and ranges first:step:last, separated by commas.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Settings(

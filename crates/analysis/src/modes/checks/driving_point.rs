@@ -8,14 +8,14 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::super::sources::Output;
 use super::tested::Tested;
 
-/// Returns, for each driving point, the test that the modal masses there are positive: the residue of a
-/// displacement times 2jω_d has a positive real part.
+/// Returns, for each driving point, the test that the modal masses there are positive: the residue
+/// of a displacement times 2jω_d has a positive real part.
 ///
 /// The probability is that of the mode that contradicts most, times the number of modes.
 ///
 /// # Source
-/// Ewins, *Modal Testing*, 2nd ed. (2000), sections 3.6 and 4.2 (residues at a driving point have one
-/// sign).
+/// Ewins, *Modal Testing*, 2nd ed. (2000), sections 3.6 and 4.2 (residues at a driving point have
+/// one sign).
 pub(super) fn tests(
     modes: &[IdentifiedMode],
     inputs: &[String],
@@ -56,7 +56,8 @@ pub(super) fn receptance_residue(
     mode.residue(output, input) / mode.pole.powi(power)
 }
 
-/// Relative standard error of a residue, with errors of shape and participation taken as independent.
+/// Relative standard error of a residue, with errors of shape and participation taken as
+/// independent.
 pub(super) fn relative_error(mode: &IdentifiedMode, output: usize, input: usize) -> f64 {
     let of = |value: Complex<f64>, error: Complex<f64>| error.norm() / value.norm();
     of(mode.shape[output], mode.shape_standard_error[output])

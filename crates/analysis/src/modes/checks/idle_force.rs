@@ -8,8 +8,8 @@ use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Returns, for each of several forces, the check that it drives some mode: all its participations are
-/// zero with probability p.
+/// Returns, for each of several forces, the check that it drives some mode: all its participations
+/// are zero with probability p.
 ///
 /// # Source
 /// Wald's test of the participations, two degrees of freedom for each mode.

@@ -1,4 +1,5 @@
-//! Reciprocity between driving points: the response at one to a force at the other, and the reverse.
+//! Reciprocity between driving points: the response at one to a force at the other, and the
+//! reverse.
 
 use mechid_io::derivative;
 use mechid_modal::IdentifiedMode;
@@ -8,8 +9,8 @@ use super::super::sources::Output;
 use super::driving_point::{receptance_residue, relative_error};
 use super::tested::Tested;
 
-/// Returns, for each pair of driving points, the test that the residues of all modes are the same in
-/// both directions.
+/// Returns, for each pair of driving points, the test that the residues of all modes are the same
+/// in both directions.
 ///
 /// Errors of shapes and participations are taken as independent; those of the common scale are not,
 /// which makes the test a cautious one.

@@ -13,7 +13,8 @@ use crate::measurement::Channels;
 use crate::measurement::units::doubt;
 use crate::text::significant;
 
-/// Returns the checks of tables; `settled` says whether what a window blunts was separated from the modes.
+/// Returns the checks of tables; `settled` says whether what a window blunts was separated from the
+/// modes.
 pub(in super::super) fn of_tables(
     tables: &Tables,
     band_hz: [f64; 2],
@@ -42,8 +43,8 @@ fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
     findings.map(check).collect()
 }
 
-/// Median coherence over the rows and functions of a table. It does not weigh the fit, in which noise
-/// and unmeasured forces are estimated from the residual.
+/// Median coherence over the rows and functions of a table. It does not weigh the fit, in which
+/// noise and unmeasured forces are estimated from the residual.
 fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     let values = table.coherence.iter();
     let mut values: Vec<f64> = values.flat_map(|c| rows.iter().map(|row| c.values[*row])).collect();
@@ -66,8 +67,8 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     Some(ModalCheck { code: "coherence", passed, value: median, text })
 }
 
-/// Width of the narrowest resonance in lines; `None` of periods and of hits, which no window blunts, and
-/// of unevenly spaced frequencies without segments.
+/// Width of the narrowest resonance in lines; `None` of periods and of hits, which no window
+/// blunts, and of unevenly spaced frequencies without segments.
 fn leakage(
     table: &FrequencyResponses,
     averaged: Option<&Averaged>,
@@ -110,8 +111,8 @@ fn leakage(
     })
 }
 
-/// Deviation of a distance of two frequencies from the first one, relative to it, in spite of the digits of
-/// a file.
+/// Deviation of a distance of two frequencies from the first one, relative to it, in spite of the
+/// digits of a file.
 const EVEN: f64 = 1e-2;
 
 /// Returns the distance of the frequencies, in Hz, if all are the same.
