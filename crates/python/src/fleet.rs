@@ -125,7 +125,7 @@ pub fn fleet_summary(
 ) -> PyResult<(String, String)> {
     let parts = parts.iter().map(|part| failure::settings::<PartDone>(py, part));
     let parts = parts.collect::<PyResult<Vec<_>>>()?;
-    let summary = work::brief(py, || FleetSummary::of(parts, &folder, elapsed_s))?;
+    let summary = work::brief(py, || FleetSummary::from_parts(parts, &folder, elapsed_s))?;
     let summary = FleetSummary { left_out, ..summary };
     Ok((summary.to_string(), failure::json(py, &summary)?))
 }

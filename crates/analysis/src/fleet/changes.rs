@@ -1,44 +1,45 @@
-//! Steps and drifts of a quantity over many records: p-values by the ranks of its values.
+//! Steps and drifts of a quantity over many records, with p-values from ranks.
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Smallest number of records on either side of a step, and of a drift. Fewer are outliers.
+/// Minimum number of records on either side of a step, and of a drift; fewer are outliers.
 const LEAST: usize = 4;
 
-/// Number of orders at random behind a p-value. The least p-value is one over this.
+/// Maximum number of random permutations for a p-value; its inverse is about the smallest p-value.
 const ORDERS: usize = 9999;
 
-/// Number of orders that look as changed after which a p-value is known well enough; it is then
-/// about this over the number of orders tried.
+/// Number of permutations with at least the same change that end the test; the p-value is then
+/// about the ratio of this number to the number of permutations.
 ///
 /// # Source
 /// J. Besag and P. Clifford, "Sequential Monte Carlo p-values", Biometrika 78 (1991).
 const EXCEEDED: usize = 20;
 
-/// Number of records that a test shuffles one by one; of more, means of neighbours.
+/// Maximum number of records that a test permutes one by one; for more it permutes means of
+/// neighbours.
 const SHUFFLED: usize = 2000;
 
-/// p-value of a quantity, adjusted for the number of quantities, below which a change is told.
+/// Maximum p-value, adjusted for the number of quantities, of a reported change.
 pub const SIGNIFICANT: f64 = 0.01;
 
-/// Number of pairs of records at most from which a slope is computed, in each direction.
+/// Maximum number of records in the pairs for a slope.
 const SLOPES: usize = 400;
 
-/// Way in which a quantity changes.
+/// Kind of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChangeKind {
     /// Change from one level to another, between two records.
     Step,
-    /// Change by the same amount from record to record, from one record on.
+    /// Change by the same amount from record to record, beginning at one record.
     Drift,
 }
 
 impl ChangeKind {
-    /// Returns the word for it.
+    /// Returns the word for the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Step => "step",
@@ -58,8 +59,8 @@ pub(super) struct Change {
     pub size: f64,
 }
 
-/// Finds the changes of values in order: the largest, then those within its parts. `tests` is the
-/// number of lists that are looked at, for which each p-value is adjusted.
+/// Detects the changes in a list of values: the largest one, then the changes within its parts.
+/// `tests` is the number of tested lists, for the adjustment of p-values.
 pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut parts = vec![(0, values.len())];
@@ -81,8 +82,8 @@ pub(super) fn find(values: &[f64], tests: usize) -> Vec<Change> {
     changes
 }
 
-/// Returns for each value the level that it would have without noise: the medians between steps,
-/// and the line of a drift.
+/// Returns the level of each value without noise: the medians between steps, and the line of a
+/// drift.
 pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
     let mut levels = Vec::with_capacity(values.len());
     let mut start = 0;
@@ -101,21 +102,21 @@ pub(super) fn baseline(values: &[f64], changes: &[Change]) -> Vec<f64> {
     levels
 }
 
-/// The step or drift that explains most of some values, with the share of orders at random whose
-/// ranks one would explain as well. Both have one size and one beginning, so that the larger share
-/// is the likelier.
+/// Returns the step or drift with the largest share of the variance, and its p-value by a
+/// permutation test of the ranks. Step and drift have the same number of parameters, so their
+/// shares can be compared.
 fn largest(values: &[f64]) -> Option<Change> {
     if values.len() < 2 * LEAST {
         return None;
     }
-    // Ranks show whether there is a change, but squeeze its ends; values without single outliers
-    // show where.
+    // Ranks show whether there is a change, but distort its position; running medians, which remove
+    // single outliers, show the position.
     let (kind, begins, _) = best(&running_medians(values), LEAST)?;
     let ranks = ranks(values);
     let mut shuffled = means_of_neighbours(&ranks);
     let least = (LEAST * shuffled.len()).div_ceil(values.len()).max(1);
     let (_, _, explained) = best(&shuffled, least)?;
-    // The same seed for every list: the same rows give the same page.
+    // A fixed seed makes the result reproducible.
     let mut random = ChaCha8Rng::seed_from_u64(48);
     let (mut orders, mut exceeded) = (0, 0);
     while orders < ORDERS && exceeded < EXCEEDED {
@@ -136,7 +137,7 @@ fn largest(values: &[f64]) -> Option<Change> {
     Some(Change { kind, begins, p_value, size })
 }
 
-/// Ranks less their mean; equal values share their mean rank.
+/// Returns ranks minus their mean; equal values have their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -151,8 +152,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Medians of five neighbours, less their mean: a step stays where it is, one or two outliers are
-/// gone.
+/// Returns medians of five neighbours, minus their mean: they keep the position of a step and
+/// remove one or two outliers.
 fn running_medians(values: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
     let of_five =
@@ -170,8 +171,8 @@ fn means_of_neighbours(ranks: &[f64]) -> Vec<f64> {
     means.into_iter().map(|value| value - middle).collect()
 }
 
-/// The change that explains the largest share of the variance of values whose sum is zero: kind,
-/// beginning, share.
+/// Returns the change with the largest share of the variance of values with the sum zero: kind,
+/// beginning and share.
 fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     let len = values.len();
     let total: f64 = values.iter().map(|value| value * value).sum();
@@ -180,7 +181,7 @@ fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     }
     let mut best = (ChangeKind::Step, 0, 0.0);
     let n = len as f64;
-    // Sum of the values behind k, and of their distances from k times the values.
+    // Sum of the values after k, and sum of these values times their distances from k.
     let (mut behind, mut moment) = (0.0, 0.0);
     for k in (0..len).rev() {
         moment += behind;
@@ -204,7 +205,7 @@ fn best(values: &[f64], least: usize) -> Option<(ChangeKind, usize, f64)> {
     (best.2 > 0.0).then_some(best)
 }
 
-/// Median of the slopes between pairs of values.
+/// Returns the median of the slopes between pairs of values.
 ///
 /// # Source
 /// P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63 (1968).

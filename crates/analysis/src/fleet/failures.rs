@@ -13,7 +13,7 @@ pub struct FailureCount {
     pub code: String,
     /// Number of records.
     pub records: usize,
-    /// The first of them, by name.
+    /// The first record, by name.
     pub record: String,
     /// Failure of that record, in a sentence.
     pub message: String,

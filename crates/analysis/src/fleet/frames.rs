@@ -1,5 +1,5 @@
-//! Messages between a fleet and the processes that work for it: a length of four bytes, the lowest
-//! first, and so many bytes.
+//! Messages between a fleet and its worker processes: a length of four bytes (little endian), then
+//! the bytes of the message.
 
 use std::io::{self, ErrorKind, Read, Write};
 

@@ -1,18 +1,18 @@
-//! Tables of results of many records, part by part, that can be interrupted and continued.
+//! Tables of results of many records, computed in parts; a run can be interrupted and continued.
 //!
 //! | File | What it does |
 //! |---|---|
-//! | `part` | the unit of work: some records, whose rows become one file |
+//! | `part` | the unit of work: some records with one file of results |
 //! | `rows` | the rows of records of a file |
-//! | `worker`, `serve`, `frames` | rows computed in processes of their own, which a record may end |
+//! | `worker`, `serve`, `frames` | rows computed in separate processes, which can crash |
 //! | `table` | rows as columns of that file |
 //! | `trends` | the parameters of all records over their order or a number in their names |
 //! | `results` | the rows of all files, read back |
-//! | `summary` | how many records, how fast, and which failed why |
+//! | `summary` | number of records, speed, and failures with their reasons |
 //!
-//! The folder of results is the whole state: a part is computed where its file is missing, and its
-//! file appears complete or not at all. Whoever computes a part, in whatever order and process,
-//! writes the same rows.
+//! The folder of results is the whole state: a part is computed if its file is missing, and its
+//! file is written completely or not at all. The rows of a part do not depend on the order of the
+//! parts or on the process.
 
 mod changes;
 mod failures;
@@ -45,7 +45,7 @@ pub use self::trends::{OUTLIER, TrendAxis, TrendChange, TrendPoint, TrendSeries,
 pub use self::worker::{Isolation, RECORD_MEMORY_GB, RECORD_SECONDS, Worker};
 use crate::{AnalysisError, SavedAnalysis};
 
-/// Number of records in a part unless it is said.
+/// Default number of records in a part.
 pub const RECORDS_PER_PART: usize = 32;
 
 /// Many records, an analysis, and the folder of their results.
@@ -65,7 +65,7 @@ pub const RECORDS_PER_PART: usize = 32;
 /// let summary = fleet.run(2, &|_| ())?;
 /// assert_eq!((summary.records, summary.failed), (2, 1));
 /// assert_eq!(summary.failures[0].code, "io.read");
-/// // All is there: nothing is computed again.
+/// // All parts exist, so no record is computed again.
 /// assert_eq!(fleet.run(2, &|_| ())?.computed_records, 0);
 /// # std::fs::remove_dir_all(folder).unwrap();
 /// # Ok::<(), mechid_analysis::AnalysisError>(())
@@ -79,16 +79,15 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Divides records into parts of `records_per_part`, by rising path. A folder stands for the
-    /// files in it, and a file with a
-    /// [`Reading::record_column`](crate::measurement::Reading::record_column) for the records in
-    /// it, in the order of its rows; a record named twice is taken once. Named pipes, sockets and
-    /// devices are left out.
+    /// Divides records into parts of `records_per_part`, by rising path. A folder is replaced by
+    /// its files, and a file with a
+    /// [`Reading::record_column`](crate::measurement::Reading::record_column) by its records, in
+    /// the order of its rows; duplicates are removed. Named pipes, sockets and devices are ignored.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], [`AnalysisError::Setting`]
-    /// for parts without records and for results in a folder of records, and [`AnalysisError::Io`]
-    /// if a folder cannot be listed.
+    /// [`AnalysisError::NoRecord`], the errors of [`SavedAnalysis::check`],
+    /// [`AnalysisError::Setting`] for parts without records and for results in a folder of records,
+    /// and [`AnalysisError::Io`] if a folder cannot be listed.
     pub fn new(
         analysis: SavedAnalysis,
         records: &[PathBuf],
@@ -120,7 +119,7 @@ impl Fleet {
             return Err(AnalysisError::NoRecord);
         }
         let records: Vec<FleetRecord> =
-            files.into_iter().flat_map(|file| FleetRecord::of_file(file, &analysis)).collect();
+            files.into_iter().flat_map(|file| FleetRecord::from_file(file, &analysis)).collect();
         let parts = records.chunks(records_per_part).map(|some| Part::new(some, &analysis));
         Ok(Self { folder: folder.to_owned(), parts: parts.collect(), analysis, left_out })
     }
@@ -135,16 +134,16 @@ impl Fleet {
         self.parts.iter().map(|part| part.records().len()).sum()
     }
 
-    /// Returns the paths that can be no records, each with what it is.
+    /// Returns the paths that are not files, each with its kind.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
     }
 
-    /// Computes the parts that are missing, each record in a process that it may end, with
-    /// `workers` of them at a time, and calls `done` after each part.
+    /// Computes the missing parts in `workers` separate processes, so that a record that crashes
+    /// its process does not end the run, and calls `done` after each part.
     ///
     /// # Errors
-    /// Those of [`Fleet::run`] and [`Isolation::check`], and [`AnalysisError::RecordProcess`] if a
+    /// As [`Fleet::run`] and [`Isolation::check`], and [`AnalysisError::RecordProcess`] if a
     /// process cannot be started.
     pub fn run_isolated(
         &self,
@@ -159,19 +158,19 @@ impl Fleet {
         })
     }
 
-    /// Computes the parts that are missing, with `workers` threads of one record each at a time,
-    /// and calls `done` after each part.
+    /// Computes the missing parts in `workers` threads, one record per thread at a time, and calls
+    /// `done` after each part.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if a part cannot be written, [`AnalysisError::Setting`] if the system
-    /// does not give the threads. What was written stays; a later call goes on from there.
+    /// [`AnalysisError::Io`] if a part cannot be written, [`AnalysisError::Setting`] if the threads
+    /// cannot be created. Written parts remain, and a later call continues from there.
     pub fn run(
         &self,
         workers: usize,
         done: &(dyn Fn(&PartDone) + Sync),
     ) -> Result<FleetSummary, AnalysisError> {
         self.run_by(workers, done, &|| {
-            // A pool of one thread: an identification that divides its work does so within its
+            // The pool has one thread, so that parallel parts of an identification stay within its
             // worker.
             let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| {
                 AnalysisError::Setting { setting: "workers", why: error.to_string() }
@@ -180,8 +179,7 @@ impl Fleet {
         })
     }
 
-    /// Computes the parts that are missing, with `workers` threads, each with what `make` makes for
-    /// it.
+    /// Computes the missing parts in `workers` threads, each with a function from `make`.
     fn run_by<'a>(
         &'a self,
         workers: usize,
@@ -217,16 +215,15 @@ impl Fleet {
         }
         let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
         let elapsed_s = begun.elapsed().as_secs_f64();
-        let summary = FleetSummary::of(results, &self.folder, elapsed_s)?;
+        let summary = FleetSummary::from_parts(results, &self.folder, elapsed_s)?;
         Ok(FleetSummary { left_out: self.left_out.clone(), ..summary })
     }
 }
 
-/// What a thread computes a part with.
+/// Function that computes a part in a thread.
 type Compute<'a> = dyn FnMut(&Part) -> Result<PartDone, AnalysisError> + 'a;
 
-/// Refuses a folder of results as a record, and as the folder of one: a later run would take the
-/// results for records.
+/// Refuses results in a folder of records, because a later run would read them as records.
 fn refuse_results(record: &Path, results: &Path) -> Result<(), AnalysisError> {
     let Ok(results) = results.canonicalize() else { return Ok(()) };
     let Ok(record) = record.canonicalize() else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! The unit of work.
+//! Unit of work: a part of the records.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::batch::settings::hash;
 use crate::measurement::records_of;
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
-/// Key in a part's file under which its [`PartDone`] stands.
+/// Key of the [`PartDone`] in the file of a part.
 const DONE: &str = "mechid.part";
 
 /// A record to identify: a file, or some rows of one.
@@ -21,14 +21,14 @@ const DONE: &str = "mechid.part";
 pub struct FleetRecord {
     /// The file.
     pub path: PathBuf,
-    /// Rows of the file, where it holds many records; `None`: all of it is the record.
+    /// Rows of the record in a file of many records; `None`: the whole file.
     pub rows: Option<RecordRows>,
 }
 
 impl FleetRecord {
-    /// Returns the records of a file as the analysis reads it: those that a column tells apart, or
-    /// the file itself; so, too, where the file cannot be read, which its row will tell.
-    pub(super) fn of_file(path: PathBuf, analysis: &SavedAnalysis) -> Vec<Self> {
+    /// Returns the records of a file: those that the record column separates, or the file itself.
+    /// The row of a file that cannot be read will have the error.
+    pub(super) fn from_file(path: PathBuf, analysis: &SavedAnalysis) -> Vec<Self> {
         let column = analysis.reading.record_column.as_ref();
         let column = column.filter(|_| analysis.reading.record_id.is_none());
         match column.map(|column| records_of(&path, column, &analysis.reading)) {
@@ -41,14 +41,14 @@ impl FleetRecord {
     }
 }
 
-/// Some records, whose results become the rows of one file.
+/// Some records, with one file of results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
     records: Vec<FleetRecord>,
     file_name: String,
 }
 
-/// Callback that adds the rows of records of a file, all of it where no records are given.
+/// Callback that adds the rows of some records of a file, or of the whole file without records.
 type ComputeRows<'a> =
     dyn FnMut(&Path, &[RecordRows], &mut Vec<ResultRow>) -> Result<(), AnalysisError> + 'a;
 
@@ -57,29 +57,29 @@ type ComputeRows<'a> =
 pub struct PartDone {
     /// Name of its file in the folder of results.
     pub file_name: String,
-    /// Number of records, which is that of the rows.
+    /// Number of records and of rows.
     pub records: usize,
-    /// Records without a result, by the reason.
+    /// Counts of records without a result, by the reason.
     pub failures: Vec<FailureCount>,
-    /// `true` if it was computed now, `false` if it was there before.
+    /// `true` if it was computed now, `false` if it existed before.
     pub computed: bool,
 }
 
 impl Part {
-    /// Looks at the records and gives the part its name: a hash of their paths, sizes and times of
-    /// modification, of the analysis and of the version of this crate. A record that changes, or an
-    /// analysis that does, makes another part.
+    /// Creates a part. Its name is a hash of the paths, sizes and times of modification of its
+    /// records, of the analysis and of the version of this crate: a changed record or analysis
+    /// gives another part.
     pub fn new(records: &[FleetRecord], analysis: &SavedAnalysis) -> Self {
-        let mut all = format!("{}\n{}\n", env!("CARGO_PKG_VERSION"), analysis.hash());
+        let mut state = format!("{}\n{}\n", env!("CARGO_PKG_VERSION"), analysis.hash());
         for file in records.chunk_by(|a, b| a.path == b.path) {
             let path = &file[0].path;
             let stamp = FileStamp::of(path).map(|s| (s.bytes, s.modified_ns));
             for FleetRecord { rows, .. } in file {
-                // Quoted: no path looks like two.
-                all += &format!("{path:?} {stamp:?} {rows:?}\n");
+                // Quotes make the text of different paths different.
+                state += &format!("{path:?} {stamp:?} {rows:?}\n");
             }
         }
-        let file_name = format!("part-{}.parquet", hash(all.as_bytes()));
+        let file_name = format!("part-{}.parquet", hash(state.as_bytes()));
         Self { records: records.to_vec(), file_name }
     }
 
@@ -93,11 +93,10 @@ impl Part {
         &self.file_name
     }
 
-    /// Computes the rows and writes them into `folder`, unless the file is there.
+    /// Computes the rows and writes them into `folder`, unless the file exists.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if the file cannot be written. What is wrong with a record is in its
-    /// row.
+    /// [`AnalysisError::Io`] if the file cannot be written. The error of a record is in its row.
     pub fn run(&self, analysis: &SavedAnalysis, folder: &Path) -> Result<PartDone, AnalysisError> {
         self.written(folder, &mut |path, records, rows| {
             rows_of(path, records, analysis, &mut |row| {
@@ -107,10 +106,10 @@ impl Part {
         })
     }
 
-    /// Computes the rows as [`Part::run`] does, in a process of their own.
+    /// Computes the rows like [`Part::run`], in a separate process.
     ///
     /// # Errors
-    /// Those of [`Part::run`]; [`AnalysisError::RecordProcess`] if the process cannot be started.
+    /// As [`Part::run`]; [`AnalysisError::RecordProcess`] if the process cannot be started.
     pub fn run_isolated(
         &self,
         worker: &mut Worker,
@@ -151,7 +150,7 @@ impl Part {
             failures: FailureCount::of(&rows),
             computed: true,
         };
-        // As the next run finds it.
+        // The file has the values for a later run.
         let later = PartDone { computed: false, ..done.clone() };
         let later = serde_json::to_string(&later).unwrap_or_default();
         write_parquet(&path, &columns(&rows), &[(DONE, later)])?;

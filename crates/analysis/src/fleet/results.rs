@@ -1,4 +1,4 @@
-//! The table of results, read back as rows.
+//! Table of results, read as rows.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -10,22 +10,22 @@ use mechid_io::{FileStamp, Limits, ParameterCovariance, ParquetCell, files_of, r
 use crate::batch::{FindingRow, ModeCell, ParameterCell, RowError};
 use crate::{AnalysisError, ResultRow};
 
-/// Rows of results, each record once.
+/// Rows of results, one for each record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Results {
-    /// The rows, by rising record.
+    /// Rows by rising record.
     pub rows: Vec<ResultRow>,
-    /// Number of older rows of the same records, in parts from before a record or the analysis
-    /// changed.
+    /// Number of older rows of the same records, from parts before a change of a record or the
+    /// analysis.
     pub superseded: usize,
 }
 
-/// Reads the rows of all parts in a folder of results, by rising record, as they were written. Of
-/// several rows of one record, the one in the part written last counts.
+/// Reads the rows of all parts in a folder of results, by rising record. If a record has several
+/// rows, the row in the part written last counts.
 ///
 /// # Errors
-/// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if it
-/// holds no row.
+/// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if
+/// there is no row.
 pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> {
     let mut parts: Vec<(u128, PathBuf)> = Vec::new();
     for path in files_of(folder.as_ref())? {
@@ -38,7 +38,7 @@ pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> 
             parts.push((written, path));
         }
     }
-    // The newest last, which replaces the rows before it.
+    // The newest part comes last and replaces earlier rows.
     parts.sort();
     let (mut places, mut rows) = (HashMap::new(), Vec::<ResultRow>::new());
     let mut superseded = 0;
@@ -57,7 +57,7 @@ pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> 
             }
         }
     }
-    // Stable: the records of one file stay in the order of its rows.
+    // A stable sort keeps the records of one file in the order of its rows.
     rows.sort_by(|a, b| a.record.cmp(&b.record));
     if rows.is_empty() { Err(AnalysisError::NoRecord) } else { Ok(Results { rows, superseded }) }
 }

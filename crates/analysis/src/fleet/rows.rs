@@ -1,4 +1,4 @@
-//! The rows of records of a file, one after the other.
+//! Rows of the records of a file, one after the other.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use mechid_io::{RecordRows, path_text};
 use crate::measurement::{Measurement, open_all};
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
-/// Number of rows read at a time of a file that holds many records, unless one of them has more.
+/// Number of rows of a file with many records that are read at a time, unless one record has more.
 const ROWS_AT_ONCE: usize = 1 << 20;
 
-/// Identifies records of a file, all of it where `records` is empty, and passes their rows to
-/// `take` in their order.
+/// Identifies some records of a file, or the whole file if `records` is empty, and passes their
+/// rows to `take` in their order.
 ///
 /// # Errors
-/// Those of `take`. What is wrong with a record is in its row.
+/// As `take`. The error of a record is in its row.
 pub(super) fn rows_of<E>(
     path: &Path,
     records: &[RecordRows],
@@ -36,19 +36,19 @@ pub(super) fn rows_of<E>(
 
 /// Divides records of a file into those that are read together.
 fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> {
-    let mut rest = records;
+    let mut remaining = records;
     std::iter::from_fn(move || {
-        let start = rest.first()?.rows.start;
+        let start = remaining.first()?.rows.start;
         let count =
-            rest.iter().take_while(|record| record.rows.end - start <= ROWS_AT_ONCE).count();
-        let (together, others) = rest.split_at(count.max(1));
-        rest = others;
+            remaining.iter().take_while(|record| record.rows.end - start <= ROWS_AT_ONCE).count();
+        let (together, later) = remaining.split_at(count.max(1));
+        remaining = later;
         Some(together)
     })
 }
 
-/// Opens records of a file that follow one another; where their rows cannot be read together, one
-/// by one.
+/// Opens consecutive records of a file together, or one by one if their rows cannot be read
+/// together.
 fn open(
     path: &Path,
     records: &[RecordRows],

@@ -1,4 +1,4 @@
-//! The side of the process that works for a fleet.
+//! Worker process of a fleet.
 
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
@@ -16,21 +16,21 @@ use super::results_as_parquet;
 use super::rows::rows_of;
 use crate::SavedAnalysis;
 
-/// Message of a process that has begun: what ends it from then on is the work on a record.
+/// Message of a process that is ready: a later crash is due to a record.
 pub(super) const READY: &[u8] = b"";
 
-/// First message: what to do with the records that follow.
+/// First message: the analysis of the records that follow.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     pub analysis: SavedAnalysis,
-    /// Memory that the process may take, in bytes.
+    /// Maximum memory of the process, in bytes.
     pub memory_bytes: Option<u64>,
 }
 
-/// A further message: records of a file, all of it if there are none.
+/// A further message: some records of a file, or the whole file without records.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
-    /// Name of the file, in the form that the system has for names.
+    /// Name of the file, in the encoding of the system.
     path: Vec<u8>,
     records: Vec<(String, Range<usize>)>,
 }
@@ -62,12 +62,12 @@ impl Order {
     }
 }
 
-/// Works for a fleet in another process, which sends records through `input` and gets their rows
-/// through `output`, until the input ends. Then this process ends, whatever it is doing: whoever
-/// waited for it is no more.
+/// Works for a fleet in another process, which sends records through `input` and receives their
+/// rows through `output`. At the end of the input this process exits immediately, because the fleet
+/// has ended.
 ///
 /// # Errors
-/// Those of the streams, and of messages that a fleet does not send.
+/// Errors of the streams, and of invalid messages.
 pub fn serve(
     mut input: impl Read + Send + 'static,
     mut output: impl Write + Send,
@@ -98,8 +98,7 @@ pub fn serve(
     })
 }
 
-/// Takes no more than so many bytes of memory from now on: an allocation beyond them ends the
-/// process.
+/// Limits the memory of this process: an allocation above the limit ends it.
 fn limit_memory(bytes: Option<u64>) -> io::Result<()> {
     #[cfg(target_os = "linux")]
     if let Some(bytes) = bytes {

@@ -16,7 +16,7 @@ use crate::text::compact;
 /// Result of a run over many records.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetSummary {
-    /// Number of records, which is that of the rows.
+    /// Number of records and of rows.
     pub records: usize,
     /// Number of records without a result.
     pub failed: usize,
@@ -24,25 +24,29 @@ pub struct FleetSummary {
     pub failures: Vec<FailureCount>,
     /// Number of parts.
     pub parts: usize,
-    /// Number of parts computed now; the others were there.
+    /// Number of parts computed now; the others existed before.
     pub computed_parts: usize,
     /// Number of records in the parts computed now.
     pub computed_records: usize,
-    /// Number of parts in the folder that are of other records, of another version of these, or of
+    /// Number of parts in the folder with other records, other versions of these records, or
     /// another analysis.
     pub other_parts: usize,
-    /// Paths that can be no records, each with what it is: named pipes, sockets, devices.
+    /// Paths that are not files, each with its kind: named pipes, sockets, devices.
     pub left_out: Vec<String>,
     /// Time of the run, in s.
     pub elapsed_s: f64,
 }
 
 impl FleetSummary {
-    /// Gathers the parts of a run that took `elapsed_s` seconds and wrote into `folder`.
+    /// Summarises the parts of a run of `elapsed_s` seconds that wrote into `folder`.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the folder cannot be listed.
-    pub fn of(parts: Vec<PartDone>, folder: &Path, elapsed_s: f64) -> Result<Self, AnalysisError> {
+    pub fn from_parts(
+        parts: Vec<PartDone>,
+        folder: &Path,
+        elapsed_s: f64,
+    ) -> Result<Self, AnalysisError> {
         let ours: BTreeSet<&str> = parts.iter().map(|part| part.file_name.as_str()).collect();
         let other = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();

@@ -5,7 +5,8 @@ use mechid_io::{ParquetColumn, ParquetValues, parquet_bytes};
 use crate::batch::{FindingRow, ModeCell, ParameterCell};
 use crate::{AnalysisError, ResultRow};
 
-/// Returns rows of results as the bytes of a Parquet file, with the columns of a fleet's parts.
+/// Returns rows of results as the bytes of a Parquet file, with the columns of the parts of a
+/// fleet.
 ///
 /// # Errors
 /// As [`parquet_bytes`].
@@ -13,7 +14,7 @@ pub fn results_as_parquet(rows: &[ResultRow]) -> Result<Vec<u8>, AnalysisError> 
     Ok(parquet_bytes(&columns(rows))?)
 }
 
-/// Returns the columns of the table of results: the same ones whatever the rows hold.
+/// Returns the columns of the table of results, which do not depend on the rows.
 pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
     let text = |value: &dyn Fn(&ResultRow) -> Option<String>| {
         ParquetValues::Text(rows.iter().map(value).collect())

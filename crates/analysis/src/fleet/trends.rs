@@ -1,4 +1,4 @@
-//! The results of many records side by side: parameters over records, outliers, failures.
+//! Trends of the results of many records: parameters over records, outliers, failures.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -14,30 +14,30 @@ use super::results::{Results, read_results};
 use crate::text::{significant, text_table};
 use crate::{AnalysisError, ResultRow};
 
-/// Distance from the median, in robust standard deviations, beyond which a value is an outlier.
+/// Maximum distance of a value from the median, in robust standard deviations; outliers have more.
 ///
 /// # Source
 /// Iglewicz & Hoaglin, *How to Detect and Handle Outliers* (1993): the modified z score, limit 3.5.
 pub const OUTLIER: f64 = 3.5;
 
-/// Standard deviation of a normal distribution over its median absolute deviation.
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
 const NORMAL_OVER_MAD: f64 = 1.482_602_218_505_602;
 
-/// Number of outliers that the text lists.
+/// Maximum number of outliers in the text.
 const LISTED: usize = 10;
 
 /// Order of the records in a trend.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrendAxis {
-    /// The records one after the other, by their names, counted from 1.
+    /// Position of the record in the order of names, counted from 1.
     #[default]
     Order,
-    /// The last number in the name of a record, such as 1500 in `speed-1500.csv`.
+    /// Last number in the name of a record, such as 1500 in `speed-1500.csv`.
     Number,
 }
 
-/// Parameters and modes of many records, each over the records.
+/// Parameters and modes of many records as functions of the record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trends {
     /// Order of the records.
@@ -48,11 +48,11 @@ pub struct Trends {
     pub failed: usize,
     /// Failures by their code, the most frequent first.
     pub failures: Vec<FailureCount>,
-    /// Number of older rows left out, of records that a later part holds, too.
+    /// Number of ignored older rows of records with a later row.
     pub superseded: usize,
-    /// Number of records left out because their names hold no number.
+    /// Number of ignored records without a number in their names.
     pub without_number: usize,
-    /// Number of analyses and versions that the rows come from; several are not comparable.
+    /// Number of different analyses and versions of the rows; several are not comparable.
     pub analyses: usize,
     /// One series for each parameter, natural frequency and damping ratio.
     pub series: Vec<TrendSeries>,
@@ -83,15 +83,15 @@ pub struct TrendSeries {
 pub struct TrendChange {
     /// Step or drift.
     pub kind: ChangeKind,
-    /// Name of the record from which on the quantity has another value.
+    /// Name of the first record with a changed value.
     pub record: String,
-    /// Place of that record on the axis, a pure number.
+    /// Position of that record on the axis, a pure number.
     pub at: f64,
-    /// Change of the level by a step, or from the beginning of a drift to the last record, in the
-    /// unit of the series.
+    /// Size of a step, or change from the beginning of a drift to the last record, in the unit of
+    /// the series.
     pub size: f64,
-    /// Probability that records in an order at random look as changed, adjusted for the number of
-    /// series.
+    /// Probability of at least this change for a random order of the records, adjusted for the
+    /// number of series.
     pub p_value: f64,
 }
 
@@ -100,17 +100,17 @@ pub struct TrendChange {
 pub struct TrendPoint {
     /// Name of the record.
     pub record: String,
-    /// Place of the record on the axis, a pure number: that in its name, or its position counted
-    /// from 1.
+    /// Position of the record on the axis, a pure number: the number in its name, or its index from
+    /// 1.
     pub at: f64,
     /// Value, in the unit of the series.
     pub value: f64,
     /// Standard error, in the same unit.
     pub standard_error: Option<f64>,
-    /// Ends of the 95 % interval, in the same unit.
+    /// Limits of the 95 % interval, in the same unit.
     pub interval: Option<[f64; 2]>,
-    /// `true` if the value is farther from the median than [`OUTLIER`] standard deviations, those
-    /// of the series and of the value together.
+    /// `true` if the distance of the value from its level is more than [`OUTLIER`] times the
+    /// combined standard deviation of the series and of the value.
     pub is_outlier: bool,
 }
 
@@ -124,7 +124,7 @@ impl Trends {
         Ok(Self { superseded, ..Self::of(&rows, over) })
     }
 
-    /// Gathers rows, in the order given.
+    /// Computes the trends of rows, in the order given.
     pub fn of(rows: &[ResultRow], over: TrendAxis) -> Self {
         let failures = FailureCount::of(rows);
         let mut placed: Vec<(f64, &ResultRow)> = Vec::new();
@@ -185,8 +185,8 @@ impl Trends {
 }
 
 impl TrendSeries {
-    /// Finds changes, computes median and spread, and marks the outliers: values far from the level
-    /// of their records, not from that of all.
+    /// Detects changes, computes median and spread, and marks the outliers: values far from the
+    /// level at their record.
     fn judge(&mut self, tests: usize) {
         let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
         self.median = median(values.clone());
@@ -256,15 +256,18 @@ impl Trends {
         self.series.iter().flat_map(|one| one.changes.iter().map(move |change| (one, change)))
     }
 
-    /// Returns a table with one row per value: quantity, unit, record, place on the axis, value,
-    /// standard error, whether it is an outlier, and the kind, size and p-value of a change that
+    /// Returns a table with one row per value: quantity, unit, record, position on the axis, value,
+    /// standard error, the flag of an outlier, and the kind, size and p-value of a change that
     /// begins there.
     pub fn csv(&self) -> String {
         let header = "quantity,unit,record,at,value,standard_error,outlier,change,change_size,change_p_value";
         let mut text = format!("{header}\n");
-        let quoted = |cell: &str| match cell.contains([',', '"', '\n', '\r']) {
-            true => format!("\"{}\"", cell.replace('"', "\"\"")),
-            false => cell.to_owned(),
+        let quoted = |cell: &str| {
+            if cell.contains([',', '"', '\n', '\r']) {
+                format!("\"{}\"", cell.replace('"', "\"\""))
+            } else {
+                cell.to_owned()
+            }
         };
         for series in &self.series {
             for point in &series.points {
@@ -290,7 +293,7 @@ impl Trends {
     }
 }
 
-/// Names, units and values of what a row says of its machine.
+/// Returns names, units and values of the parameters and modes of a row.
 fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
     let degrees_of_freedom = row.covariance.as_ref().map_or(0, |c| c.degrees_of_freedom);
     let uncertain = |value: f64, standard_error: Option<f64>| Uncertain {
@@ -309,11 +312,11 @@ fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
             (format!("damping ratio {number}"), String::new(), ratio),
         ]
     });
-    let all = of_parameters.chain(of_modes);
-    all.filter(|(.., value)| value.value.is_finite()).collect()
+    let quantities = of_parameters.chain(of_modes);
+    quantities.filter(|(.., value)| value.value.is_finite()).collect()
 }
 
-/// Returns the name of a record as messages show it.
+/// Returns the name of a record for messages.
 fn name_of(row: &ResultRow) -> String {
     match &row.record_id {
         Some(id) => id.clone(),
@@ -321,7 +324,7 @@ fn name_of(row: &ResultRow) -> String {
     }
 }
 
-/// Returns the last number in the name of a record, without its folder and ending.
+/// Returns the last number in the name of a record, without its folder and extension.
 fn number_in(row: &ResultRow) -> Option<f64> {
     let stem = match &row.record_id {
         Some(id) => id.clone(),

@@ -1,4 +1,4 @@
-//! Modes of an ambient record, as numbers for people and programs.
+//! Modes of an ambient record.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ use crate::measurement::Measurement;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::significant;
 
-/// Finds the modes of the only record of an ambient test.
+/// Identifies the modes of the only record of an ambient test.
 pub(super) fn modes(
     measurements: &[Measurement],
     settings: &ModesSettings,
@@ -59,7 +59,7 @@ pub(super) fn modes(
         p_value: h.p_value,
     };
     let summary = ModesSummary {
-        records: vec![RecordRow::of_block(&block)],
+        records: vec![RecordRow::from_block(&block)],
         hits: Vec::new(),
         inputs: Vec::new(),
         outputs: outputs.into_iter().map(output_row).collect(),
@@ -72,7 +72,7 @@ pub(super) fn modes(
         harmonics: estimate.harmonics.iter().map(harmonic).collect(),
         variance_explained: None,
         variance_predicted: None,
-        checks: checks::of_channels(measurements)?,
+        checks: checks::channel_checks(measurements)?,
         notes: notes(&estimate),
         diagrams: None,
         analysis: settings.clone(),
@@ -102,7 +102,7 @@ fn row(mode: &AmbientMode) -> ModalModeRow {
         value: [value.re, value.im],
         standard_error: Some([error(at), error(shape.len() + at)]),
     });
-    // The damping ratio changes the damped frequency by less than its error.
+    // The error of the damping ratio is negligible in the damped frequency.
     let damped = |value: &ModalValue| {
         let scale = |x: f64| root * x;
         Uncertain {

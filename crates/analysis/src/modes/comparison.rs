@@ -13,16 +13,16 @@ use crate::AnalysisError;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::{paged_table, significant, text_table};
 
-/// Two sets of modes side by side.
+/// Comparison of two sets of modes.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModeComparison {
     /// Names of the two sets.
     pub sets: [String; 2],
-    /// Points that both sets have, by their names in the first.
+    /// Common points of both sets, by their names in the first.
     pub points: Vec<String>,
-    /// Modes of one set and the other that are one, by rising frequency of the first set.
+    /// Pairs of equal modes of both sets, by rising frequency of the first set.
     pub pairs: Vec<PairRow>,
     /// Modes of the first set without a partner.
     pub only_first: Vec<LoneRow>,
@@ -48,8 +48,8 @@ pub struct PairRow {
     pub mac: f64,
     /// Standard error of the criterion, a pure number.
     pub mac_standard_error: f64,
-    /// Probability of a difference of the shapes as large by their errors alone, adjusted for all
-    /// tests; `None` without errors, or at a single point.
+    /// Probability of a larger difference of the shapes due to their errors alone, adjusted for the
+    /// number of tests; `None` without errors, or at a single point.
     pub shape_p_value: Option<f64>,
 }
 
@@ -60,12 +60,12 @@ pub struct DifferenceRow {
     pub first: f64,
     /// Value in the second set.
     pub second: f64,
-    /// Second less first.
+    /// Second value minus first value.
     pub difference: f64,
     /// Standard error of the difference, in the same unit; 0 if both values are exact.
     pub standard_error: f64,
-    /// Probability of a difference as large by the errors alone, adjusted for all tests of the
-    /// comparison; `None` if both values are exact.
+    /// Probability of a larger difference due to the errors alone, adjusted for the number of
+    /// tests; `None` if both values are exact.
     pub p_value: Option<f64>,
 }
 
@@ -78,18 +78,19 @@ pub struct LoneRow {
     pub natural_frequency_hz: f64,
 }
 
-/// Compares two sets of modes at the points that they have in common: pairs by frequency and shape,
-/// differences over their standard errors, and modes without a partner.
+/// Compares two sets of modes at their common points: pairs by frequency and shape, differences
+/// with their standard errors, and modes without a partner.
 ///
-/// Points are the same if their names are. A name without a direction (`3`) is that of the only
-/// direction that the other set has there (`3+Z`). Sets without a name in common, but with as many
-/// entries, are compared entry by entry where the names of one of them are numbers from 1.
+/// Points with the same name are the same. A name without a direction (`3`) stands for the only
+/// direction of the other set at this point (`3+Z`). Sets without a common name, but with the same
+/// number of entries, are compared entry by entry if the names of one of them are the numbers from
+/// 1.
 ///
 /// # Errors
-/// [`AnalysisError::NoCommonPoint`] if they have none.
+/// [`AnalysisError::NoCommonPoint`] without a common point.
 ///
 /// # Source
-/// That of [`mechid_modal::compare::compare`].
+/// As [`mechid_modal::compare::compare`].
 pub fn compare_modes(first: &ModeSet, second: &ModeSet) -> Result<ModeComparison, AnalysisError> {
     let common = common_points(first, second)?;
     let one: Vec<(usize, f64)> = common.iter().map(|(i, _, _)| (*i, 1.0)).collect();
@@ -131,7 +132,7 @@ pub fn compare_modes(first: &ModeSet, second: &ModeSet) -> Result<ModeComparison
     })
 }
 
-/// Returns the entries of both sets that belong together, with the sign of the second.
+/// Returns the corresponding entries of both sets, with the sign of the second.
 fn common_points(
     first: &ModeSet,
     second: &ModeSet,
@@ -140,7 +141,8 @@ fn common_points(
         second.points.iter().position(|other| other == name).map(|at| (at, 1.0)).or_else(|| {
             let directions = |at: &usize| same_direction(name, &second.points[*at]);
             let mut some = (0..second.points.len()).filter_map(|at| Some((at, directions(&at)?)));
-            // Of several directions at a point, a name without one means none of them.
+            // A name without a direction is ambiguous if the other set has several directions
+            // there.
             some.next().filter(|_| some.next().is_none())
         })
     };
@@ -166,10 +168,10 @@ fn common_points(
     Ok(common)
 }
 
-/// Number of points that a message lists.
+/// Maximum number of points in a message.
 const LISTED: usize = 6;
 
-/// Returns the sign of one name for the other if both may be the same point and direction.
+/// Returns the relative sign of two names if they can be the same point and direction.
 fn same_direction(one: &str, other: &str) -> Option<f64> {
     match (Direction::parse(one), Direction::parse(other)) {
         (Some(a), Some(b)) if a.point == b.point && a.axis == b.axis => {
@@ -192,7 +194,7 @@ impl DifferenceRow {
         }
     }
 
-    /// First, second, difference and its error, and probability, of values times a factor.
+    /// Returns the cells of a row, with all values multiplied by a factor.
     fn cells(&self, factor: f64, digits: usize) -> Vec<String> {
         let number = |value: f64, digits| significant(factor * value, digits);
         let mut cells = vec![number(self.first, digits), number(self.second, digits)];
@@ -214,7 +216,7 @@ impl PairRow {
         format!("{} – {}", self.first, self.second)
     }
 
-    /// What differs by more than the errors allow.
+    /// Returns the names of the quantities with a significant difference.
     fn changes(&self) -> Vec<&'static str> {
         let mut changes = Vec::new();
         if self.natural_frequency_hz.has_changed() {
@@ -269,7 +271,7 @@ impl ModeComparison {
 }
 
 impl ModeComparison {
-    /// What has changed, modes without a partner, and what to know of the numbers.
+    /// Returns remarks about changed modes, modes without a partner, and a comparison at one point.
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         for pair in self.pairs.iter().filter(|pair| !pair.changes().is_empty()) {

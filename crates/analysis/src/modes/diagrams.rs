@@ -12,10 +12,10 @@ use serde::Serialize;
 
 use crate::AnalysisError;
 
-/// Diagrams from which a person judges the number of modes.
+/// Diagrams for a choice of the number of modes.
 #[derive(Debug, Clone, Serialize)]
 pub struct Diagrams {
-    /// Poles of models of rising order, from which the search for the modes started.
+    /// Poles of models of rising order: the initial estimates of the modes.
     pub stabilisation: StabilisationRows,
     /// Complex mode indicator function; `None` without measured forces.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -31,27 +31,28 @@ pub struct StabilisationRows {
     pub frequency_hz: Vec<f64>,
     /// Damping ratios, pure numbers, one for each pole.
     pub damping_ratio: Vec<f64>,
-    /// Flags, one for each pole: frequency and damping (and the shape, of ambient records) repeat
-    /// those of a pole of the order below.
+    /// Flags, one for each pole: true if frequency and damping (for ambient records also the shape)
+    /// agree with a pole of the order below.
     pub is_stable: Vec<bool>,
 }
 
 /// Singular values of the frequency responses at each frequency.
 ///
-/// Peaks of the first are modes; a peak of the second at the same frequency is a second mode there.
+/// Peaks of the first singular value are modes; a peak of the second one at the same frequency is a
+/// second mode.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModeIndicator {
-    /// `true` of measured responses (tables), `false` of those of the identified modes and residual
-    /// terms (records).
+    /// `true` for measured responses (tables), `false` for the responses of the identified modes
+    /// and residual terms (records).
     pub is_measured: bool,
     /// Frequencies, in Hz, one per singular value of a list.
     pub frequency_hz: Vec<f64>,
-    /// Singular values, falling, each a list with one value for each frequency; responses over
-    /// their RMS in the band per force over its RMS; pure numbers.
+    /// Singular values, the largest first, each a list with one value for each frequency: pure
+    /// numbers, because responses and forces are divided by their RMS in the band.
     pub singular_values: Vec<Vec<f64>>,
 }
 
-/// Data from which the diagrams follow.
+/// Data of the diagrams.
 #[derive(Debug)]
 pub(super) enum DiagramData {
     Forced(Box<Forced>),
@@ -141,11 +142,11 @@ impl ModeIndicator {
     }
 }
 
-/// Frequencies (rad/s), and the response at each.
+/// Frequencies (rad/s), and the response at each frequency.
 type MeasuredResponses = (Vec<f64>, Vec<DMatrix<Complex<f64>>>);
 
-/// Returns the frequencies (rad/s) and responses, outputs × inputs, of a table in which every force
-/// has one record on the same lines; `None` of others.
+/// Returns the frequencies (rad/s) and responses, outputs × inputs, of a table with one record for
+/// every force on the same lines; `None` for other tables.
 fn measured_responses(data: &LineData) -> Option<MeasuredResponses> {
     let (inputs, outputs) = (data.inputs().ncols(), data.outputs().ncols());
     let records = data.records();

@@ -1,4 +1,4 @@
-//! The fit of a test with measured forces, as numbers for people and programs.
+//! Fit of a test with measured forces, and its result.
 
 use std::f64::consts::TAU;
 
@@ -21,13 +21,13 @@ use crate::AnalysisError;
 use crate::hits::HitRow;
 use crate::text::significant;
 
-/// Records of a test, and the band that is fitted.
+/// Records of a test, and the band of the fit.
 pub(super) struct Test {
     pub recorded: Recorded,
     pub band_hz: [f64; 2],
 }
 
-/// What the result says beside the fit.
+/// Parts of the result that do not come from the fit.
 struct Context {
     records: Vec<RecordRow>,
     hits: Vec<HitRow>,
@@ -40,19 +40,20 @@ struct Context {
     predicted: Option<Vec<f64>>,
     /// `true` if the data are tables of frequency responses.
     is_table: bool,
-    /// Decay rate, in 1/s, that an exponential window adds to that of every mode.
+    /// Decay rate, in 1/s, that an exponential window adds to every mode.
     added_decay: Option<f64>,
 }
 
-/// Modes as they were fitted and as they are reported: without the decay of an exponential window.
+/// Fit of the modes.
 struct Fit {
     data: LineData,
     estimate: ModalEstimate,
+    /// Modes of the result: without the decay of an exponential window.
     modes: Vec<IdentifiedMode>,
 }
 
 impl Test {
-    /// Fits the modes, and once more to the beginning of the records where that was asked for.
+    /// Fits the modes, and for a validation also the beginning of the records.
     pub fn modes(
         self,
         records: Vec<RecordRow>,
@@ -123,13 +124,13 @@ pub(super) fn modes_of_tables(
     let remarks = tables.with_segments().flat_map(|(table, _)| table.remarks.iter().cloned());
     notes.extend(remarks);
     let context = Context {
-        records: tables.with_segments().map(|(table, _)| RecordRow::of_table(table)).collect(),
+        records: tables.with_segments().map(|(table, _)| RecordRow::from_table(table)).collect(),
         hits: Vec::new(),
         inputs: tables.forces.clone(),
         driving_points: tables.driving_points(),
         outputs,
         band_hz,
-        checks: checks::of_tables(tables, band_hz, &modes, settled),
+        checks: checks::table_checks(tables, band_hz, &modes, settled),
         notes,
         predicted: None,
         is_table: true,
@@ -164,17 +165,17 @@ fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisEr
 }
 
 fn engine_settings(settings: &ModesSettings) -> ModalSettings {
-    let usual = ModalSettings::default();
+    let default = ModalSettings::default();
     ModalSettings {
         modes: settings.modes,
-        max_modes: settings.max_modes.unwrap_or(usual.max_modes),
+        max_modes: settings.max_modes.unwrap_or(default.max_modes),
         near_hz: settings.near_hz.clone(),
-        ..usual
+        ..default
     }
 }
 
-/// Share of the variance of each output at the end of the records that a fit to their beginning
-/// explains.
+/// Returns the share of the variance of each output at the end of the records that a fit to their
+/// beginning predicts.
 fn predicted(
     recorded: &Recorded,
     band_hz: [f64; 2],
@@ -200,9 +201,9 @@ fn predicted(
     };
     let fitted =
         identify_modes(&part(0.0, 1.0 - share)?.lines(band_hz)?, &engine_settings(settings))?;
-    let rest = part(1.0 - share, 1.0)?.lines(band_hz)?;
-    let model = fitted.synthesis(&rest)?;
-    Ok(explained(rest.outputs(), &model))
+    let end = part(1.0 - share, 1.0)?.lines(band_hz)?;
+    let model = fitted.synthesis(&end)?;
+    Ok(explained(end.outputs(), &model))
 }
 
 impl Context {
@@ -211,8 +212,13 @@ impl Context {
         let names: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let explained = estimate.variance_explained();
         let mut rows = self.checks;
-        rows.extend(checks::of_outputs(&explained, &names));
-        rows.extend(checks::of_modes(&reported, &self.inputs, &self.outputs, &self.driving_points));
+        rows.extend(checks::output_checks(&explained, &names));
+        rows.extend(checks::mode_checks(
+            &reported,
+            &self.inputs,
+            &self.outputs,
+            &self.driving_points,
+        ));
         let fitted = reported.iter().zip(estimate.modes());
         let modes: Vec<ModalModeRow> = fitted
             .map(|(mode, fitted)| row(mode, fitted, &self.outputs, &self.driving_points))
@@ -258,13 +264,13 @@ impl Context {
     }
 }
 
-/// RMS of an output over the lines, which is not zero.
+/// Returns the RMS of an output over the lines, never zero.
 fn rms(data: &LineData, output: usize) -> f64 {
     let power = data.outputs().column(output).norm_squared() / data.len() as f64;
     power.sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Measured and explained responses of the first record, all outputs together.
+/// Returns the measured and modelled responses of the first record, all outputs together.
 fn spectrum(data: &LineData, estimate: &ModalEstimate) -> Result<ModesSpectrum, AnalysisError> {
     let modelled: DMatrix<Complex<f64>> = estimate.synthesis(data)?;
     let outputs = data.outputs();

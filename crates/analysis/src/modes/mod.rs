@@ -92,10 +92,10 @@ pub fn modes(
     let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());
     let records = measurements.iter().map(|measurement| {
         let block = measurement.whole_block()?;
-        Ok(RecordRow::of_block(&block))
+        Ok(RecordRow::from_block(&block))
     });
     let records = records.collect::<Result<Vec<_>, AnalysisError>>()?;
-    let checks = checks::of_channels(measurements)?;
+    let checks = checks::channel_checks(measurements)?;
     Test { recorded, band_hz }.modes(records, checks, settings)
 }
 

@@ -142,7 +142,7 @@ impl ModeSet {
         Self::new(name, points, modes)
     }
 
-    /// Takes the modes of a test; its points are the places that were stated, or the columns.
+    /// Takes the modes of a test; its points are the stated ones, or the columns.
     ///
     /// # Errors
     /// [`AnalysisError::NothingToCompare`].
@@ -199,7 +199,7 @@ impl ModeSet {
         let exact = |value: f64| Measured { value, standard_error: 0.0 };
         let modes = nodal.modes.iter().map(|mode| {
             let entry = |z: &Complex<f64>| SavedEntry { value: [z.re, z.im], standard_error: None };
-            // A file of undamped modes states no damping: zero is no value to compare.
+            // A file of undamped modes has a damping of zero, which is not a value to compare.
             let damping_ratio = Some(mode.damping_ratio).filter(|ratio| *ratio != 0.0).map(exact);
             (exact(mode.frequency_hz), damping_ratio, mode.shape.iter().map(entry).collect())
         });
@@ -238,15 +238,15 @@ impl ModeSet {
     pub(super) fn at(&self, entries: &[(usize, f64)]) -> Result<Vec<ComparedMode>, AnalysisError> {
         let restrict = |mode: &ComparedMode| {
             let (shape, covariance) = (mode.shape.shape(), mode.shape.covariance());
-            let (all, len) = (shape.len(), entries.len());
+            let (total, len) = (shape.len(), entries.len());
             let values = entries.iter().map(|(at, sign)| shape[*at] * *sign);
             let values = DVector::from_iterator(len, values);
-            let place = |row: usize| {
+            let source = |row: usize| {
                 let (at, sign) = entries[row % len];
-                (if row < len { at } else { all + at }, sign)
+                (if row < len { at } else { total + at }, sign)
             };
             let covariance = DMatrix::from_fn(2 * len, 2 * len, |row, column| {
-                let ((i, a), (j, b)) = (place(row), place(column));
+                let ((i, a), (j, b)) = (source(row), source(column));
                 a * b * covariance[(i, j)]
             });
             let shape = ShapeWithCovariance::new(values, covariance)?;
@@ -256,7 +256,7 @@ impl ModeSet {
     }
 }
 
-/// Shape with independent errors of its parts.
+/// Returns a shape with independent errors of real and imaginary parts.
 fn with_covariance(shape: &[SavedEntry]) -> Result<ShapeWithCovariance, AnalysisError> {
     let values = shape.iter().map(|entry| Complex::new(entry.value[0], entry.value[1]));
     let errors = shape.iter().map(|entry| entry.standard_error.unwrap_or_default());

@@ -1,4 +1,4 @@
-//! Resonances beyond those that a machine with one degree of freedom for each response can have.
+//! Records with more resonances than a machine with one degree of freedom for each response.
 
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_modal::{ModalSettings, identify_modes, initial_mode_count};
@@ -12,18 +12,18 @@ use crate::identify::IdentifyResponses;
 use crate::measurement::Measurement;
 use crate::text::compact;
 
-/// Number of natural frequencies that the sentence lists.
+/// Maximum number of natural frequencies in the remark.
 const LISTED: usize = 8;
 
-/// Returns a sentence if records show more modes, each significant by the likelihood, than they
-/// have responses: M, C and K of that size cannot describe them.
+/// Returns a remark if records show more modes, each significant by the likelihood, than they have
+/// responses: M, C and K of this size cannot describe them.
 pub(crate) fn surplus(measurements: &[Measurement]) -> Option<String> {
     let recorded = Recorded::from_forced(measurements, None, &Places::default()).ok()?;
     let responses = recorded.outputs.len();
     surplus_of(&recorded.lines(recorded.driven_band()).ok()?, responses)
 }
 
-/// Returns the sentence of [`surplus`] for tables of frequency responses.
+/// Returns the remark of [`surplus`] for tables of frequency responses.
 pub(crate) fn surplus_of_tables(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -40,9 +40,10 @@ pub(crate) fn surplus_of_tables(
     surplus_of(&tables.lines(band, None).ok()?, tables.responses.len())
 }
 
-/// Returns the sentence if some lines show more modes than there are `responses`.
+/// Returns the remark if the lines show more modes than there are `responses`.
 fn surplus_of(data: &LineData, responses: usize) -> Option<String> {
-    // Most records have none, which the start of the search shows in a fraction of its time.
+    // The initial estimates need a fraction of the time and show that most records have no more
+    // modes.
     if initial_mode_count(data).ok()? <= responses {
         return None;
     }

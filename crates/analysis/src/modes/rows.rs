@@ -11,8 +11,8 @@ use crate::limits::NOTED_UNMEASURED;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, significant};
 
-/// Returns the row of a mode; masses follow from `fitted`, the mode as it was fitted, which has the
-/// decay of an exponential window.
+/// Returns the row of a mode; the modal mass comes from `fitted`, the fitted mode with the decay of
+/// an exponential window.
 pub(super) fn row(
     mode: &IdentifiedMode,
     fitted: &IdentifiedMode,
@@ -20,13 +20,13 @@ pub(super) fn row(
     points: &[(usize, usize)],
 ) -> ModalModeRow {
     let entries = |values: &[Complex<f64>], errors: &[Complex<f64>], scale: Complex<f64>| {
-        let of = |(value, error): (&Complex<f64>, &Complex<f64>)| {
+        let entry = |(value, error): (&Complex<f64>, &Complex<f64>)| {
             let value = value / scale;
             let size = scale.norm();
             let standard_error = Some([error.re / size, error.im / size]);
             ShapeEntry { value: [value.re, value.im], standard_error }
         };
-        values.iter().zip(errors).map(of).collect::<Vec<_>>()
+        values.iter().zip(errors).map(entry).collect::<Vec<_>>()
     };
     let largest = mode.participation.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let scale = largest.filter(|z| z.norm() > 0.0).unwrap_or(Complex::from(1.0));
@@ -34,7 +34,7 @@ pub(super) fn row(
         let power = derivative(outputs[output].quantity?) as i32;
         Some((mode.residue(output, input).norm(), fitted.modal_mass(output, input, power).re))
     });
-    // The driving point that moves most in this mode determines the mass best.
+    // The driving point with the largest residue determines the mass best.
     let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
     let values = [
         uncertain(&mode.natural_frequency_hz),
@@ -52,7 +52,7 @@ pub(super) fn row(
     }
 }
 
-/// f√(1 − ζ²), with its standard error to first order.
+/// Returns f√(1 − ζ²), with its standard error to first order.
 fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
     let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
     let root = (1.0 - zeta.value * zeta.value).sqrt();
@@ -63,7 +63,7 @@ fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
     normal(root * f.value, variance.max(0.0).sqrt())
 }
 
-/// Value with a normal interval: the noise is averaged over many lines.
+/// Returns a value with a normal interval, because the noise level is averaged over many lines.
 fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
     normal(value.value, value.standard_error)
 }

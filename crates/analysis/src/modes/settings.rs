@@ -14,33 +14,32 @@ use crate::measurement::Channels;
 pub struct ModesSettings {
     /// Kind of test.
     pub test: ModalTest,
-    /// Lowest and highest frequency to use, in Hz; `None`: the band that the forces drive, or all.
+    /// Lowest and highest frequency to use, in Hz; `None`: the band that the forces excite, or all.
     pub band_hz: Option<[f64; 2]>,
-    /// Number of modes; `None`: as many as the record shows.
+    /// Number of modes; `None`: all significant modes.
     pub modes: Option<usize>,
-    /// Largest number of modes where the number is not given.
+    /// Maximum number of modes if the number is not given.
     pub max_modes: Option<usize>,
-    /// Frequencies, in Hz, near which a mode is looked for whatever the start shows; a list of any
-    /// length.
+    /// Additional initial estimates of natural frequencies, in Hz; a list of any length.
     pub near_hz: Vec<f64>,
     /// Quantity of the responses of tables that do not state it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantity: Option<ResponseQuantity>,
-    /// Places of the forces, one each (of a roving hammer one per record), and of the responses, by
-    /// which a driving point is known; empty: not stated.
+    /// Points of the forces (one per record for a roving hammer) and of the responses, which define
+    /// the driving points; empty: not stated.
     pub places: Places,
-    /// Share of each record, at its end, from 0 to 0.8, that is kept out of a second fit and
-    /// predicted by it; 0 for no such test.
+    /// Share of each record, from 0 to 0.8, at its end, that a second fit excludes and predicts; 0
+    /// for no such validation.
     pub validate: f64,
 }
 
-/// Places of forces and responses, such as `3` or `12+Z`.
+/// Points of forces and responses, such as `3` or `12+Z`.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Places {
-    /// Place of each force column, or of the struck point of each record.
+    /// Point of each force column, or of the hammer in each record.
     pub forces: Vec<String>,
-    /// Place of each response column.
+    /// Point of each response column.
     pub responses: Vec<String>,
 }
 
@@ -48,18 +47,18 @@ pub struct Places {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ModalTest {
-    /// Forces are measured, whatever they are.
+    /// Test with measured forces of any kind.
     Forced {
-        /// Cuts the records into the hits of a hammer by this rule; `None`: each record as a whole.
+        /// Rule that cuts the records into the hits of a hammer; `None`: each record as a whole.
         #[serde(default, deserialize_with = "crate::words::written::optional")]
         hits: Option<HitRule>,
     },
-    /// Forces act that are not measured, such as wind or traffic.
+    /// Test with unmeasured forces, such as wind or traffic.
     Ambient {
-        /// Frequencies, in Hz, of machines nearby, whose lines are left out.
+        /// Frequencies, in Hz, of nearby machines; their lines are excluded.
         #[serde(default)]
         without_hz: Vec<f64>,
-        /// `true` to leave out the harmonics that are found.
+        /// `true` to exclude the lines of detected harmonics.
         #[serde(default)]
         without_harmonics: bool,
     },
@@ -72,7 +71,7 @@ impl Default for ModalTest {
 }
 
 impl ModesSettings {
-    /// Checks that there are the columns that the kind of test needs.
+    /// Checks that the record has the columns for this kind of test.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`].
@@ -86,8 +85,10 @@ impl ModesSettings {
         }
     }
 
+    /// Checks the band and the share for validation.
+    ///
     /// # Errors
-    /// [`AnalysisError::Setting`] for a band or a share that is none.
+    /// [`AnalysisError::Setting`] for an invalid band or share.
     pub(super) fn check(&self) -> Result<(), AnalysisError> {
         if let Some([low, high]) = self.band_hz
             && !(low >= 0.0 && low < high && high.is_finite())

@@ -1,4 +1,4 @@
-//! Spectral lines of modal tests: records as a whole, hits of a hammer, a struck point per record.
+//! Spectral lines of modal tests: whole records, hits of a hammer, or one hammer point per record.
 
 use mechid_model::ResponseQuantity;
 use mechid_signal::{HitRule, Record, Spectrum, message};
@@ -11,7 +11,7 @@ use crate::hits::{self, HitRow};
 use crate::limits::{DRIVEN_LINES, DRIVEN_POWER};
 use crate::measurement::{Block, Channels, Measurement};
 
-/// Records of one test: the inputs and outputs of each, and what they are called.
+/// Records of one test: inputs and outputs with their names.
 #[derive(Debug)]
 pub(super) struct Recorded {
     /// Forces (N, samples × inputs) and responses (samples × outputs) of each record or hit.
@@ -20,9 +20,9 @@ pub(super) struct Recorded {
     pub inputs: Vec<String>,
     /// Responses.
     pub outputs: Vec<Output>,
-    /// Input and output at the same place, counted from 0.
+    /// Input and output at the same point, counted from 0.
     pub driving_points: Vec<(usize, usize)>,
-    /// Hits, where the records were cut.
+    /// Hits, if the records were cut.
     pub hits: Vec<HitRow>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Output {
 }
 
 impl Recorded {
-    /// Takes the records of a test with measured forces, cut into hits if there is a rule.
+    /// Reads the records of a test with measured forces, cut into hits if there is a rule.
     pub fn from_forced(
         measurements: &[Measurement],
         rule: Option<&HitRule>,
@@ -80,27 +80,27 @@ impl Recorded {
         Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
     }
 
-    /// Returns the band, in Hz, that the forces drive.
+    /// Returns the band, in Hz, that the forces excite.
     pub fn driven_band(&self) -> [f64; 2] {
         driven_band(self.parts.iter().filter_map(|part| part.forces.as_ref()))
     }
 
-    /// Lines of all records in a band (Hz).
+    /// Returns the lines of all records in a band (Hz).
     pub fn lines(&self, band_hz: [f64; 2]) -> Result<LineData, AnalysisError> {
-        let mut all: Option<LineData> = None;
+        let mut data: Option<LineData> = None;
         for part in &self.parts {
             let one = LineData::from_open_record(part.forces.as_ref(), &part.responses, band_hz)?;
-            all = Some(match all {
+            data = Some(match data {
                 None => one,
                 Some(before) => before.followed_by(&one)?,
             });
         }
-        all.ok_or(AnalysisError::NoRecord)
+        data.ok_or(AnalysisError::NoRecord)
     }
 }
 
-/// Returns the band, in Hz, that forces or other inputs drive: from the first to the last group of
-/// lines in which one of them has a power worth mentioning.
+/// Returns the band, in Hz, that forces or other inputs excite: from the first to the last group of
+/// lines with at least [`DRIVEN_POWER`] of the largest power of an input.
 pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [f64; 2] {
     let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
     for forces in inputs {
@@ -125,11 +125,11 @@ pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [
     [low, high]
 }
 
-/// Input that each force column of each record belongs to.
+/// Inputs of the force columns of each record.
 struct Columns {
     /// Names of the inputs.
     names: Vec<String>,
-    /// Place of each input, if it is stated.
+    /// Point of each input, if it is stated.
     places: Vec<Option<String>>,
     /// Input of each force column, record by record.
     input: Vec<Vec<usize>>,
@@ -169,7 +169,7 @@ impl Columns {
         Ok(Self { names, places, input: vec![(0..count).collect(); measurements.len()] })
     }
 
-    /// Forces of a record, samples × inputs.
+    /// Returns the forces of a record, samples × inputs.
     fn forces(&self, record: usize, block: &Block) -> Result<Record, AnalysisError> {
         let mut data = DMatrix::zeros(block.force.len(), self.names.len());
         for (column, input) in self.input[record].iter().enumerate() {
@@ -178,13 +178,13 @@ impl Columns {
         Ok(Record::new(block.force.sampling(), data)?)
     }
 
-    /// A hit of a record, with the input that it belongs to.
+    /// Returns a hit of a record with the number of its input.
     fn placed(&self, record: usize, hit: HitRow) -> HitRow {
         let force = self.input[record].get(hit.force - 1).map_or(hit.force, |input| input + 1);
         HitRow { force, ..hit }
     }
 
-    /// Pairs of an input and an output at the same place.
+    /// Returns the pairs of an input and an output at the same point.
     fn driving_points(&self, responses: &[Option<String>]) -> Vec<(usize, usize)> {
         let mut pairs = Vec::new();
         for (input, place) in self.places.iter().enumerate() {
@@ -208,19 +208,19 @@ impl Places {
     }
 }
 
-/// Responses of all kinds, in the order of [`responses_of`].
+/// Returns the responses of all quantities, in the order of [`responses_of`].
 pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
-    let of_kind = |quantity| {
+    let outputs = |quantity| {
         let named = move |at| Output {
             name: channels.response_name(quantity, at),
             quantity: Some(quantity),
         };
         (0..channels.response(quantity).len()).map(named)
     };
-    ResponseQuantity::ALL.into_iter().flat_map(of_kind).collect()
+    ResponseQuantity::ALL.into_iter().flat_map(outputs).collect()
 }
 
-/// All responses of a record, samples × outputs.
+/// Returns all responses of a record, samples × outputs.
 pub(super) fn responses_of(block: &Block) -> Result<Record, AnalysisError> {
     let kinds = block.responses();
     let columns: Vec<&[f64]> = kinds

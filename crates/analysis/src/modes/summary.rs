@@ -14,7 +14,8 @@ use crate::measurement::Block;
 use crate::modal::{ShapeEntry, ShapedMode};
 use crate::text::{compact, paged_table, significant, text_table};
 
-/// Damping ratio above which a candidate stands for what lies outside of the band, in the text.
+/// Maximum damping ratio of a candidate in the text; one with more represents modes outside the
+/// band.
 const LIGHT: f64 = 0.3;
 
 /// Decimal places of a phase, in degrees.
@@ -25,10 +26,10 @@ const PHASE_DECIMALS: usize = 0;
 pub struct ModesSummary {
     /// Records, in the order in which they were given.
     pub records: Vec<RecordRow>,
-    /// Hits of the records, where these were cut into hits.
+    /// Hits of the records, if these were cut into hits.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hits: Vec<HitRow>,
-    /// Names of the forces, by their place where it was stated.
+    /// Names of the forces: their points if these are stated.
     pub inputs: Vec<String>,
     /// Responses.
     pub outputs: Vec<OutputRow>,
@@ -40,19 +41,20 @@ pub struct ModesSummary {
     pub confidence: f64,
     /// Modes by rising frequency.
     pub modes: Vec<ModalModeRow>,
-    /// Modal assurance criterion of every pair of shapes, a pure number from 0 to 1; rows of modes.
+    /// Modal assurance criterion of every pair of shapes, a pure number from 0 to 1; one row per
+    /// mode.
     pub mac: Vec<Vec<f64>>,
-    /// Candidates for modes that were left out.
+    /// Rejected candidates for modes.
     pub dropped: Vec<DroppedRow>,
-    /// Sinusoids of machines nearby, in the records of ambient tests.
+    /// Sinusoids of nearby machines in the records of ambient tests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<HarmonicRow>,
-    /// Share of the variance that the model explains, in the mean over the responses; `None`
-    /// without forces.
+    /// Share of the variance that the model explains, averaged over the responses; `None` without
+    /// forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_explained: Option<f64>,
-    /// Share that a fit to the first part of the records explains of the rest, or the modes of
-    /// another record, where that was tried.
+    /// Share of the variance that is predicted, averaged over the responses: at the end of the
+    /// records by a fit to their beginning, or in other records; `None` without a validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
     /// Checks of the data and of the fit.
@@ -71,10 +73,10 @@ pub struct ModesSummary {
 pub struct RecordRow {
     /// Name of the file.
     pub file: String,
-    /// Samples used; `None` of a table.
+    /// Samples used; `None` for a table.
     #[serde(flatten)]
     pub window: Option<WindowRow>,
-    /// Frequencies of a table and their segments; `None` of a record.
+    /// Frequencies of a table and their segments; `None` for a record.
     #[serde(flatten)]
     pub table: Option<TableRow>,
 }
@@ -84,10 +86,10 @@ pub struct RecordRow {
 pub struct TableRow {
     /// Number of frequencies.
     pub frequencies: usize,
-    /// Segments that the responses are averages over; `None` if the table does not state them.
+    /// Segments of averaged responses; `None` if the table does not state them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub segments: Option<SegmentsRow>,
-    /// Rate, in 1/s, that an exponential window adds to the decay of every mode, if there is one.
+    /// Decay rate, in 1/s, that an exponential window adds to every mode, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub added_decay: Option<f64>,
 }
@@ -105,12 +107,12 @@ pub struct SegmentsRow {
 
 impl RecordRow {
     /// Returns the row of a record.
-    pub(super) fn of_block(block: &Block) -> Self {
+    pub(super) fn from_block(block: &Block) -> Self {
         Self { file: block.file.clone(), window: Some(WindowRow::of(block)), table: None }
     }
 
     /// Returns the row of a table.
-    pub(super) fn of_table(table: &FrequencyResponses) -> Self {
+    pub(super) fn from_table(table: &FrequencyResponses) -> Self {
         let segments = table.segments.map(|stated| SegmentsRow {
             count: stated.count,
             samples: stated.samples,
@@ -152,10 +154,11 @@ pub struct OutputRow {
     /// Share of the variance that the model explains in the band, a ratio; `None` without forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_explained: Option<f64>,
-    /// Share that a fit to the first part of the records explains of the rest, where it was tried.
+    /// Share of the variance at the end of the records that a fit to their beginning predicts, a
+    /// ratio; `None` without a validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
-    /// RMS of the sensor noise in the band over that of the response, a ratio; `None` without
+    /// Ratio of the RMS of the sensor noise in the band to that of the response; `None` without
     /// forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_share: Option<f64>,
@@ -167,19 +170,19 @@ pub struct ModalModeRow {
     /// Frequencies, damping, pole, and the shape with one entry per response.
     #[serde(flatten)]
     pub mode: ShapedMode,
-    /// One entry per force; the largest is 1. Empty without forces.
+    /// Participation of each force, scaled to 1 for the largest; empty without forces.
     pub participation: Vec<ShapeEntry>,
     /// Modal phase collinearity of the shape, a pure number: 1 if all entries have one phase or its
     /// opposite.
     pub phase_collinearity: f64,
-    /// Share of the motion of this mode that the measured forces drive; the rest answers forces
-    /// that were not measured. `None` without measured forces.
+    /// Share of the motion of this mode due to the measured forces, a ratio; the rest is due to
+    /// unmeasured forces. `None` without measured forces.
     pub driven_share: Option<f64>,
-    /// Modal mass for the shape scaled to 1 at its largest entry, in kg, where a force acts at the
-    /// place of a response.
+    /// Modal mass for the shape scaled to 1 at its largest entry, in kg; `None` without a driving
+    /// point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_mass: Option<f64>,
-    /// Length of the record in decay times of the mode, ζωT, a pure number, of ambient records.
+    /// Length of an ambient record in decay times of the mode, ζωT, a pure number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_times: Option<f64>,
 }

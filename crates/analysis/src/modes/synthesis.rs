@@ -11,8 +11,8 @@ impl Modes {
     /// Returns the frequency responses of modes and residual terms at the lines of the first
     /// record, in m/N, m/(s·N) or m/(s²·N); `None` without measured forces.
     ///
-    /// Places that are nodes of a universal file (`3`, `12+Z`) are the points. Others get numbers:
-    /// responses from 1 on, then forces.
+    /// The points are the stated ones if they are nodes of a universal file (`3`, `12+Z`).
+    /// Otherwise they have numbers: first the responses from 1, then the forces.
     pub fn synthesis(&self) -> Option<FrequencyResponses> {
         let DiagramData::Forced(forced) = &self.source else { return None };
         let Forced { data, estimate, quantities, added_decay, .. } = &**forced;
@@ -50,7 +50,7 @@ impl Modes {
     }
 }
 
-/// Returns names as nodes with directions, or, unless all are, numbers from `first` on.
+/// Returns the names if all are nodes with directions, otherwise numbers that begin at `first`.
 fn nodes(names: &[String], first: usize) -> Vec<String> {
     let is_node = |name: &String| {
         let (node, direction) = name.split_at(name.find(['+', '-']).unwrap_or(name.len()));

@@ -14,12 +14,12 @@ use crate::AnalysisError;
 use crate::identify::added_decay;
 use crate::identify::tabulated::with_positive_directions;
 
-/// Tables of frequency responses of one structure, and the points that they name.
+/// Tables of frequency responses of one structure, and their points.
 #[derive(Debug)]
 pub(super) struct Tables {
     /// Tables with points in positive directions.
     tables: Vec<FrequencyResponses>,
-    /// What is known of the segments behind each table.
+    /// Segments of each table, if it states them.
     averaged: Vec<Option<Averaged>>,
     /// Points of the forces, in the order of the tables.
     pub forces: Vec<String>,
@@ -30,7 +30,7 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    /// Takes tables, and the quantity of their responses where they do not state it.
+    /// Takes tables, and the quantity of responses in tables that do not state it.
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`] without a table, [`AnalysisError::Setting`] if a table states
@@ -59,7 +59,7 @@ impl Tables {
         Ok(Self { averaged, forces, responses, added_decay, tables })
     }
 
-    /// Returns the tables, and the segments behind each.
+    /// Returns the tables, each with its segments.
     pub fn with_segments(
         &self,
     ) -> impl Iterator<Item = (&FrequencyResponses, Option<&Averaged>)> + '_ {
@@ -101,19 +101,18 @@ impl Tables {
         self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
     }
 
-    /// Returns the lines in a band (Hz): each force in turn is a record with a unit input there.
-    /// With a `model` the responses are less what the windows of their segments make of those of
-    /// the model.
+    /// Returns the lines in a band (Hz): each force is a record with a unit input. With a `model`,
+    /// the window bias of its responses is subtracted.
     ///
     /// # Errors
-    /// [`AnalysisError::MissingResponse`] if a table has the response of one point to a force, and
-    /// not that of another; those of [`LineData`] if the band has no line.
+    /// [`AnalysisError::MissingResponse`] if a table has the responses of only some points to a
+    /// force, and the errors of [`LineData`] if the band has no line.
     pub fn lines(
         &self,
         band_hz: [f64; 2],
         model: Option<&[IdentifiedMode]>,
     ) -> Result<LineData, AnalysisError> {
-        let mut all: Option<LineData> = None;
+        let mut data: Option<LineData> = None;
         for (table, averaged) in self.with_segments() {
             let rows = rows(table, averaged, band_hz);
             let bias = match (averaged, model) {
@@ -137,13 +136,13 @@ impl Tables {
                     functions[output].values[rows[at]] - bias
                 });
                 let one = LineData::new(omega, inputs, outputs, Transient::None)?;
-                all = Some(match all {
+                data = Some(match data {
                     None => one,
                     Some(before) => before.followed_by(&one)?,
                 });
             }
         }
-        all.ok_or(AnalysisError::NoRecord)
+        data.ok_or(AnalysisError::NoRecord)
     }
 
     /// Returns the responses of all points to a force.
@@ -165,7 +164,7 @@ impl Tables {
     }
 }
 
-/// Returns the rows of a table in a band (Hz), without 0 Hz, whose errors are independent.
+/// Returns the rows of a table in a band (Hz) with independent errors, without 0 Hz.
 pub(super) fn rows(
     table: &FrequencyResponses,
     averaged: Option<&Averaged>,
@@ -180,8 +179,9 @@ pub(super) fn rows(
     }
 }
 
-/// Returns a table with points in positive directions, the stated quantity, and velocities and
-/// accelerations as derivatives also under an exponential window.
+/// Returns a table with points in positive directions and the stated quantity. Under an exponential
+/// window it also corrects velocities and accelerations, so that they are derivatives of the
+/// displacement.
 fn prepare(
     table: &FrequencyResponses,
     quantity: Option<ResponseQuantity>,

@@ -1,4 +1,4 @@
-//! Prediction of records that the modes were not fitted to.
+//! Prediction of records that were not part of the fit.
 
 use nalgebra::{Complex, DMatrix, DVectorView};
 
@@ -11,12 +11,12 @@ use crate::measurement::Measurement;
 
 impl Modes {
     /// Predicts other records of the same structure from their forces; returns the share of the
-    /// variance of each response in the band that the modes explain. The state at the beginning of
-    /// each record is estimated.
+    /// variance of each response in the band that the modes explain. The initial state of each
+    /// record is estimated.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] of modes without measured forces, [`AnalysisError::Modal`] for
-    /// other numbers of forces or responses, and if a file cannot be read.
+    /// [`AnalysisError::Setting`] for modes without measured forces, [`AnalysisError::Modal`] for
+    /// another number of forces or responses, and an error if a file cannot be read.
     pub fn predict(&self, measurements: &[Measurement]) -> Result<Vec<f64>, AnalysisError> {
         let ModesSummary { analysis, band_hz, .. } = self.summary();
         let (DiagramData::Forced(forced), ModalTest::Forced { hits }) =
@@ -30,7 +30,7 @@ impl Modes {
         Ok(explained(data.outputs(), &forced.estimate.synthesis(&data)?))
     }
 
-    /// Predicts other records as [`Modes::predict`] does, and adds the shares to the summary.
+    /// Predicts other records like [`Modes::predict`], and adds the shares to the summary.
     ///
     /// # Errors
     /// As [`Modes::predict`].
@@ -45,7 +45,7 @@ impl Modes {
     }
 }
 
-/// Share of the variance of each measured response that modelled ones explain.
+/// Returns the share of the variance of each measured response that the modelled one explains.
 pub(super) fn explained(
     measured: &DMatrix<Complex<f64>>,
     modelled: &DMatrix<Complex<f64>>,

@@ -1,4 +1,4 @@
-//! Driving points: a force and a response at one place, where every modal mass is positive.
+//! Test of driving points: for force and response at one point, every modal mass is positive.
 
 use mechid_io::derivative;
 use mechid_modal::IdentifiedMode;
@@ -8,10 +8,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::super::sources::Output;
 use super::tested::Tested;
 
-/// Returns, for each driving point, the test that the modal masses there are positive: the residue
-/// of a displacement times 2jω_d has a positive real part.
+/// Returns, for each driving point, the test of positive modal masses: the residue of a
+/// displacement times 2jω_d has a positive real part.
 ///
-/// The probability is that of the mode that contradicts most, times the number of modes.
+/// The p-value is the smallest one of all modes, multiplied by the number of modes (Bonferroni).
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 3.6 and 4.2 (residues at a driving point have
@@ -46,7 +46,7 @@ pub(super) fn tests(
     driving_points.iter().filter_map(test).collect()
 }
 
-/// Residue of the displacement where the output measures its `power`-th derivative.
+/// Returns the residue of the displacement if the output measures its `power`-th derivative.
 pub(super) fn receptance_residue(
     mode: &IdentifiedMode,
     output: usize,
@@ -56,10 +56,10 @@ pub(super) fn receptance_residue(
     mode.residue(output, input) / mode.pole.powi(power)
 }
 
-/// Relative standard error of a residue, with errors of shape and participation taken as
-/// independent.
+/// Returns the relative standard error of a residue for independent errors of shape and
+/// participation.
 pub(super) fn relative_error(mode: &IdentifiedMode, output: usize, input: usize) -> f64 {
-    let of = |value: Complex<f64>, error: Complex<f64>| error.norm() / value.norm();
-    of(mode.shape[output], mode.shape_standard_error[output])
-        .hypot(of(mode.participation[input], mode.participation_standard_error[input]))
+    let relative = |value: Complex<f64>, error: Complex<f64>| error.norm() / value.norm();
+    relative(mode.shape[output], mode.shape_standard_error[output])
+        .hypot(relative(mode.participation[input], mode.participation_standard_error[input]))
 }

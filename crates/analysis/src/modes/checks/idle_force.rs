@@ -1,4 +1,4 @@
-//! Forces that drive no mode: a shaker that is off, or a channel with noise alone.
+//! Test of unexcited inputs: a shaker that is off, or a force channel with noise alone.
 
 use mechid_modal::IdentifiedMode;
 use nalgebra::Complex;
@@ -8,11 +8,11 @@ use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Returns, for each of several forces, the check that it drives some mode: all its participations
-/// are zero with probability p.
+/// Returns, for each of several forces, the check that it excites some mode, by a test of zero
+/// participations in all modes.
 ///
 /// # Source
-/// Wald's test of the participations, two degrees of freedom for each mode.
+/// Wald's test of the participations, with two degrees of freedom for each mode.
 pub(super) fn checks(modes: &[IdentifiedMode], inputs: &[String]) -> Vec<ModalCheck> {
     if inputs.len() < 2 {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Checks of a modal test: channels and tables before the fit, what the fit leaves, and the modes.
+//! Checks of a modal test: channels and tables before the fit, residual and modes after it.
 
 mod driving_point;
 mod idle_force;
@@ -9,7 +9,7 @@ mod tested;
 use mechid_checks::Verdict;
 use mechid_modal::IdentifiedMode;
 
-pub(super) use self::table::of_tables;
+pub(super) use self::table::table_checks;
 use self::tested::Tested;
 use super::sources::Output;
 use super::summary::ModalCheck;
@@ -19,7 +19,9 @@ use crate::limits::LEAST_EXPLAINED;
 use crate::measurement::Measurement;
 
 /// Returns the checks of all channels: clipped, constant, spiked, quantised.
-pub(super) fn of_channels(measurements: &[Measurement]) -> Result<Vec<ModalCheck>, AnalysisError> {
+pub(super) fn channel_checks(
+    measurements: &[Measurement],
+) -> Result<Vec<ModalCheck>, AnalysisError> {
     let mut rows = Vec::new();
     for measurement in measurements {
         let block = measurement.whole_block()?;
@@ -35,8 +37,8 @@ pub(super) fn of_channels(measurements: &[Measurement]) -> Result<Vec<ModalCheck
     Ok(rows)
 }
 
-/// Returns the check of what the modes explain of each response.
-pub(super) fn of_outputs(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
+/// Returns the check of the share of the variance of each response that the modes explain.
+pub(super) fn output_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
     let row = |(share, name): (&f64, &String)| ModalCheck {
         code: "explained",
         passed: *share >= LEAST_EXPLAINED,
@@ -50,9 +52,9 @@ pub(super) fn of_outputs(explained: &[f64], names: &[String]) -> Vec<ModalCheck>
     explained.iter().zip(names).map(row).collect()
 }
 
-/// Returns the checks of the modes: forces that drive none, modal masses at driving points, and
-/// reciprocity between these.
-pub(super) fn of_modes(
+/// Returns the checks of the modes: unexcited inputs, modal masses at driving points, and
+/// reciprocity between driving points.
+pub(super) fn mode_checks(
     modes: &[IdentifiedMode],
     inputs: &[String],
     outputs: &[Output],

@@ -9,11 +9,11 @@ use super::super::sources::Output;
 use super::driving_point::{receptance_residue, relative_error};
 use super::tested::Tested;
 
-/// Returns, for each pair of driving points, the test that the residues of all modes are the same
-/// in both directions.
+/// Returns, for each pair of driving points, the test of equal residues of all modes in both
+/// directions.
 ///
-/// Errors of shapes and participations are taken as independent; those of the common scale are not,
-/// which makes the test a cautious one.
+/// Errors of shapes and participations are assumed to be independent; errors of their common scale
+/// are not, which makes the test conservative.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.7 (Maxwell's reciprocity of receptances).

@@ -13,9 +13,8 @@ use crate::measurement::Channels;
 use crate::measurement::units::doubt;
 use crate::text::significant;
 
-/// Returns the checks of tables; `settled` says whether what a window blunts was separated from the
-/// modes.
-pub(in super::super) fn of_tables(
+/// Returns the checks of tables; `settled` is true if the correction of the window bias converged.
+pub(in super::super) fn table_checks(
     tables: &Tables,
     band_hz: [f64; 2],
     modes: &[IdentifiedMode],
@@ -30,7 +29,7 @@ pub(in super::super) fn of_tables(
     checks
 }
 
-/// Texts of a header that may be units.
+/// Checks texts of a header that may be units.
 fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
     let doubts = table.doubts.iter();
     let findings = doubts.filter_map(|(column, stated, wanted)| doubt(column, stated, *wanted));
@@ -43,8 +42,8 @@ fn units(table: &FrequencyResponses) -> Vec<ModalCheck> {
     findings.map(check).collect()
 }
 
-/// Median coherence over the rows and functions of a table. It does not weigh the fit, in which
-/// noise and unmeasured forces are estimated from the residual.
+/// Checks the median coherence over the rows and functions of a table. The coherence is not a
+/// weight of the fit, which estimates noise and unmeasured forces from the residual.
 fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     let values = table.coherence.iter();
     let mut values: Vec<f64> = values.flat_map(|c| rows.iter().map(|row| c.values[*row])).collect();
@@ -67,8 +66,8 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     Some(ModalCheck { code: "coherence", passed, value: median, text })
 }
 
-/// Width of the narrowest resonance in lines; `None` of periods and of hits, which no window
-/// blunts, and of unevenly spaced frequencies without segments.
+/// Checks the width of the narrowest resonance in lines; `None` for periods and hits, which have no
+/// window bias, and for unevenly spaced frequencies without segments.
 fn leakage(
     table: &FrequencyResponses,
     averaged: Option<&Averaged>,
@@ -111,11 +110,10 @@ fn leakage(
     })
 }
 
-/// Deviation of a distance of two frequencies from the first one, relative to it, in spite of the
-/// digits of a file.
+/// Maximum relative difference of the line spacings of even frequencies: the rounding of a file.
 const EVEN: f64 = 1e-2;
 
-/// Returns the distance of the frequencies, in Hz, if all are the same.
+/// Returns the line spacing, in Hz, if it is even.
 fn even_spacing_hz(frequency_hz: &[f64]) -> Option<f64> {
     let mut distances = frequency_hz.windows(2).map(|pair| pair[1] - pair[0]);
     let first = distances.next()?;

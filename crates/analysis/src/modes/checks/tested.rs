@@ -1,20 +1,20 @@
-//! Checks that are tests of a hypothesis, with one error rate for all of them.
+//! Checks that are tests of hypotheses, with p-values adjusted for their number.
 
 use super::super::summary::ModalCheck;
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::text::significant;
 
-/// Test of modes against what a structure of constant M, C and K obeys.
+/// Test of a property of modes that every structure with constant M, C and K has.
 pub(super) struct Tested {
     /// Name of the check, in snake case.
     pub code: &'static str,
-    /// Probability of a statistic as large, by the errors of the modes alone.
+    /// Probability of a larger statistic due to the errors of the modes alone.
     pub p_value: f64,
     /// The finding if the test fails, in a sentence.
     pub text: String,
 }
 
-/// Returns tests as checks, their p-values adjusted for their number.
+/// Converts tests to checks, with p-values adjusted for the number of tests.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
