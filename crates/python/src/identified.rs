@@ -150,7 +150,7 @@ impl Identified {
                 None => &[],
             };
             let none = Complex::new(f64::NAN, f64::NAN);
-            let acting = ActingAlone::of(&data);
+            let acting = ActingAlone::new(&data);
             let measured = DMatrix::from_fn(data.len(), n * n, |row, at| match at % n {
                 force if acting.on(row, force) => {
                     data.displacement()[(row, at / n)] / data.force()[(row, force)]

@@ -31,48 +31,48 @@ pub struct FrfSettings {
     pub estimator: Estimator,
     /// Spectral lines of a segment.
     pub lines: LineChoice,
-    /// Spectral lines to leave out of these.
+    /// Spectral lines to exclude from these.
     pub without: LeftOut,
-    /// Segments that are averaged.
+    /// Segments of the average.
     #[serde(deserialize_with = "words::written::one")]
     pub segments: Segmentation,
-    /// Rule by which the record of a hammer test is cut into hits, which are averaged instead of
+    /// Rule that cuts the record of a hammer test into hits, which are averaged instead of
     /// segments.
     #[serde(
         skip_serializing_if = "Option::is_none",
         deserialize_with = "words::written::optional"
     )]
     pub hits: Option<HitRule>,
-    /// Weight at the end of a hit of an exponential window on force and response, in per cent of
-    /// that at its beginning; `None`: no window.
+    /// Weight of an exponential window on force and response at the end of a hit, in per cent of
+    /// the weight at its beginning; `None`: no window.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exponential_percent: Option<f64>,
 }
 
 /// Estimates the frequency responses and the coherence of a record.
 ///
-/// With a periodic excitation the periods of the window are the segments that are averaged.
+/// With a periodic excitation the periods of the window are the segments of the average.
 ///
 /// # Errors
-/// [`AnalysisError::NoHit`] and [`AnalysisError::Setting`] of a hammer test without a good hit and
-/// for settings that make no sense, [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`]
-/// or [`AnalysisError::EmptyBand`] if no chosen line carries force, [`AnalysisError::Estimate`] if
-/// the segments are too few or too long, and if a file cannot be read again.
+/// [`AnalysisError::NoHit`] for a hammer test without a good hit, [`AnalysisError::Setting`] for
+/// invalid settings, [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`] or
+/// [`AnalysisError::EmptyBand`] if no chosen line carries force, [`AnalysisError::Estimate`] if the
+/// segments are too few or too long, and an error if a file cannot be read again.
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
     frf_of_records(std::slice::from_ref(measurement), how)
 }
 
 /// Estimates the frequency responses and the coherence of one or several records of the same
-/// machine, which are averaged together: auto- and cross-spectra of the segments of all of them.
+/// machine from the averaged auto- and cross-spectra of the segments of all records.
 ///
-/// The records need the same columns and time step, and periods or segments of the same length; one
-/// may be longer than another. Without either, records that end at rest or repeat one another are
-/// averaged whole; others are cut into segments as one record is. Each force need act in one of
-/// them only.
+/// The records need the same columns and time step, and periods or segments of the same length;
+/// their own lengths may differ. Without periods and segments, records that end at rest or have the
+/// same force are averaged as a whole; others are cut into segments like one record. Each force
+/// need act only in one record.
 ///
 /// # Errors
 /// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the
-/// records do not belong together.
+/// records do not match.
 pub fn frf_of_records(
     measurements: &[Measurement],
     how: &FrfSettings,
@@ -86,8 +86,8 @@ pub fn frf_of_records(
             return Err(AnalysisError::Setting { setting: "hits", why });
         }
         let records = held_of(measurements, hold)?;
-        let averaged = of_hits::of_hits(&records, rule, lines, how)?;
-        return Ok(FrfTable::of_hits(&records, averaged, how));
+        let averaged = of_hits::responses_of_hits(&records, rule, lines, how)?;
+        return Ok(FrfTable::from_hits(&records, averaged, how));
     }
     if how.exponential_percent.is_some() {
         let why = "an exponential window is for `hits`".into();
@@ -98,9 +98,9 @@ pub fn frf_of_records(
         record.check_spectra(how.segments.segment.unwrap_or(record.held.period) / 2)?;
     }
     if let [recorded] = &records[..]
-        && let Some(found) = interleaved(recorded, how, lines)?
+        && let Some(responses) = interleaved(recorded, how, lines)?
     {
-        return Ok(FrfTable::interleaved(&records, &found, how));
+        return Ok(FrfTable::interleaved(&records, &responses, how));
     }
     let chosen = match records.iter().min_by_key(|recorded| recorded.held.force.len()) {
         Some(shortest) if !period_given && !whole::close(&records) => {
@@ -109,7 +109,7 @@ pub fn frf_of_records(
         _ => None,
     };
     let segments = chosen.as_ref().map_or(&how.segments, |(segments, _)| segments);
-    let responses = Responses::of(&records, segments, how.estimator, lines)?;
+    let responses = Responses::new(&records, segments, how.estimator, lines)?;
     let mut table = FrfTable::new(&records, &responses, how);
     table.remarks.extend(chosen.map(|(_, remark)| remark));
     if matches!(responses.segments, Segments::Windowed { .. }) {
@@ -118,7 +118,7 @@ pub fn frf_of_records(
     Ok(table)
 }
 
-/// Returns the records with what must be held of each; one at least, with as many forces in each.
+/// Reads the records, at least one, and checks that all have the same number of forces.
 fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, AnalysisError> {
     let records = measurements.iter().map(|measured| measured.hold(hold));
     let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
@@ -137,19 +137,19 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
     Ok(records)
 }
 
-/// Amplitude of the other forces over that of the one that drives a line, below which they are idle
-/// there.
+/// Maximum ratio of the amplitudes of unexcited forces on a line to that of the exciting force.
 const IDLE: f64 = 0.1;
 
-/// Frequency responses to forces that have lines of their own.
+/// Frequency responses to forces with interleaved lines.
 pub(crate) struct Interleaved {
     /// Responses to each force, on its lines.
     parts: Vec<Responses>,
     crosstalk: Vec<Crosstalk>,
 }
 
-/// Frequency responses to each force on the lines that it alone drives, and what the others do
-/// there; `None` unless several forces have every line of whole periods to themselves, in turn.
+/// Returns the frequency responses to each force on the lines that it alone excites, and the
+/// crosstalk of the other forces on these lines; `None` unless several forces have interleaved
+/// lines of whole periods.
 fn interleaved(
     recorded: &Windowed,
     how: &FrfSettings,
@@ -178,22 +178,23 @@ fn interleaved(
         return Ok(None);
     }
     let sampling = held.force.sampling().with_len(period)?;
-    let own = held.driven.iter().map(|dof| {
+    let averages = held.driven.iter().map(|dof| {
         let of_force = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
         let lines = Lines::new(sampling, of_force.map(|(line, _)| *line))?;
         average(recorded, &lines, segments)
     });
-    let own: Vec<FrfAverage> = own.collect::<Result<_, AnalysisError>>()?;
-    let OwnLines { responses, crosstalk } = OwnLines::of(&own, how.estimator.estimator())?;
-    let parts = responses.into_iter().zip(&own).zip(&held.driven).map(|((frf, own), dof)| {
-        let (lines, counts) = (own.lines().clone(), vec![own.pieces()]);
+    let averages: Vec<FrfAverage> = averages.collect::<Result<_, AnalysisError>>()?;
+    let OwnLines { responses, crosstalk } = OwnLines::of(&averages, how.estimator.estimator())?;
+    let parts = responses.into_iter().zip(&averages).zip(&held.driven);
+    let parts = parts.map(|((frf, average), dof)| {
+        let (lines, counts) = (average.lines().clone(), vec![average.pieces()]);
         let (idle, following) = (Vec::new(), Vec::new());
         Responses { frf, lines, driven: vec![*dof], idle, following, segments, counts }
     });
     Ok(Some(Interleaved { parts: parts.collect(), crosstalk }))
 }
 
-/// Frequency response estimator: where the noise is.
+/// Frequency response estimator, by the location of the noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
@@ -225,16 +226,16 @@ impl Estimator {
     }
 }
 
-/// Segments of a record to average over.
+/// Segments of a record for an average.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Segmentation {
-    /// Number of samples in a segment, for a random excitation; `None`: the periods are the
-    /// segments or, of records without a period, as many as the coherence asks for.
+    /// Number of samples of a segment, for a random excitation; `None`: the periods are the
+    /// segments or, for records without a period, the length is chosen by the coherence.
     pub segment: Option<usize>,
     /// Window that weights the samples of a segment.
     pub window: Weight,
-    /// Part of a segment that the next one repeats, in per cent, from 0 to below 100.
+    /// Overlap of successive segments, in per cent, from 0 to below 100.
     pub overlap_percent: f64,
 }
 
@@ -279,12 +280,12 @@ impl FromStr for Segmentation {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weight {
-    /// The usual choice.
+    /// Hann window, the usual choice.
     #[default]
     Hann,
-    /// A narrower peak, more leakage from far away.
+    /// Hamming window: a narrower peak, more leakage from distant lines.
     Hamming,
-    /// The least leakage, a wider peak.
+    /// Blackman window: least leakage, a wider peak.
     Blackman,
     /// Equal weights, for bursts that begin and end at rest.
     Rectangular,
@@ -312,7 +313,7 @@ impl Segmentation {
         self.segment.is_none()
     }
 
-    /// Returns how much of a record must be held in memory: segments are averaged one after
+    /// Returns the part of a record that must be in memory: segments are averaged one after
     /// another.
     pub(crate) fn hold(&self) -> Hold {
         self.segment.map_or(Hold::Periods, Hold::Samples)
@@ -343,12 +344,12 @@ pub(crate) struct Responses {
     pub frf: Frf,
     /// Lines of a segment.
     pub lines: Lines,
-    /// Degrees of freedom a force acts on, counted from 0.
+    /// Degrees of freedom with a force, counted from 0.
     pub driven: Vec<usize>,
-    /// Degrees of freedom whose force channels show noise only, counted from 0.
+    /// Degrees of freedom with only noise in their force channels, counted from 0.
     pub idle: Vec<usize>,
-    /// Forces that follow another one, so that nothing tells the responses to them, by degrees of
-    /// freedom counted from 0.
+    /// Forces coherent with another one, so that the responses to them cannot be separated, by
+    /// degrees of freedom counted from 0.
     pub following: Vec<Crosstalk>,
     pub segments: Segments,
     /// Number of segments of each record.
@@ -356,9 +357,9 @@ pub(crate) struct Responses {
 }
 
 impl Responses {
-    /// Estimates them from the forces that act in one of the records to the first kind of response
-    /// measured, on the lines that `rule` finds in a segment of a force.
-    pub fn of(
+    /// Estimates the responses of the first measured quantity to the forces that act in at least
+    /// one record, on the lines that `rule` chooses in a segment of a force.
+    pub fn new(
         records: &[Windowed],
         segments: &Segmentation,
         estimator: Estimator,
@@ -375,9 +376,9 @@ impl Responses {
                 Segments::Windowed { len, .. } => rule.lines(&held.force.window(0, len)?, len)?,
             });
         }
-        for all in [&mut driven, &mut chosen] {
-            all.sort_unstable();
-            all.dedup();
+        for list in [&mut driven, &mut chosen] {
+            list.sort_unstable();
+            list.dedup();
         }
         let lines = Lines::new(held.force.sampling().with_len(len)?, chosen)?;
         let mut average = average_of(&records[0], &lines, segments, &driven)?;
@@ -448,8 +449,8 @@ impl Responses {
     }
 }
 
-/// Averages from the forces that act to the first kind of response, on some lines of a segment,
-/// over all of the window.
+/// Averages the spectra of the acting forces and the first measured quantity over the whole window,
+/// on some lines of a segment.
 pub(crate) fn average(
     recorded: &Windowed,
     lines: &Lines,
@@ -458,7 +459,7 @@ pub(crate) fn average(
     average_of(recorded, lines, segments, &recorded.held.driven)
 }
 
-/// Averages as [`average`] does, from the forces on some degrees of freedom, counted from 0.
+/// Averages like [`average`], for the forces on some degrees of freedom, counted from 0.
 fn average_of(
     recorded: &Windowed,
     lines: &Lines,

@@ -14,23 +14,23 @@ use crate::identify::left_out::LineRule;
 use crate::measurement::Windowed;
 use crate::text::significant;
 
-/// Number of parts of a window by which it is told whether the response has died out.
+/// Number of parts of a window for the test whether the response has decayed.
 pub(super) const PARTS: usize = 20;
 
-/// RMS of the last part, or before the pulse, over that of the largest part, from which the
-/// response has not died out.
+/// Maximum ratio of the RMS of the last part of a window, or before the pulse, to that of the
+/// largest part for a response that has decayed.
 const DIED_OUT: f64 = 0.02;
 
-/// Frequency responses from hits, and what there is to tell of them.
+/// Frequency responses from hits, with remarks.
 pub(super) struct OfHits {
     pub responses: Responses,
     pub cut: Cut,
-    /// Rate at which the exponential window decays, in 1/s.
+    /// Decay rate of the exponential window, in 1/s.
     pub added_decay: Option<f64>,
     pub remarks: Vec<String>,
 }
 
-/// Averages over hits, and what the responses in their windows look like.
+/// Averages over hits, with the decay of the responses in their windows.
 pub(crate) struct AverageOfHits {
     pub average: FrfAverage,
     /// Lines of the shortest window.
@@ -38,17 +38,18 @@ pub(crate) struct AverageOfHits {
     /// Degrees of freedom that were struck, counted from 0.
     pub driven: Vec<usize>,
     segments: Segments,
-    /// Rate at which the exponential window decays, in 1/s.
+    /// Decay rate of the exponential window, in 1/s.
     added_decay: Option<f64>,
-    /// RMS of the last part of a window, and before the pulse, over that of the largest part.
-    left: f64,
+    /// Largest ratio of the RMS of the last part of a window to that of its largest part.
+    at_end: f64,
+    /// Largest ratio of the RMS before the pulse to that of the largest part.
     before: f64,
 }
 
 /// Averages the responses to some hits, each cut to the length of the shortest.
 ///
-/// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM
-/// and K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the
+/// With an exponential window exp(−σt) on force and response, M, C and K become exactly M, C + 2σM
+/// and K + σC + σ²M: every eigenvalue is shifted by −σ, and the response at iω is that of the
 /// machine at iω + σ.
 ///
 /// # Source
@@ -88,21 +89,21 @@ pub(crate) fn average_of_hits(
     };
     let segments = Segments::Periods(len);
     let mut average = FrfAverage::new(lines.clone(), [driven.len(), outputs], kind, segments)?;
-    let all: Vec<usize> = (0..outputs).collect();
-    let (mut left, mut before) = (0.0_f64, 0.0_f64);
+    let channels: Vec<usize> = (0..outputs).collect();
+    let (mut at_end, mut before) = (0.0_f64, 0.0_f64);
     for hit in hits {
         let force = weighted(&hit.held.force, &driven)?;
-        let response = weighted(hit.held.response().0, &all)?;
+        let response = weighted(hit.held.response().0, &channels)?;
         let pulse = force.data().row_iter().position(|row| row.amax() > 0.0).unwrap_or(0);
         before = before.max(over_largest(&response, 0..pulse));
-        left = left.max(over_largest(&response, len - len.div_ceil(PARTS)..len));
+        at_end = at_end.max(over_largest(&response, len - len.div_ceil(PARTS)..len));
         average.push(&force, &response)?;
     }
-    Ok(AverageOfHits { average, lines, driven, segments, added_decay, left, before })
+    Ok(AverageOfHits { average, lines, driven, segments, added_decay, at_end, before })
 }
 
 /// Averages the responses to all good hits of some records.
-pub(super) fn of_hits(
+pub(super) fn responses_of_hits(
     records: &[Windowed],
     rule: &HitRule,
     lines: LineRule<'_>,
@@ -110,15 +111,15 @@ pub(super) fn of_hits(
 ) -> Result<OfHits, AnalysisError> {
     let cut = cut(records, rule)?;
     let averaged = average_of_hits(&cut.hits, lines, how.exponential_percent)?;
-    let AverageOfHits { average, lines, driven, segments, added_decay, left, before } = averaged;
+    let AverageOfHits { average, lines, driven, segments, added_decay, at_end, before } = averaged;
     let frf = average.frf(how.estimator.estimator())?;
     let mut remarks = cut.remarks.clone();
-    if left > DIED_OUT {
+    if at_end > DIED_OUT {
         remarks.push(format!(
             "at the end of a window the response is still {} % of its largest: leakage makes resonances \
              blunt; fit the hits with `hits` of an identification, which takes the ends into account, or give \
              `exponential_percent`",
-            significant(100.0 * left, 2)
+            significant(100.0 * at_end, 2)
         ));
     }
     if before > DIED_OUT {
@@ -142,17 +143,17 @@ pub(super) fn of_hits(
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 
-/// RMS of some samples of a response over that of its largest part, of the channel where that is
-/// largest.
+/// Returns the ratio of the RMS of some samples of a response to that of its largest part, the
+/// largest ratio of all channels.
 pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
     };
     let part = response.len().div_ceil(PARTS);
     let of_channel = |channel: usize| {
-        let all = response.channel(channel);
-        let largest = all.chunks(part).map(rms).fold(0.0, f64::max);
-        if largest > 0.0 { rms(&all[samples.clone()]) / largest } else { 0.0 }
+        let values = response.channel(channel);
+        let largest = values.chunks(part).map(rms).fold(0.0, f64::max);
+        if largest > 0.0 { rms(&values[samples.clone()]) / largest } else { 0.0 }
     };
     (0..response.channels()).map(of_channel).fold(0.0, f64::max)
 }

@@ -1,4 +1,4 @@
-//! The length of the segments that a record of a random test is cut into, where none is given.
+//! Choice of the length of segments for a record of a random test.
 
 use mechid_spectra::Lines;
 use mechid_spectra::frf::FrfEstimator;
@@ -12,29 +12,29 @@ use crate::measurement::Windowed;
 /// Shortest segment, in samples.
 const SHORTEST: usize = 64;
 
-/// Independent averages beyond the number of forces at least.
+/// Minimum number of independent averages in excess of the number of forces.
 const AVERAGES: f64 = 5.0;
 
-/// Number of lines within half the power of a peak from which it is more than the window makes of
-/// any.
-const TOLD: usize = 3;
+/// Minimum number of lines within the half-power bandwidth of a resolved peak; the window alone
+/// gives fewer.
+const RESOLVED_LINES: usize = 3;
 
-/// Part of the most information that is enough: of segments that say nearly as much the shorter
-/// ones have more averages.
+/// Minimum share of the maximum information: segments with slightly less information are shorter
+/// and have more averages.
 const ENOUGH: f64 = 0.9;
 
 impl Segmentation {
-    /// Returns these segments with a length, and a remark on how it was chosen; `None` where it is
-    /// given, and where no segments would have averages enough.
+    /// Returns these segments with a length, and a remark about its choice; `None` if the length is
+    /// given, or if no length gives enough averages.
     ///
-    /// The length is the shortest of the powers of two, as far as they leave averages enough, whose
-    /// responses say at least nine tenths of what the best say, by their coherence, averages and
-    /// number of lines ([`Frf::information`](mechid_spectra::frf::Frf::information)); or a longer
-    /// one in which the narrowest of the largest peaks is three lines wide, if there is one. The
-    /// samples held in memory are looked at.
+    /// The length is the shortest power of two with enough averages that keeps 90 % of the
+    /// information (coherence, averages and number of lines,
+    /// [`Frf::information`](mechid_spectra::frf::Frf::information)); or the next longer one that
+    /// resolves the narrowest of the largest peaks with three lines, if there is one. The choice
+    /// uses the samples in memory.
     ///
     /// # Errors
-    /// The errors of an average over segments.
+    /// As an average over segments.
     pub(crate) fn chosen(
         &self,
         recorded: &Windowed,
@@ -52,13 +52,14 @@ impl Segmentation {
             let lines = rule.lines(&held.force.window(0, len)?, len)?;
             let lines = Lines::new(held.force.sampling().with_len(len)?, lines)?;
             let average = average_of(recorded, &lines, segments, &held.driven)?;
-            // Two forces that one segment cannot tell apart may be told by longer ones.
+            // Longer segments may separate two forces that this segment cannot separate.
             if let Ok(frf) = average.frf(FrfEstimator::H1) {
                 if frf.averages() < AVERAGES + held.driven.len() as f64 {
                     break;
                 }
-                let is_told = Peak::narrowest(&frf).is_none_or(|peak| peak.lines >= TOLD);
-                tried.push((len, frf.information(), is_told));
+                let peak = Peak::narrowest(&frf);
+                let is_resolved = peak.is_none_or(|peak| peak.lines >= RESOLVED_LINES);
+                tried.push((len, frf.information(), is_resolved));
             }
             len *= 2;
         }
@@ -68,13 +69,12 @@ impl Segmentation {
         else {
             return Ok(None);
         };
-        let told = tried[enough..].iter().find(|(.., is_told)| *is_told);
-        let (len, ..) = *told.unwrap_or(&tried[enough]);
-        let why = match len > tried[enough].0 {
-            false => {
-                "whose coherence, averages and lines say nine tenths of what those of any length say"
-            }
-            true => "in which the narrowest peak is wider than the window makes any",
+        let resolved = tried[enough..].iter().find(|(.., is_resolved)| *is_resolved);
+        let (len, ..) = *resolved.unwrap_or(&tried[enough]);
+        let why = if len > tried[enough].0 {
+            "in which the narrowest peak is wider than the window makes any"
+        } else {
+            "whose coherence, averages and lines say nine tenths of what those of any length say"
         };
         let remark = format!("segments of {len} samples were chosen: the shortest {why}");
         Ok(Some((Self { segment: Some(len), ..self.clone() }, remark)))

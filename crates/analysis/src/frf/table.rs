@@ -33,16 +33,16 @@ pub struct FrfTable {
     pub last_sample: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// Every record, the first included.
+    /// All records, including the first.
     pub records: Vec<AveragedRecord>,
     /// Name of the estimator.
     pub estimator: &'static str,
     /// Segments that were averaged.
     pub segments: SegmentRow,
-    /// Every hit of a hammer test, used or left out.
+    /// All hits of a hammer test, used or excluded.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hits: Vec<HitRow>,
-    /// Rate, in 1/s, that an exponential window adds to the decay of every mode.
+    /// Decay rate, in 1/s, that an exponential window adds to every mode.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub added_decay: Option<f64>,
     /// Measured quantity of the response.
@@ -100,8 +100,8 @@ pub struct Response {
     pub motion: usize,
     /// Degree of freedom that is driven, counted from 1.
     pub force: usize,
-    /// Real part, one value per frequency, in the unit of the table; as the other values not a
-    /// number where another force has the line to itself.
+    /// Real part, one value per frequency, in the unit of the table; like the other values it is
+    /// not a number on the interleaved lines of another force.
     pub real: Vec<f64>,
     /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
@@ -123,7 +123,8 @@ pub struct Coherence {
     pub values: Vec<f64>,
 }
 
-/// Number of lines within half the power of a peak from which a window hardly widens it.
+/// Minimum number of lines within the half-power bandwidth of a peak that the window does not
+/// widen.
 const WIDE: usize = 4;
 
 impl FrfTable {
@@ -132,16 +133,16 @@ impl FrfTable {
         let mut responses = Vec::new();
         for motion in 0..n {
             for (input, dof) in averaged.driven.iter().enumerate() {
-                responses.push(Response::of(averaged, (motion, input), *dof));
+                responses.push(Response::new(averaged, (motion, input), *dof));
             }
         }
-        let coherence = (0..n).map(|motion| Coherence::of(averaged, motion)).collect();
+        let coherence = (0..n).map(|motion| Coherence::new(averaged, motion)).collect();
         let omega = averaged.frf.omega().to_vec();
-        Self::of(records, averaged, how, omega, responses, coherence)
+        Self::from_parts(records, averaged, how, omega, responses, coherence)
     }
 
-    /// Makes the table over the hits of a hammer.
-    pub(super) fn of_hits(records: &[Windowed], averaged: OfHits, how: &FrfSettings) -> Self {
+    /// Creates the table of the hits of a hammer.
+    pub(super) fn from_hits(records: &[Windowed], averaged: OfHits, how: &FrfSettings) -> Self {
         let mut table = Self::new(records, &averaged.responses, how);
         table.hits = averaged.cut.rows;
         table.added_decay = averaged.added_decay;
@@ -149,37 +150,38 @@ impl FrfTable {
         table
     }
 
-    /// Makes the table of forces each of which has lines of its own.
+    /// Creates the table of forces with interleaved lines.
     pub(super) fn interleaved(
         records: &[Windowed],
-        found: &Interleaved,
+        responses: &Interleaved,
         how: &FrfSettings,
     ) -> Self {
-        let Interleaved { parts, crosstalk } = found;
+        let Interleaved { parts, crosstalk } = responses;
         let n = records[0].held.force.channels();
-        let all = parts.iter().enumerate().flat_map(|(part, averaged)| {
+        let lines = parts.iter().enumerate().flat_map(|(part, averaged)| {
             averaged.frf.omega().iter().enumerate().map(move |(at, omega)| (*omega, part, at))
         });
-        let mut places: Vec<(f64, usize, usize)> = all.collect();
+        let mut places: Vec<(f64, usize, usize)> = lines.collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut responses = Vec::new();
         for motion in 0..n {
             for (number, averaged) in parts.iter().enumerate() {
                 let indices = places.iter().map(|(_, part, at)| (*part == number).then_some(*at));
                 let indices: Vec<Option<usize>> = indices.collect();
-                responses
-                    .push(Response::of(averaged, (motion, 0), averaged.driven[0]).spread(&indices));
+                responses.push(
+                    Response::new(averaged, (motion, 0), averaged.driven[0]).spread(&indices),
+                );
             }
         }
         let coherence = (0..n).map(|motion| {
-            let each: Vec<Coherence> =
-                parts.iter().map(|averaged| Coherence::of(averaged, motion)).collect();
-            let values = places.iter().map(|(_, part, at)| each[*part].values[*at]).collect();
+            let of_parts: Vec<Coherence> =
+                parts.iter().map(|averaged| Coherence::new(averaged, motion)).collect();
+            let values = places.iter().map(|(_, part, at)| of_parts[*part].values[*at]).collect();
             Coherence { motion: motion + 1, values }
         });
         let coherence = coherence.collect();
         let omega = places.iter().map(|(omega, ..)| *omega).collect();
-        let mut table = Self::of(records, &parts[0], how, omega, responses, coherence);
+        let mut table = Self::from_parts(records, &parts[0], how, omega, responses, coherence);
         table.remarks.push(
             "every force has lines of its own: the responses to it are those on its lines alone"
                 .into(),
@@ -196,7 +198,7 @@ impl FrfTable {
         table
     }
 
-    fn of(
+    fn from_parts(
         records: &[Windowed],
         averaged: &Responses,
         how: &FrfSettings,
@@ -223,7 +225,7 @@ impl FrfTable {
             sample_rate_hz: measured.force.sampling().rate_hz(),
             records: records.iter().zip(&averaged.counts).map(row).collect(),
             estimator: how.estimator.name(),
-            segments: SegmentRow::of(averaged),
+            segments: SegmentRow::new(averaged),
             hits: Vec::new(),
             added_decay: None,
             quantity: kind.to_string(),
@@ -284,7 +286,7 @@ impl FrfTable {
         }
     }
 
-    /// Returns the result as a person reads it.
+    /// Returns the result as text for people.
     fn text(&self) -> String {
         let [low, high] = [self.frequency_hz.first(), self.frequency_hz.last()]
             .map(|hz| compact(hz.copied().unwrap_or(0.0), 5));
@@ -329,13 +331,13 @@ impl FrfTable {
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
-    /// Returns the responses as they are written into files of other programs; `points` names the
-    /// place and direction of each degree of freedom, such as `12+Z`. Empty: node and degree of
-    /// freedom have the same number, and the direction is +X.
+    /// Returns the responses for files of other programs; `points` has the point and direction of
+    /// each degree of freedom, such as `12+Z`. Without points, node and degree of freedom have the
+    /// same number, and the direction is +X.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and if every
-    /// force has lines of its own.
+    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and for forces
+    /// with interleaved lines.
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
         if self.is_interleaved() {
@@ -441,7 +443,7 @@ impl fmt::Display for FrfTable {
 }
 
 impl Response {
-    fn of(responses: &Responses, (motion, input): (usize, usize), dof: usize) -> Self {
+    fn new(responses: &Responses, (motion, input): (usize, usize), dof: usize) -> Self {
         let frf = &responses.frf;
         let lines = 0..frf.omega().len();
         let h: Vec<_> = lines.clone().map(|at| frf.response(at)[(motion, input)]).collect();
@@ -480,14 +482,14 @@ impl Response {
 }
 
 impl Coherence {
-    fn of(averaged: &Responses, motion: usize) -> Self {
+    fn new(averaged: &Responses, motion: usize) -> Self {
         let values = averaged.frf.coherence().column(motion).iter().copied().collect();
         Self { motion: motion + 1, values }
     }
 }
 
 impl SegmentRow {
-    fn of(responses: &Responses) -> Self {
+    fn new(responses: &Responses) -> Self {
         let (averages, count) = (responses.frf.averages(), responses.counts.iter().sum());
         match responses.segments {
             Segments::Periods(samples) => {

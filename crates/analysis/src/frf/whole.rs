@@ -1,20 +1,19 @@
-//! Records that may be averaged whole, without a window.
+//! Records that can be averaged as a whole, without a window.
 
 use super::of_hits::{PARTS, over_largest};
 use crate::measurement::Windowed;
 
-/// RMS of the last part of a record over that of its largest part, noise included, up to which it
-/// ends at rest.
+/// Maximum ratio of the RMS of the last part of a record, including noise, to that of its largest
+/// part for a record that ends at rest.
 const AT_REST: f64 = 0.05;
 
-/// RMS difference of two forces over their RMS, noise included, up to which they are one.
-const ALIKE: f64 = 0.1;
+/// Maximum ratio of the RMS difference of two equal forces, including noise, to their RMS.
+const SAME_FORCE: f64 = 0.1;
 
-/// Returns whether several records close on themselves, so that no sample needs the ones before it:
-/// bursts, at whose end force and response are at rest, or one period after another of the same
-/// force.
+/// Returns whether several records have no transients: bursts with force and response at rest at
+/// the end, or successive periods of the same force.
 ///
-/// One record is cut into segments whatever it is, for it gives no average as a whole.
+/// A single record is always cut into segments, because an average needs several.
 pub(super) fn close(records: &[Windowed]) -> bool {
     records.len() > 1 && (records.iter().all(ends_at_rest) || repeat(records))
 }
@@ -31,6 +30,6 @@ fn repeat(records: &[Windowed]) -> bool {
     let first = records[0].held.force.data();
     records[1..].iter().all(|recorded| {
         let force = recorded.held.force.data();
-        force.shape() == first.shape() && (force - first).norm() <= ALIKE * first.norm()
+        force.shape() == first.shape() && (force - first).norm() <= SAME_FORCE * first.norm()
     })
 }

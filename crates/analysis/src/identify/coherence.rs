@@ -68,7 +68,7 @@ impl Identified {
             else {
                 return Ok(None);
             };
-            let averaged = Responses::of(&self.records, &segments, Estimator::H1, rule)?;
+            let averaged = Responses::new(&self.records, &segments, Estimator::H1, rule)?;
             ResponseCoherence::new(&averaged.frf, averaged.averages())
         } else {
             return Ok(None);

@@ -46,7 +46,7 @@ pub fn fit(
     let chosen = if period_given { None } else { segments.chosen(&records[0], lines)? };
     let segments = chosen.as_ref().map_or(segments, |(segments, _)| segments);
     let estimate =
-        |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
+        |recorded| Responses::new(std::slice::from_ref(recorded), segments, *estimator, lines);
     let mut responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
     let measured = joined(&responses)?;
     let Outcome { name, estimate, misfit, remark, settled } =

@@ -1,4 +1,4 @@
-//! Conversion of columns to SI units, and time axes in a doubtful unit.
+//! Conversion of columns to SI units, and time axes with a doubtful unit.
 
 use mechid_checks::{Finding, TimeUnit};
 use mechid_io::{Evidence, Quantity, StatedUnit, Table, TimeAxis, escaped};
@@ -8,15 +8,14 @@ use super::Reading;
 use crate::AnalysisError;
 use crate::text::{compact, significant};
 
-/// Use of a column: its name or number, the quantity that it must hold, and the setting that names
-/// it.
+/// Use of a column: its name or number, its required quantity, and its setting.
 #[derive(Debug, Clone, Copy)]
 pub struct Role<'a> {
     /// Column.
     pub column: &'a String,
-    /// Quantity that was measured.
+    /// Measured quantity.
     pub quantity: Quantity,
-    /// The setting.
+    /// Setting that names the column.
     pub setting: &'static str,
 }
 
@@ -25,23 +24,23 @@ pub struct Role<'a> {
 pub struct ToSi {
     /// Factor of each column, in SI units per unit of the column.
     pub factors: Vec<f64>,
-    /// Columns in other units, and a time axis that may be.
+    /// Remarks about columns in other units, and about a time axis in a doubtful unit.
     pub remarks: Vec<String>,
-    /// Texts in headers that may be units.
+    /// Findings on texts in headers that may be units.
     pub findings: Vec<Finding>,
 }
 
 impl ToSi {
-    /// Returns the factors for columns with these labels and what their headers state about units.
+    /// Returns the factors for columns with these labels and the units stated in their headers.
     ///
     /// # Errors
-    /// [`AnalysisError::Unit`] if a unit is one of another quantity.
+    /// [`AnalysisError::Unit`] if a unit belongs to another quantity.
     pub fn new(
         file: &str,
         columns: impl Iterator<Item = (String, Option<StatedUnit>)>,
         roles: &[Role<'_>],
     ) -> Result<Self, AnalysisError> {
-        let (mut all, mut converted) = (Self::default(), Vec::new());
+        let (mut to_si, mut converted) = (Self::default(), Vec::new());
         for ((label, stated), role) in columns.zip(roles) {
             let used = stated.as_ref().and_then(StatedUnit::used);
             if let Some(unit) = used.filter(|unit| unit.quantity != role.quantity) {
@@ -54,19 +53,19 @@ impl ToSi {
                     wanted: role.quantity,
                 });
             }
-            all.factors.push(used.map_or(1.0, |unit| unit.in_si));
+            to_si.factors.push(used.map_or(1.0, |unit| unit.in_si));
             if let Some(unit) = used.filter(|unit| unit.in_si != 1.0) {
                 converted.push(format!("{label} in {}", escaped(&unit.name)));
             }
-            all.findings.extend(stated.and_then(|stated| doubt(&label, &stated, role.quantity)));
+            to_si.findings.extend(stated.and_then(|stated| doubt(&label, &stated, role.quantity)));
         }
         if !converted.is_empty() {
-            all.remarks.push(format!("{file}: converted to SI units: {}", converted.join(", ")));
+            to_si.remarks.push(format!("{file}: converted to SI units: {}", converted.join(", ")));
         }
-        Ok(all)
+        Ok(to_si)
     }
 
-    /// Returns the factors by the units that the columns of `table` say.
+    /// Returns the factors from the units in the headers of `table`.
     ///
     /// # Errors
     /// As [`ToSi::new`], and if there is no such column.
@@ -79,13 +78,13 @@ impl ToSi {
         Self::new(table.file(), columns, roles)
     }
 
-    /// Returns the factor of a column; 1 where there is no such column.
+    /// Returns the factor of a column; 1 if there is no such column.
     pub fn factor(&self, column: usize) -> f64 {
         self.factors.get(column).copied().unwrap_or(1.0)
     }
 }
 
-/// Returns the finding about a text that may be a unit, if there is a doubt.
+/// Returns the finding about a text that may be a unit, if it is doubtful.
 pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Option<Finding> {
     let unit = stated.unit.as_ref().filter(|unit| unit.quantity == wanted);
     (stated.evidence != Evidence::Stated).then(|| {
@@ -99,8 +98,7 @@ pub(crate) fn doubt(column: &str, stated: &StatedUnit, wanted: Quantity) -> Opti
     })
 }
 
-/// Returns a remark on a text in the header of a column that may be a unit, whatever the column
-/// measures.
+/// Returns a remark on a text in the header of a column that may be a unit, for any quantity.
 pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     let stated = table.stated_unit(column, None)?;
     if stated.evidence == Evidence::Stated || table.values(column).is_err() {
@@ -125,18 +123,17 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
     ))
 }
 
-/// Relative difference of two sampling rates that are one: a time column is printed with some
-/// digits.
+/// Maximum relative difference of equal sampling rates, because a time column has few digits.
 const SAME_RATE: f64 = 1e-4;
 
-/// Returns a remark if the sampling rate that was asked for is not that of the file: of its time
-/// column, or of a number that states it by its name (`Fs`).
+/// Returns a remark if the given sampling rate differs from that of the file: of its time column,
+/// or of a number with the name of a sampling rate (`Fs`).
 pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<String> {
     let rate_hz = reading.sample_rate_hz?;
     let of_file = Reading { sample_rate_hz: None, ..reading.clone() };
     let time = of_file.time_axis(table)?;
-    let own_hz = table.sampling(&time, &[] as &[&str]).ok()?.rate_hz();
-    if (own_hz - rate_hz).abs() <= SAME_RATE * rate_hz {
+    let file_hz = table.sampling(&time, &[] as &[&str]).ok()?.rate_hz();
+    if (file_hz - rate_hz).abs() <= SAME_RATE * rate_hz {
         return None;
     }
     let source = match (&time, table.stated_rate()) {
@@ -144,39 +141,39 @@ pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<Stri
         (_, Some((name, value))) => format!("{} = {}", escaped(name), message::number(*value)),
         _ => return None,
     };
-    let [rate, own] = [rate_hz, own_hz].map(|hz| compact(hz, 8));
-    Some(format!("{}: `sample_rate` {rate} Hz is used; {source} says {own} Hz", table.file()))
+    let [rate, of_file] = [rate_hz, file_hz].map(|hz| compact(hz, 8));
+    Some(format!("{}: `sample_rate` {rate} Hz is used; {source} says {of_file} Hz", table.file()))
 }
 
-/// Sampling rate, in Hz, below which a time column without a unit is doubtful whatever its length:
-/// structures that need no more swing in minutes. Milliseconds taken as seconds look so at all
-/// rates up to 2 kHz, numbers of samples at any.
+/// Maximum doubtful sampling rate, in Hz, of a time column without a unit, for any length: only
+/// very slow structures need no more. Milliseconds read as seconds give such a rate up to 2 kHz,
+/// and numbers of samples at any rate.
 const SLOW_HZ: f64 = 2.0;
 
-/// Sampling rate, in Hz, below which records longer than [`LONG_S`] are doubtful: buildings are
-/// sampled so, but seldom without a unit. Milliseconds look so at all rates up to 20 kHz in records
-/// of a second or more.
+/// Maximum doubtful sampling rate, in Hz, of records longer than [`LONG_S`]: buildings have such
+/// rates, but seldom without a unit. Milliseconds read as seconds give such a rate up to 20 kHz in
+/// records of at least a second.
 const RATHER_SLOW_HZ: f64 = 20.0;
 
-/// Duration, in s, from which [`RATHER_SLOW_HZ`] holds.
+/// Minimum duration, in s, for the limit [`RATHER_SLOW_HZ`].
 const LONG_S: f64 = 1000.0;
 
-/// Sampling rate, in Hz, above which a time column without a unit is doubtful: no channel of a
-/// force or a response is sampled so fast, but day numbers look so.
+/// Minimum doubtful sampling rate, in Hz, of a time column without a unit: no force or response
+/// needs it, but day numbers read as seconds give it.
 const FAST_HZ: f64 = 1e7;
 
-/// Sampling rate, in Hz, above which instants behind [`DAY_NUMBERS`] are doubtful: that of day
-/// numbers at 1 Hz.
+/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: that of day numbers at
+/// 1 Hz.
 const RATHER_FAST_HZ: f64 = 86_400.0;
 
 /// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.
 const DAY_NUMBERS: f64 = 20_000.0;
 
-/// Size of a day, in s.
+/// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Returns a finding if a time column without a unit gives a record so slow and long that it may be
-/// in milliseconds, or so fast that it may be in days.
+/// Returns a finding if the sampling rate of a time column without a unit is so low and the record
+/// so long that it may be in milliseconds, or so high that it may be in days.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
@@ -191,7 +188,7 @@ pub(crate) fn doubtful_time(
     if !(is_slow || is_fast) || table.says_unit_of_time(column) {
         return None;
     }
-    // The largest unit that makes the record no slow one.
+    // The largest unit with a plausible sampling rate.
     let small = [("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
     let small = small.into_iter().find(|(_, size)| rate_hz / size > SLOW_HZ);
     let (unit, factor) = if is_slow { small.unwrap_or(("ms", 1e-3)) } else { ("days", DAY_S) };
@@ -199,15 +196,15 @@ pub(crate) fn doubtful_time(
     Some(Finding::TimeUnit(TimeUnit { column, rate_hz, duration_s, unit, factor }))
 }
 
-/// Error of a sampling rate by the digits of its time column, relative to the rate, from which
-/// frequencies may be known less well for it than for the noise.
+/// Minimum relative error of a sampling rate, due to the digits of its time column, for a remark; a
+/// smaller error is negligible against the noise of frequencies.
 const RATE_ERROR: f64 = 1e-5;
 
-/// Rounding over the time step, below which instants are rounded ones.
+/// Maximum ratio of rounding to time step of rounded instants; even instants have 1.
 const EVEN: f64 = 0.99;
 
-/// Returns a remark if the digits of a time column leave the sampling rate so uncertain that
-/// frequencies suffer.
+/// Returns a remark if the digits of a time column make the sampling rate so uncertain that the
+/// frequencies are affected.
 pub(crate) fn coarse_time(
     table: &Table,
     time: &TimeAxis<'_>,

@@ -100,7 +100,7 @@ pub fn choose(
     Ok((method, why))
 }
 
-/// Finds the force, with the uncertainty of the machine if that is known.
+/// Reconstructs the force, with the uncertainty of the machine if it is known.
 pub fn find(
     request: &Request,
     machine: &Machine,
@@ -131,9 +131,10 @@ fn with_machine(
     machine: &UncertainSystem,
     find: &Finder<'_>,
 ) -> Result<IdentifiedForce, AnalysisError> {
-    Ok(match machine.parameters().is_empty() {
-        true => find(machine.system())?,
-        false => with_uncertain_system(machine, find)?,
+    Ok(if machine.parameters().is_empty() {
+        find(machine.system())?
+    } else {
+        with_uncertain_system(machine, find)?
     })
 }
 
@@ -141,7 +142,8 @@ fn noise(request: &Request, unknown: Noise) -> Noise {
     if request.noise.is_empty() { unknown } else { Noise::PerChannel(request.noise.clone()) }
 }
 
-/// The force by the equation of motion, sample by sample or from each to the next.
+/// Reconstructs the force by the equation of motion, sample by sample or from each sample to the
+/// next.
 pub fn equation(
     request: &Request,
     machine: &Machine,
@@ -172,7 +174,8 @@ pub fn equation(
     })
 }
 
-/// The force of a machine with nonlinear terms, of the motion before the phase of its channels.
+/// Reconstructs the force of a machine with nonlinear terms, from the motion corrected for the
+/// phase of its channels.
 fn with_terms(
     part: &NonlinearPart,
     response: &Response,
@@ -193,7 +196,8 @@ fn with_terms(
     })?)
 }
 
-/// The noise of each channel as that of a complete motion, if it is stated.
+/// Returns the stated noise of each channel as the noise of a complete motion; `None` without a
+/// statement.
 fn motion_noise(
     request: &Request,
     motion: &Measurement,
@@ -203,7 +207,7 @@ fn motion_noise(
     if levels.is_empty() {
         return Ok(None);
     }
-    let of = |quantity: ResponseQuantity| -> Vec<f64> {
+    let noise_of = |quantity: ResponseQuantity| -> Vec<f64> {
         let find = |dof| channels.iter().position(|c| *c == Channel { dof, quantity });
         (0..dofs).filter_map(find).map(|at| levels[at]).collect()
     };
@@ -212,7 +216,7 @@ fn motion_noise(
         ResponseQuantity::Velocity,
         ResponseQuantity::Acceleration,
     ]
-    .map(of);
+    .map(noise_of);
     Ok(Some(MotionNoise::new(x, v, a)?))
 }
 
@@ -266,14 +270,15 @@ fn lines(
     })
 }
 
-/// Evidence of the noise where it is not stated: lines that carry no force, if there are enough of
-/// them. Lines outside a band may carry one that is not asked for.
+/// Returns the source of the noise if it is not stated: the lines without force, if there are
+/// enough. Lines outside a band may have a force that is not reconstructed.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);
     let needed = mechid_force::MIN_OUTSIDE_LINES;
-    match given.is_some_and(|lines| inner_lines(motion).len() >= lines.len() + needed) {
-        true => Noise::OutsideLines,
-        false => Noise::Unknown,
+    if given.is_some_and(|lines| inner_lines(motion).len() >= lines.len() + needed) {
+        Noise::OutsideLines
+    } else {
+        Noise::Unknown
     }
 }
 
@@ -292,16 +297,18 @@ fn filtered(
     };
     let noise = noise(request, outside(request, motion));
     let regular = regularised(machine.system(), motion, forced, &extent, filter, &noise)?;
-    // The machine is moved with the parameter that was chosen, not with another choice.
+    // The perturbed machines use the same regularisation parameter.
     let fixed = match (filter, regular.parameter) {
         (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
         (Filter::TruncatedSvd(_), Some(lambda)) => Filter::TruncatedSvd(Rule::Given(lambda)),
         _ => filter,
     };
-    let banded = of_this_band(motion, &regular.force)?;
-    let find = |system: &SecondOrderSystem| match system == machine.system() {
-        true => Ok(regular.force.clone()),
-        false => regularised(system, &banded, forced, &extent, fixed, &noise).map(|r| r.force),
+    let banded = in_band_of(motion, &regular.force)?;
+    let find = |system: &SecondOrderSystem| {
+        if system == machine.system() {
+            return Ok(regular.force.clone());
+        }
+        regularised(system, &banded, forced, &extent, fixed, &noise).map(|r| r.force)
     };
     let force = with_machine(machine, &find)?;
     let mut chosen = Vec::new();
@@ -324,23 +331,20 @@ fn filtered(
     })
 }
 
-/// The measurement, with the band in which the force was found as the one asked for: a change of
-/// the machine must not choose another.
-fn of_this_band(
-    motion: &Measurement,
-    force: &IdentifiedForce,
-) -> Result<Measurement, AnalysisError> {
+/// Returns the measurement with the band of the reconstructed force, so that a perturbed machine
+/// has the same band.
+fn in_band_of(motion: &Measurement, force: &IdentifiedForce) -> Result<Measurement, AnalysisError> {
     Ok(match force.band_hz() {
         Some(band_hz) => motion.clone().in_band(band_hz)?,
         None => motion.clone(),
     })
 }
 
-/// Part of the power of a response on the lines of the force below which it has another cause.
+/// Minimum share of the power of a response on the given lines; with less, it has another cause.
 const FEW: f64 = 0.5;
 
-/// Returns a remark on the channel of which the lines given hold least, if that is little: they may
-/// have been counted in another period than that of the window.
+/// Returns a remark about the channel with the smallest share of its power on the given lines, if
+/// the share is small: the lines may refer to another period than that of the window.
 fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;
     let spectrum = Spectrum::of(motion.record());
@@ -348,9 +352,9 @@ fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
         lines.map(|n| spectrum.line(n, channel).norm_sqr()).sum()
     };
     let shares = (0..motion.channels().len()).map(|channel| {
-        let all = power(&mut (1..spectrum.len()), channel);
-        let held = power(&mut lines.iter().copied(), channel);
-        (channel, if all > 0.0 { held / all } else { 1.0 })
+        let total = power(&mut (1..spectrum.len()), channel);
+        let on_lines = power(&mut lines.iter().copied(), channel);
+        (channel, if total > 0.0 { on_lines / total } else { 1.0 })
     });
     let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
     let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
@@ -363,8 +367,7 @@ fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     ))
 }
 
-/// The noise of every channel as it was measured, in its own unit, from that of the mean of
-/// periods.
+/// Returns the noise of every measured channel, in its unit, from the noise of the mean of periods.
 fn noise_levels<'a>(
     motion: &'a Measurement,
     noise: &'a [f64],
@@ -396,19 +399,22 @@ fn smoothed(
         level => Tuning::NoiseKnown(level.to_vec()),
     };
     let noise_std = Some(&request.noise[..]).filter(|noise| !noise.is_empty());
-    let is_found = request.start == Start::InMotion
+    let is_at_rest = request.start == Start::InMotion
         && starts_at_rest(machine.system(), motion, forced, noise_std).unwrap_or(false);
-    let (start, why) = match is_found {
-        true => (Start::FromRest, format!("{why}, which begins at rest")),
-        false => (request.start, why),
+    let (start, why) = if is_at_rest {
+        (Start::FromRest, format!("{why}, which begins at rest"))
+    } else {
+        (request.start, why)
     };
     let smoothed = kalman(machine.system(), motion, forced, start, &tuning)?;
     let fixed =
         Tuning::Given { noise_std: smoothed.noise_std.clone(), model: smoothed.model.clone() };
-    let banded = of_this_band(motion, &smoothed.force)?;
-    let find = |system: &SecondOrderSystem| match system == machine.system() {
-        true => Ok(smoothed.force.clone()),
-        false => kalman(system, &banded, forced, start, &fixed).map(|found| found.force),
+    let banded = in_band_of(motion, &smoothed.force)?;
+    let find = |system: &SecondOrderSystem| {
+        if system == machine.system() {
+            return Ok(smoothed.force.clone());
+        }
+        kalman(system, &banded, forced, start, &fixed).map(|smoothed| smoothed.force)
     };
     let force = with_machine(machine, &find)?;
     let mut chosen = vec![
@@ -421,7 +427,7 @@ fn smoothed(
     chosen.extend(noise_levels(motion, &smoothed.noise_std, 1));
     let mut unexplained = force.unexplained().map(<[_]>::to_vec);
     if request.noise.is_empty() {
-        // The level is that of the fit, which takes for noise what it does not explain.
+        // The noise level comes from the fit and includes the unexplained part of the response.
         unexplained.iter_mut().flatten().for_each(|channel| channel.noise = None);
     }
     let method = "augmented Kalman filter and smoother, tuned by likelihood";

@@ -1,15 +1,15 @@
-//! Excitation by the force, as an identification needs it.
+//! Excitation by the force.
 
 use mechid_signal::measures::{self, Band};
 use mechid_signal::{Record, Spectrum};
 
 use crate::AnalysisError;
 
-/// A line this far below the strongest, in dB, is no longer driven: a multisine stands far above
-/// the noise between its lines.
+/// Maximum difference of an excited line from the strongest one, in dB: the lines of a multisine
+/// are far above the noise between them.
 pub const DROP_DB: f64 = 20.0;
 
-/// Numbers of one force that acts.
+/// Measures of one acting force.
 pub struct Excitation {
     /// Degree of freedom, counted from 1.
     pub dof: usize,
@@ -18,11 +18,11 @@ pub struct Excitation {
     /// Peak factor, half the range over √2 times the RMS, a ratio; `None` for a force that does not
     /// vary.
     pub peak_factor: Option<f64>,
-    /// Lines driven.
+    /// Number of excited lines.
     pub lines: usize,
-    /// Band of the lines driven.
+    /// Band of the excited lines.
     pub band: Option<Band>,
-    /// Spectral flatness of the driven lines, a ratio from 0 to 1.
+    /// Spectral flatness of the excited lines, a ratio from 0 to 1.
     pub flatness: Option<f64>,
     /// Order of persistent excitation.
     pub order: usize,

@@ -7,11 +7,11 @@ use crate::identify::checks::CheckRow;
 use crate::identify::summary::of_least_squares;
 use crate::text::significant;
 
-/// Residual power over what the noise explains, below which standard errors are too large by more
-/// than a factor of √2.
+/// Minimum ratio of the residual power to its expectation; with less, the standard errors are too
+/// large by more than a factor of √2.
 const OVERSTATED: f64 = 0.5;
 
-/// A prediction of another record below this fit, in per cent, leaves as much as it explains.
+/// Minimum fit of a good prediction of another record, in per cent.
 const POOR_FIT: f64 = 50.0;
 
 /// Returns the evidence against the numbers, the worst first.
@@ -19,7 +19,7 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.identified.summary();
     let mut doubts = found_out(&report.checks, Verdict::Bad);
     doubts.extend(report.doubts());
-    // Of too large a residual the checks tell.
+    // The checks report a residual that is too large.
     if let Some(misfit) =
         contents.identified.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
     {
@@ -32,7 +32,7 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     doubts
 }
 
-/// The checks with this verdict, a sentence for each subject.
+/// Returns the checks with this verdict, one sentence for each subject.
 fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
     let mut sentences: Vec<(Subject, String)> = Vec::new();
     for check in checks.iter().filter(|check| check.verdict == verdict) {
@@ -41,13 +41,13 @@ fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
             continue;
         }
         let of_subject = || checks.iter().filter(|check| check.subject == subject);
-        let alike = of_subject().filter(|check| check.verdict == verdict).count();
-        let all = of_subject().count();
+        let count = of_subject().filter(|check| check.verdict == verdict).count();
+        let total = of_subject().count();
         sentences.push((
             subject,
-            match alike {
+            match count {
                 1 => format!("{subject}: {}", check.sentence()),
-                _ => format!("{subject}: {alike} of {all} checks, such as {}", check.sentence()),
+                _ => format!("{subject}: {count} of {total} checks, such as {}", check.sentence()),
             },
         ));
     }

@@ -62,13 +62,13 @@ impl<'a> Review<'a> {
     /// If a file cannot be read again, and if the force cannot be reconstructed.
     pub fn of(identified: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
         let records = (0..identified.records().len())
-            .map(|at| RecordReview::of(identified, at, reconstruct_force))
+            .map(|at| RecordReview::new(identified, at, reconstruct_force))
             .collect::<Result<Vec<_>, _>>()?;
         let validation = match identified.validated() {
             Some(other) => identified.prediction().predict(&identified.fitted().model()?, other)?,
             None => Vec::new(),
         };
-        let receptance = Receptance::of(identified, &records).map_err(|reason| reason.to_string());
+        let receptance = Receptance::new(identified, &records).map_err(|reason| reason.to_string());
         Ok(Self { identified, receptance, records, validation })
     }
 
@@ -79,7 +79,7 @@ impl<'a> Review<'a> {
 }
 
 impl<'a> RecordReview<'a> {
-    fn of(
+    fn new(
         identified: &'a Identified,
         at: usize,
         reconstruct_force: bool,
@@ -95,12 +95,13 @@ impl<'a> RecordReview<'a> {
             }
             _ => None,
         };
-        let whole = Whole::of(recorded)?;
+        let whole = Whole::new(recorded)?;
         let mean = whole.mean.as_ref().filter(|_| lines.is_some());
         let period = mean.unwrap_or(held);
-        let reconstruction = match reconstruct_force {
-            true => Some(Reconstruction::of(identified, period, lines.clone())?),
-            false => None,
+        let reconstruction = if reconstruct_force {
+            Some(Reconstruction::new(identified, period, lines.clone())?)
+        } else {
+            None
         };
         Ok(Self {
             recorded,
@@ -108,7 +109,7 @@ impl<'a> RecordReview<'a> {
             index: at,
             channels: channels::channels(held, &whole, &held.names),
             excitations: excitation::excitations(&period.force)?,
-            residual: Residual::of(identified, at, mean).map_err(|reason| reason.to_string()),
+            residual: Residual::new(identified, at, mean).map_err(|reason| reason.to_string()),
             reconstruction,
             lines,
             whole,

@@ -1,4 +1,4 @@
-//! The receptance that records show, whatever was fitted.
+//! Measured receptance of the records, for any method of the fit.
 
 use mechid_signal::Extent;
 use mechid_signal::Window;
@@ -16,71 +16,70 @@ use crate::identify::spectra::periods;
 use crate::identify::{Identified, ResponseCoherence};
 use crate::measurement::{Block, IN_MEMORY_SAMPLES, Windowed};
 
-/// Part of an open record that a segment takes; half overlapped, this makes fifteen segments. Of a
-/// record too long to be held there are more of them, not longer ones.
+/// Ratio of the length of an open record to that of a segment; with half overlap this gives fifteen
+/// segments. Records too long for memory have more segments of the same length.
 const SEGMENTS: usize = 8;
 
-/// A line is shown if the force explains at least this part of the power of every motion.
+/// Minimum coherence of every motion with the force on a line that is shown.
 const EXPLAINED: f64 = 0.5;
 
-/// A force counts as acting alone on a line if the others have less than this part of it.
+/// Maximum ratio of the other forces to a force that acts alone on a line.
 const ALONE: f64 = 1e-3;
 
-/// The same of others that have nothing to do with it: the noise of their load cells.
-const ALONE_BESIDE_NOISE: f64 = 0.1;
+/// Maximum ratio of the other forces to a force that acts alone, if the others are only noise of
+/// their load cells.
+const ALONE_WITH_NOISE: f64 = 0.1;
 
-/// Coherence from line to line from which a force is a part of another, and the fewest lines that
-/// tell.
-const PART_OF_IT: f64 = 0.5;
+/// Minimum coherence from line to line of a force channel that contains a part of another force.
+const CROSSTALK_COHERENCE: f64 = 0.5;
+/// Minimum number of lines for this coherence.
 const FEWEST_LINES: usize = 8;
 
-/// A measured receptance, and where it comes from.
+/// A measured receptance and its origin.
 pub struct Receptance {
     /// Receptance, line by line.
     pub data: FrequencyData,
     /// Origin of the receptance, in words.
     pub origin: String,
-    /// Coherence of responses and forces, of records that are no periods.
+    /// Coherence of responses and forces, for open records.
     pub coherence: Option<ResponseCoherence>,
 }
 
-/// Rows of data on which one force acts alone, so that motion over force is the receptance.
+/// Rows of data with a single force, so that the ratio of motion to force is the receptance.
 pub struct ActingAlone<'a> {
     data: &'a FrequencyData,
-    /// Part of force j, the column, that force k, the row, has at most where j acts alone.
+    /// Maximum ratio of force k (row) to force j (column) on lines with force j alone.
     limits: DMatrix<f64>,
 }
 
 impl<'a> ActingAlone<'a> {
-    /// Tells noise in the channel of an idle force from a part of the force that acts, by its
-    /// coherence from line to line where one force acts.
-    pub fn of(data: &'a FrequencyData) -> Self {
+    /// Distinguishes noise in the channel of an unexcited force from crosstalk of the acting force,
+    /// by the coherence from line to line.
+    pub fn new(data: &'a FrequencyData) -> Self {
         let n = data.dof();
         let limits = DMatrix::from_fn(n, n, |k, j| {
             let driven = |row: &usize| {
                 let amplitude = data.force()[(*row, j)].norm();
-                let limit = ALONE_BESIDE_NOISE * amplitude;
+                let limit = ALONE_WITH_NOISE * amplitude;
                 let others = (0..n).filter(|other| *other != j);
                 amplitude > 0.0
                     && others.into_iter().all(|other| data.force()[(*row, other)].norm() <= limit)
             };
-            // Each line counts alike, whatever drives it.
+            // The ratio gives every line the same weight.
             let part = |row: usize| data.force()[(row, k)] / data.force()[(row, j)];
             let parts: Vec<Complex<f64>> = (0..data.len()).filter(driven).map(part).collect();
             let power: f64 = parts.iter().map(|part| part.norm_sqr()).sum();
-            // A part of a force hardly turns from line to line, or always alike where it is late.
-            let alike: Complex<f64> = parts.windows(2).map(|two| two[0].conj() * two[1]).sum();
-            let (lines, coherence) = (parts.len(), alike.norm() / power);
-            match lines >= FEWEST_LINES && coherence < PART_OF_IT {
-                true => ALONE_BESIDE_NOISE,
-                false => ALONE,
-            }
+            // The phase of crosstalk is nearly constant from line to line, or linear with a delay.
+            let products: Complex<f64> = parts.windows(2).map(|two| two[0].conj() * two[1]).sum();
+            let (lines, coherence) = (parts.len(), products.norm() / power);
+            let is_noise = lines >= FEWEST_LINES && coherence < CROSSTALK_COHERENCE;
+            if is_noise { ALONE_WITH_NOISE } else { ALONE }
         });
         Self { data, limits }
     }
 
-    /// Returns `true` if on a row of the data no force acts but the one on degree of freedom `dof`,
-    /// both counted from 0.
+    /// Returns `true` if the force on degree of freedom `dof` acts alone on a row of the data, both
+    /// counted from 0.
     pub fn on(&self, row: usize, dof: usize) -> bool {
         let amplitude = self.data.force()[(row, dof)].norm();
         let absent =
@@ -90,12 +89,12 @@ impl<'a> ActingAlone<'a> {
 }
 
 impl Receptance {
-    /// Returns the data fitted in the frequency domain; otherwise those of whole periods, or
-    /// averaged over segments of open records.
+    /// Returns the data of a fit in the frequency domain; otherwise those of whole periods, or
+    /// averages over segments of open records.
     ///
     /// # Errors
-    /// If the records show none.
-    pub fn of(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
+    /// [`AnalysisError`] if the records do not show a receptance.
+    pub fn new(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
         let (data, origin) = measured(identified, parts)?;
         Ok(Self { data, origin, coherence: identified.coherence()? })
     }
@@ -106,7 +105,7 @@ fn measured(
     identified: &Identified,
     parts: &[RecordReview<'_>],
 ) -> Result<(FrequencyData, String), AnalysisError> {
-    // One window without averages shows little of a random response.
+    // A random response needs averages: one window is not enough.
     let fitted = identified.fitted();
     if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
         let origin = "measured on the lines of each hit, without what the ends of its window add";
@@ -122,42 +121,42 @@ fn measured(
         return Ok((data.clone(), origin.into()));
     }
     let first = parts[0].held();
-    // The beginning of a period is none.
-    let held = first.periods > 1 || first.held_to().is_none();
-    let period = match identified.fitted().prediction {
-        Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => held,
+    // A period that is not completely in memory cannot be transformed.
+    let is_complete = first.periods > 1 || first.held_to().is_none();
+    let is_periodic = match identified.fitted().prediction {
+        Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => is_complete,
         Prediction::Sampled { .. } => first.periods > 1,
     };
-    let each = |part: &RecordReview<'_>| match period {
-        true => of_periods(part),
-        false => of_segments(part.recorded),
+    let spectra = |part: &RecordReview<'_>| {
+        if is_periodic { period_spectra(part) } else { segment_spectra(part.recorded) }
     };
-    let mut data = each(&parts[0])?;
+    let mut data = spectra(&parts[0])?;
     for part in &parts[1..] {
-        data = data.and(&each(part)?)?;
+        data = data.and(&spectra(part)?)?;
     }
-    let origin = match period {
-        true => "measured on the lines of whole periods that carry force".into(),
-        false => format!(
+    let origin = if is_periodic {
+        "measured on the lines of whole periods that carry force".into()
+    } else {
+        format!(
             "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
                  where the force explains at least half of the motion (a resonance narrower than \
                  the lines looks blunter than it is)",
             segment(first)
-        ),
+        )
     };
-    // A held or linear force is weaker than its samples there, and the motion with it.
+    // Towards half the sampling rate a held or linear force is smaller than its samples, as is the
+    // motion.
     let origin =
         origin + "; towards half the sampling rate the force between the samples shows, too";
     Ok((data, origin))
 }
 
-fn of_periods(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {
+fn period_spectra(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {
     let held = part.held();
-    // Several periods tell their noise; of one that is longer than what is held there is the mean.
-    let force = match held.force.len() < held.period {
-        true => &part.whole.period(held).force,
-        false => &held.force,
-    };
+    // The scatter of several periods is their noise; a period longer than the memory has only its
+    // mean.
+    let force =
+        if held.force.len() < held.period { &part.whole.period(held).force } else { &held.force };
     let chosen = choose_lines(force, held.period, &LineChoice::Driven)?;
     let lines = Lines::new(force.sampling().with_len(held.period)?, chosen)?;
     Ok(periods(part.recorded, &lines)?.mean()?)
@@ -167,16 +166,16 @@ fn segment(measured: &Block) -> usize {
     ((measured.period * measured.periods).min(IN_MEMORY_SAMPLES) / SEGMENTS).max(1)
 }
 
-fn of_segments(recorded: &Windowed) -> Result<FrequencyData, AnalysisError> {
+fn segment_spectra(recorded: &Windowed) -> Result<FrequencyData, AnalysisError> {
     let held = &recorded.held;
     let len = segment(held);
     let segments = Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann };
     let sampling = held.force.sampling().with_len(len)?;
-    let all = Lines::new(sampling, lines::full(sampling))?;
-    let responses = average(recorded, &all, segments)?.frf(FrfEstimator::H1)?;
+    let lines = Lines::new(sampling, lines::full(sampling))?;
+    let responses = average(recorded, &lines, segments)?.frf(FrfEstimator::H1)?;
     let explained =
         |row: &usize| responses.coherence().row(*row).iter().all(|part| *part >= EXPLAINED);
-    let clear: Vec<usize> = (0..all.as_slice().len()).filter(explained).collect();
+    let clear: Vec<usize> = (0..lines.as_slice().len()).filter(explained).collect();
     if clear.is_empty() {
         return Err(AnalysisError::NoReceptance);
     }

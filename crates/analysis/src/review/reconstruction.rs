@@ -1,4 +1,4 @@
-//! The force found from the motion with the identified machine, against the measured one.
+//! Force reconstructed from the motion with the identified machine, compared with the measured one.
 
 use mechid_force::{self as force, Channel, IdentifiedForce, Rule, Start, channel_errors};
 use mechid_model::ResponseQuantity;
@@ -11,7 +11,7 @@ use crate::measurement::Block;
 use crate::reconstruct::Method;
 use crate::reconstruct::method::{Request, find};
 
-/// A force found, and what it should be.
+/// A reconstructed force and the measured one.
 pub struct Reconstruction {
     /// Name of the method.
     pub method: &'static str,
@@ -21,18 +21,18 @@ pub struct Reconstruction {
     pub measured: Record,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub forced: Vec<usize>,
-    /// RMS of the difference over the RMS of the measured force, a ratio per degree of freedom;
-    /// `None` where none acts.
+    /// Ratio of the RMS of the difference to the RMS of the measured force, one per degree of
+    /// freedom; `None` without a force.
     pub errors: Vec<Option<f64>>,
 }
 
 impl Reconstruction {
-    /// Reconstructs the force line by line on lines of the mean `period` where there are some,
-    /// otherwise with the method that suits an open record.
+    /// Reconstructs the force line by line on `lines` of the mean `period`, or without lines by the
+    /// method for an open record.
     ///
     /// # Errors
     /// [`AnalysisError::Force`] if the method refuses the record.
-    pub(crate) fn of(
+    pub(crate) fn new(
         identified: &Identified,
         period: &Block,
         lines: Option<Vec<usize>>,
@@ -63,7 +63,7 @@ impl Reconstruction {
     }
 }
 
-/// Every motion that was measured.
+/// Returns all measured motions.
 fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
     let groups = [
         (&source.displacement, ResponseQuantity::Displacement),
@@ -84,10 +84,10 @@ fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
 
 /// Returns the part of a period on these lines.
 fn on_lines(period: &Record, lines: &[usize]) -> Result<Record, SignalError> {
-    let all = Spectrum::of(period);
-    let mut kept = DMatrix::from_element(all.len(), all.channels(), Complex::ZERO);
+    let spectrum = Spectrum::of(period);
+    let mut selected = DMatrix::from_element(spectrum.len(), spectrum.channels(), Complex::ZERO);
     for &n in lines {
-        kept.set_row(n, &all.lines().row(n));
+        selected.set_row(n, &spectrum.lines().row(n));
     }
-    Spectrum::from_lines(period.sampling(), kept)?.to_record()
+    Spectrum::from_lines(period.sampling(), selected)?.to_record()
 }

@@ -15,7 +15,7 @@ pub struct Whole {
     pub force: Gathered,
     /// Measured responses, in the order of [`Block::responses`].
     pub motions: Vec<Gathered>,
-    /// The mean period; nothing where the window is one period.
+    /// Mean period; `None` if the window is one period.
     pub mean: Option<Block>,
 }
 
@@ -25,13 +25,13 @@ pub struct Gathered {
     /// Levels of each channel.
     pub levels: Vec<RunningStatistics>,
     periods: Option<Periods>,
-    /// Extreme values of each channel, where not all samples are held.
+    /// Extreme values of each channel, if not all samples are in memory.
     extremes: Vec<Extremes>,
 }
 
 impl Whole {
     /// Reads the window once.
-    pub(crate) fn of(recorded: &Windowed) -> Result<Self, AnalysisError> {
+    pub(crate) fn new(recorded: &Windowed) -> Result<Self, AnalysisError> {
         let held = &recorded.held;
         let mut force = Gathered::new(held, &held.force);
         let mut motions: Vec<Gathered> =
@@ -47,24 +47,25 @@ impl Whole {
         Ok(Self { force, motions, mean })
     }
 
-    /// The mean period; what is held where the window is one period.
+    /// Returns the mean period, or the samples in memory if the window is one period.
     pub fn period<'a>(&'a self, held: &'a Block) -> &'a Block {
         self.mean.as_ref().unwrap_or(held)
     }
 }
 
-/// The mean over all periods, as a measurement of one.
+/// Returns the mean over all periods as a measurement of one period.
 fn mean(
     held: &Block,
     force: &Gathered,
     motions: &[Gathered],
 ) -> Result<Option<Block>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
-    let of = |gathered: &Gathered| gathered.periods.as_ref().map(|p| p.mean(sampling)).transpose();
-    let Some(force) = of(force)? else { return Ok(None) };
+    let mean =
+        |gathered: &Gathered| gathered.periods.as_ref().map(|p| p.mean(sampling)).transpose();
+    let Some(force) = mean(force)? else { return Ok(None) };
     let mut motions = motions.iter();
     let mut next = |measured: &Option<Record>| match measured {
-        Some(_) => motions.next().map_or(Ok(None), of),
+        Some(_) => motions.next().map_or(Ok(None), mean),
         None => Ok(None),
     };
     Ok(Some(Block {
@@ -95,7 +96,7 @@ impl Gathered {
         Self { levels: vec![RunningStatistics::default(); channels], periods, extremes }
     }
 
-    /// The next samples.
+    /// Adds the next samples.
     fn push(&mut self, record: &Record) -> Result<(), AnalysisError> {
         for (channel, levels) in self.levels.iter_mut().enumerate() {
             levels.push(record.channel(channel))?;
@@ -115,8 +116,9 @@ impl Gathered {
         self.periods.as_ref().map(|periods| periods.scatter(channel))
     }
 
-    /// Times from the beginning of the window, in s, and values to draw one channel by: all samples
-    /// of what is held, or the least and the largest of every short chunk of a longer window.
+    /// Returns times from the beginning of the window, in s, and values for a plot of one channel:
+    /// all samples in memory, or the minimum and the maximum of every short chunk of a longer
+    /// window.
     pub fn history(&self, held: &Record, channel: usize) -> (Vec<f64>, Vec<f64>) {
         let sampling = held.sampling();
         match self.extremes.get(channel) {
@@ -132,16 +134,17 @@ impl Gathered {
 #[derive(Debug)]
 struct Periods {
     sums: DMatrix<f64>,
-    /// Sum of squares about the mean so far, over the scale: squares of the samples themselves
-    /// would lose it.
+    /// Sum of squares about the mean so far, scaled; squares about zero would lose the scatter by
+    /// cancellation.
     squares: DMatrix<f64>,
-    /// Scale of each channel: squares of large or small values leave the range of numbers.
+    /// Scale of each channel, because squares of large or small values overflow or underflow.
     scales: Vec<f64>,
     samples: usize,
 }
 
 impl Periods {
-    /// Starts with no period of `period` samples; `held` are some samples of the channels.
+    /// Creates sums without a period of `period` samples; `held` are some samples of the channels,
+    /// for their scale.
     fn new(period: usize, held: &Record) -> Self {
         let none = DMatrix::zeros(period, held.channels());
         let scale = |c: usize| Some(held.column(c).amax()).filter(|peak| *peak > 0.0);

@@ -168,7 +168,7 @@ fn pairs(
 
 /// Returns the measured columns of H for each force, in rising order of frequency.
 fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
-    let acting = ActingAlone::of(data);
+    let acting = ActingAlone::new(data);
     let separated = separated(data, &acting);
     let of_force = |j: usize| {
         let alone = (0..data.len()).filter(|row| acting.on(*row, j));
@@ -339,7 +339,7 @@ mod tests {
     #[test]
     fn records_with_crosstalk_are_separated_and_one_alone_is_drawn_as_responses() {
         let both = record(0, 0.02).and(&record(1, 0.02)).unwrap();
-        let found = separated(&both, &ActingAlone::of(&both));
+        let found = separated(&both, &ActingAlone::new(&both));
         assert_eq!(found.len(), 20);
         for (omega, h) in found {
             let truth = machine().receptance(omega).unwrap();
