@@ -38,7 +38,7 @@ pub struct ComparedMode {
     pub shape: ShapeWithCovariance,
 }
 
-/// How modes are paired.
+/// Limits of frequency and shape within which two modes form a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairingRule {
     /// Largest ratio of the two frequencies of a pair, above 1.
@@ -58,7 +58,7 @@ impl Default for PairingRule {
 pub struct Difference {
     /// Difference, in the unit of the values.
     pub value: f64,
-    /// Its standard error, in the same unit.
+    /// Standard error of the difference, in the same unit.
     pub standard_error: f64,
     /// Probability of a difference as large by the errors alone; `None` without errors.
     pub p_value: Option<f64>,
@@ -79,7 +79,7 @@ pub struct ShapeTest {
     pub adjusted_p_value: f64,
 }
 
-/// Two modes that are one.
+/// Pair of modes, one of each set, that are the same mode of the structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModePair {
     /// Index in the first set.
@@ -107,11 +107,11 @@ pub struct Comparison {
     pub only_second: Vec<usize>,
 }
 
-/// Pairs modes by frequency and shape: pairs (index of the first set, index of the second set), by
-/// rising index of the first.
+/// Pairs modes by frequency and shape. Returns the pairs (index in the first set, index in the
+/// second set), sorted by the first index.
 ///
-/// Of all pairs that the rule allows, the one with the largest MAC, reduced for its distance in
-/// frequency, is taken first.
+/// The pair with the largest MAC, reduced by its distance in frequency, is accepted first; then the
+/// next pair of modes without a partner, and so on.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if shapes differ in length.
@@ -120,7 +120,7 @@ pub fn pair_modes(
     second: &[ComparedMode],
     rule: PairingRule,
 ) -> Result<Vec<(usize, usize)>, IndicatorError> {
-    let reach = rule.max_frequency_ratio.ln();
+    let max_distance = rule.max_frequency_ratio.ln();
     let mut candidates = Vec::new();
     for (i, one) in first.iter().enumerate() {
         for (j, two) in second.iter().enumerate() {
@@ -131,8 +131,8 @@ pub fn pair_modes(
             }
             let ratio = two.natural_frequency_hz.value / one.natural_frequency_hz.value;
             let (distance, mac) = (ratio.ln().abs(), mac(one.shape.shape(), two.shape.shape()));
-            if distance <= reach && mac >= rule.min_mac {
-                candidates.push((mac * (1.0 - 0.5 * distance / reach), i, j));
+            if distance <= max_distance && mac >= rule.min_mac {
+                candidates.push((mac * (1.0 - 0.5 * distance / max_distance), i, j));
             }
         }
     }
@@ -147,12 +147,11 @@ pub fn pair_modes(
     Ok(pairs)
 }
 
-/// Compares two sets of modes: pairs, differences over their standard errors, and modes without a
-/// partner.
+/// Compares two sets of modes: pairs with tests of their differences, and modes without a partner.
 ///
-/// The errors of the two sets are independent. Differences, p-values and the test of each shape
-/// together are adjusted for their number by Holm's method: the modes that have changed are those
-/// whose adjusted p-value is small.
+/// The errors of the two sets are independent. Holm's method adjusts the p-values of all
+/// frequencies, damping ratios and shapes together for the number of tests; a small adjusted
+/// p-value means that the mode has changed.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if shapes differ in length.
@@ -179,12 +178,12 @@ pub fn compare(
         });
     }
     adjust(&mut pairs);
-    let alone = |count: usize, paired: &dyn Fn(usize) -> bool| {
+    let unpaired = |count: usize, paired: &dyn Fn(usize) -> bool| {
         (0..count).filter(|index| !paired(*index)).collect()
     };
     Ok(Comparison {
-        only_first: alone(first.len(), &|i| indices.iter().any(|pair| pair.0 == i)),
-        only_second: alone(second.len(), &|j| indices.iter().any(|pair| pair.1 == j)),
+        only_first: unpaired(first.len(), &|i| indices.iter().any(|pair| pair.0 == i)),
+        only_second: unpaired(second.len(), &|j| indices.iter().any(|pair| pair.1 == j)),
         pairs,
     })
 }
@@ -197,16 +196,18 @@ fn difference(first: Measured, second: Measured) -> Difference {
     Difference { value, standard_error, p_value, adjusted_p_value: p_value }
 }
 
-/// Chi-squared test of two shapes that are normalised to one entry, in which both are large.
+/// Tests the difference of two shapes with χ², both normalised to the same entry, one that is large
+/// in both.
 fn shape_test(first: &ShapeWithCovariance, second: &ShapeWithCovariance) -> Option<ShapeTest> {
-    let p = first.shape().len();
+    let outputs = first.shape().len();
     let size = |i: &usize| (first.shape()[*i] * second.shape()[*i]).norm();
-    let reference = (0..p).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let reference = (0..outputs).max_by(|a, b| size(a).total_cmp(&size(b)))?;
     let (one, two) = (first.normalised_to(reference)?, second.normalised_to(reference)?);
-    let rows: Vec<usize> = (0..2 * p).filter(|row| row % p != reference).collect();
-    let gap = two.shape() - one.shape();
-    let part = |row: usize| if row < p { gap[row].re } else { gap[row - p].im };
-    let gap = DVector::from_iterator(rows.len(), rows.iter().map(|row| part(*row)));
+    let rows: Vec<usize> = (0..2 * outputs).filter(|row| row % outputs != reference).collect();
+    let difference = two.shape() - one.shape();
+    let part =
+        |row: usize| if row < outputs { difference[row].re } else { difference[row - outputs].im };
+    let difference = DVector::from_iterator(rows.len(), rows.iter().map(|row| part(*row)));
     let total = one.covariance() + two.covariance();
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |i, j| total[(rows[i], rows[j])]);
     let eigen = crate::decomposition::hermitian_eigen(covariance)?;
@@ -214,7 +215,7 @@ fn shape_test(first: &ShapeWithCovariance, second: &ShapeWithCovariance) -> Opti
     let determined = |i: &usize| eigen.eigenvalues[*i] > floor;
     let terms = (0..rows.len())
         .filter(determined)
-        .map(|i| eigen.eigenvectors.column(i).dot(&gap).powi(2) / eigen.eigenvalues[i]);
+        .map(|i| eigen.eigenvectors.column(i).dot(&difference).powi(2) / eigen.eigenvalues[i]);
     let terms: Vec<f64> = terms.collect();
     let degrees_of_freedom = terms.len();
     let statistic = terms.iter().sum();
@@ -272,7 +273,8 @@ mod tests {
             mode(55.0, 0.01, &[1.0, -1.0, 0.3], 1e-3),
         ];
         let comparison = compare(&first, &second, PairingRule::default()).unwrap();
-        let indices: Vec<_> = comparison.pairs.iter().map(|p| (p.first, p.second)).collect();
+        let indices: Vec<_> =
+            comparison.pairs.iter().map(|outputs| (outputs.first, outputs.second)).collect();
         assert_eq!(indices, [(0, 1), (1, 0)]);
         assert_eq!((comparison.only_first, comparison.only_second), (vec![2], vec![2]));
         // 0.6 Hz over √(0.01² + 0.0106²): beyond doubt.
@@ -337,9 +339,9 @@ mod tests {
         assert_eq!(pair.damping_ratio, None);
         assert!(pair.natural_frequency_hz.adjusted_p_value.unwrap() > 0.1);
         assert!(pair.shape.unwrap().p_value > 0.1 && pair.mac.value > 0.999);
-        let alone = compare(&[model.clone()], &[model], PairingRule::default()).unwrap();
-        assert_eq!(alone.pairs[0].natural_frequency_hz.p_value, None);
-        assert_eq!(alone.pairs[0].shape, None);
+        let unpaired = compare(&[model.clone()], &[model], PairingRule::default()).unwrap();
+        assert_eq!(unpaired.pairs[0].natural_frequency_hz.p_value, None);
+        assert_eq!(unpaired.pairs[0].shape, None);
         let longer = [mode(10.0, 0.01, &[1.0, 0.5, 0.1], 0.02)];
         assert!(compare(&test, &longer, PairingRule::default()).is_err());
     }

@@ -1,9 +1,10 @@
 //! Constraints that a structure puts on its modes: real shapes and reciprocity.
 //!
-//! A constraint c(v) = 0 on pole, shape and participations v of a mode is imposed on the estimate v̂
-//! with covariance Σ by the smallest (v̂ − v)ᵀ Σ⁻¹ (v̂ − v) that meets it. To first order this is the
-//! maximum-likelihood estimate under the constraint, and the minimum is the likelihood-ratio
-//! statistic, χ² with one degree of freedom for each equation if the constraint is true.
+//! A constraint c(v) = 0 on pole, shape and participations v of a mode is imposed on the estimate
+//! v̂ with covariance Σ: the constrained estimate minimises (v̂ − v)ᵀ Σ⁻¹ (v̂ − v). To first order
+//! this is the maximum-likelihood estimate under the constraint, and the minimum is the
+//! likelihood-ratio statistic, χ² with one degree of freedom for each equation if the constraint is
+//! true.
 //!
 //! # Source
 //! Aitchison & Silvey, Annals of Mathematical Statistics 29 (1958) 813 (estimates under
@@ -26,7 +27,7 @@ pub struct DrivingPoint {
     pub input: usize,
 }
 
-/// What a structure is known to obey.
+/// Known property of a structure that its modes must satisfy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModalConstraint {
@@ -38,7 +39,7 @@ pub enum ModalConstraint {
     },
     /// Reciprocity: the responses between any two of these points are equal both ways.
     Reciprocity {
-        /// At least two points.
+        /// Driving points, at least two.
         points: Vec<DrivingPoint>,
     },
 }
@@ -101,35 +102,39 @@ impl ModalConstraint {
                 let pole = mode.pole();
                 let phase = pole.powi(*derivative) / Complex::i();
                 let phase = phase / phase.norm();
-                // A gauge that is a transient leaves the phase of the forces open.
+                // If the gauge is a transient, it does not fix the phase of the forces.
                 let reference = mode.phase_input();
-                let turn = mode.participation(reference);
-                let turn = turn / turn.norm();
-                let entry = |output| (mode.shape(output) * turn / phase).im;
+                let phase_factor = mode.participation(reference);
+                let phase_factor = phase_factor / phase_factor.norm();
+                let entry = |output| (mode.shape(output) * phase_factor / phase).im;
                 let entries = (0..mode.outputs).map(entry);
                 let forces = (0..mode.inputs).filter(|input| *input != reference);
-                let loads = forces.map(|input| (mode.participation(input) / turn).im);
-                entries.chain(loads).collect()
+                let participations =
+                    forces.map(|input| (mode.participation(input) / phase_factor).im);
+                entries.chain(participations).collect()
             }
             Self::Reciprocity { points } => {
                 let strength = |point: &&DrivingPoint| mode.participation(point.input).norm();
                 let strongest = points.iter().max_by(|a, b| strength(a).total_cmp(&strength(b)));
                 let Some(reference) = strongest else { return Vec::new() };
-                let (shape, load) =
+                let (shape, participation) =
                     (mode.shape(reference.output), mode.participation(reference.input));
-                let others = points.iter().filter(|point| *point != reference);
-                let gap = |point: &DrivingPoint| {
-                    mode.shape(point.output) * load - shape * mode.participation(point.input)
+                let partners = points.iter().filter(|point| *point != reference);
+                let difference = |point: &DrivingPoint| {
+                    mode.shape(point.output) * participation
+                        - shape * mode.participation(point.input)
                 };
-                others.map(gap).flat_map(|gap| [gap.re, gap.im]).collect()
+                partners
+                    .map(difference)
+                    .flat_map(|difference| [difference.re, difference.im])
+                    .collect()
             }
         }
     }
 }
 
-/// Statistic and degrees of freedom of the constraints on a mode, and the mode that meets them;
-/// `None` without constraints, or
-/// where the covariance says nothing of them.
+/// Returns statistic and degrees of freedom of the constraints on a mode, and the constrained mode;
+/// `None` without constraints, or if a constrained quantity has no finite variance.
 pub(crate) fn impose(
     constraints: &[ModalConstraint],
     estimate: &ModeParameters,
@@ -145,15 +150,15 @@ pub(crate) fn impose(
     let mut count = 0;
     for _ in 0..CONSTRAINT_STEPS {
         let slope = derivative(&equations, &mode, &estimate.covariance);
-        let gap = equations(&mode) + &slope * (&estimate.values - &mode.values);
-        let across = &estimate.covariance * slope.transpose();
-        let inner = &slope * &across;
+        let difference = equations(&mode) + &slope * (&estimate.values - &mode.values);
+        let cross = &estimate.covariance * slope.transpose();
+        let inner = &slope * &cross;
         let scale = inner.diagonal().map(|value| 1.0 / value.sqrt());
         if scale.iter().any(|value| !value.is_finite()) {
             return None;
         }
         let scaled = DMatrix::from_diagonal(&scale) * inner * DMatrix::from_diagonal(&scale);
-        // Equations that follow from others have no direction of their own.
+        // Dependent equations add no direction; only independent ones count as degrees of freedom.
         let eigen = crate::decomposition::hermitian_eigen(scaled)?;
         let floor = DEPENDENT_EQUATION * eigen.eigenvalues.max();
         let independent = eigen.eigenvalues.iter().enumerate().filter(|(_, value)| **value > floor);
@@ -161,11 +166,11 @@ pub(crate) fn impose(
             .map(|(k, value)| eigen.eigenvectors.column(k).component_mul(&scale) / value.sqrt())
             .collect();
         let directions = DMatrix::from_columns(&directions);
-        let along = directions.transpose() * gap;
-        let across = across * directions;
+        let along = directions.transpose() * difference;
+        let cross = cross * directions;
         (statistic, count) = (along.norm_squared(), along.len());
-        mode.values = &estimate.values - &across * along;
-        mode.covariance = &estimate.covariance - &across * across.transpose();
+        mode.values = &estimate.values - &cross * along;
+        mode.covariance = &estimate.covariance - &cross * cross.transpose();
     }
     statistic.is_finite().then_some((statistic, count, mode))
 }
@@ -176,16 +181,16 @@ pub(crate) fn test(
     estimate: &ModeParameters,
     mode: usize,
 ) -> Vec<ConstraintTest> {
-    let of_constraint = |(constraint, one): (usize, &ModalConstraint)| {
+    let tested = |(constraint, one): (usize, &ModalConstraint)| {
         let (statistic, degrees_of_freedom, _) = impose(std::slice::from_ref(one), estimate)?;
         let p_value = ChiSquared::new(degrees_of_freedom as f64).ok()?.sf(statistic);
         Some(ConstraintTest { mode, constraint, statistic, degrees_of_freedom, p_value })
     };
-    constraints.iter().enumerate().filter_map(of_constraint).collect()
+    constraints.iter().enumerate().filter_map(tested).collect()
 }
 
-/// Central differences over a thousandth of the standard errors: the equations are products of two
-/// or three parameters.
+/// Returns central differences with steps of a thousandth of the standard errors: the equations are
+/// products of two or three parameters, so that the error is negligible.
 fn derivative(
     equations: &impl Fn(&ModeParameters) -> DVector<f64>,
     at: &ModeParameters,

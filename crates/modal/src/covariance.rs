@@ -1,8 +1,8 @@
 //! Covariance of poles, participations and shapes under the whole noise: sensors and unmeasured
 //! forces.
 //!
-//! The fit weighs all outputs alike; its parameters have covariance G⁻¹ M G⁻¹, where M is the
-//! variance of the score under the noise as it is.
+//! The fit gives all outputs the same weight over frequency; its parameters have the covariance G⁻¹
+//! M G⁻¹, where G is the curvature and M the variance of the score under the estimated noise.
 //!
 //! # Source
 //! White, Econometrica 50 (1982) 1, with the variance of the score from the noise model.
@@ -29,16 +29,17 @@ type C = Complex<f64>;
 /// Covariances at a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
-    /// Of the parameters of the search.
+    /// Covariance of the parameters of the search.
     pub(crate) parameters: DMatrix<f64>,
-    /// Observations behind the noise spectrum at a line: real and imaginary parts in its window.
+    /// Number of observations in the noise estimate of a line: real and imaginary parts in its
+    /// window.
     pub(crate) degrees_of_freedom: usize,
-    /// Response of the linear unknowns of modes to the derivatives: A⁺ C, `2m × parameters`.
-    followed: DMatrix<f64>,
-    /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened
-    /// units.
-    own: Vec<DMatrix<f64>>,
-    /// What the unmeasured force of each mode does to the unknowns of its own shape.
+    /// A⁺ C, the change of the linear unknowns of the modes with the parameters, `2m × parameters`.
+    unknowns_by_parameter: DMatrix<f64>,
+    /// Covariance of the linear unknowns of the modes due to the sensor noise of each output,
+    /// `2m × 2m`, in whitened units.
+    sensor: Vec<DMatrix<f64>>,
+    /// Effect of the unmeasured force of each mode on the unknowns of its shape.
     process: Vec<ProcessEffect>,
     /// Inverse of the curvature.
     inverse: DMatrix<f64>,
@@ -57,20 +58,30 @@ impl Covariance {
         let (size, modes) = (normal.size, model.modes());
         let scale = parameter_scale(&pairs, model);
         let shapes = whitened_shapes(projection, modes);
-        let (followed, rows) = followed(lines, model, projection, &pairs);
-        // Near a resonance, where unmeasured forces raise the weights, the sensors' noise is far
-        // below these.
+        let (unknowns_by_parameter, rows) = unknowns_by_parameter(lines, model, projection, &pairs);
+        // The weights include unmeasured forces: near a resonance the sensor noise is far below
+        // them.
         let mean = mean_sensor(fit, noise);
         let weights = mean.iter().zip(&fit.weights.shape);
         let deviation: Vec<f64> = weights.map(|(mean, shape)| mean.sqrt() / shape).collect();
         let products = |(block, arrays): (&Block, &BlockArrays)| {
             let deviation = &deviation[block.rows.clone()];
-            BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows, deviation)
+            BlockProducts::new(
+                lines,
+                model,
+                block,
+                arrays,
+                &pairs,
+                &unknowns_by_parameter,
+                &rows,
+                deviation,
+            )
         };
         let blocks: Vec<BlockProducts> =
             lines.blocks.par_iter().zip(&projection.blocks).map(products).collect();
         let outputs = lines.outputs.len();
-        let (mut meat, own) = sensor_variance(fit, noise, &mean, &blocks, &pairs, &shapes, &scale);
+        let (mut meat, sensor) =
+            sensor_variance(fit, noise, &mean, &blocks, &pairs, &shapes, &scale);
         let scores = Scores { pairs: &pairs, shapes: &shapes, scale: &scale };
         let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut meat);
         let process: Vec<ProcessEffect> = (0..modes).map(add).collect();
@@ -78,16 +89,17 @@ impl Covariance {
         let meat = DMatrix::from_vec(size, size, meat);
         let parameters = &inverse * meat * &inverse;
         let columns = projection.triangle.size;
-        let followed =
-            DMatrix::from_fn(2 * modes, size, |row, column| followed[column * columns + row]);
+        let unknowns_by_parameter = DMatrix::from_fn(2 * modes, size, |row, column| {
+            unknowns_by_parameter[column * columns + row]
+        });
         let degrees_of_freedom = 2 * noise_window(lines) * outputs;
         Some(Self {
             parameters,
             degrees_of_freedom,
             process,
             inverse,
-            followed,
-            own,
+            unknowns_by_parameter,
+            sensor,
             scale,
             pairs,
             shapes,
@@ -97,14 +109,14 @@ impl Covariance {
     /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened
     /// units.
     fn response_of_unknowns(&self, mode: usize, output: usize) -> DMatrix<f64> {
-        let outputs = self.own.len();
+        let outputs = self.sensor.len();
         let part = |row: usize| self.shapes[row * outputs + output];
         let mut response = DMatrix::zeros(2, self.scale.len());
         for (pair, &(r, _)) in self.pairs.iter().enumerate() {
             let (x, y) = (part(2 * r), part(2 * r + 1));
             for row in 0..2 {
-                let u = self.followed[(2 * mode + row, 2 * pair)];
-                let v = self.followed[(2 * mode + row, 2 * pair + 1)];
+                let u = self.unknowns_by_parameter[(2 * mode + row, 2 * pair)];
+                let v = self.unknowns_by_parameter[(2 * mode + row, 2 * pair + 1)];
                 response[(row, 2 * pair)] = (u * x + v * y) * self.scale[2 * pair];
                 response[(row, 2 * pair + 1)] = (v * x - u * y) * self.scale[2 * pair + 1];
             }
@@ -114,9 +126,9 @@ impl Covariance {
 
     /// Returns the covariance of real and imaginary part of a shape over its entry `reference`.
     ///
-    /// Unmeasured forces on the mode itself change all its entries alike and cancel in the
-    /// quotient.
-    pub(crate) fn of_normalised_shape(
+    /// An unmeasured force on the mode multiplies all its entries by the same factor, which cancels
+    /// in the quotient.
+    pub(crate) fn normalised_entry_covariance(
         &self,
         mode: usize,
         output: usize,
@@ -128,31 +140,37 @@ impl Covariance {
             return DMatrix::zeros(2, 2);
         }
         let quotient = shape[output] / shape[reference];
-        let own = |output: usize| {
-            self.own[output].view((2 * mode, 2 * mode), (2, 2)) * levels[output].powi(2)
+        let sensor_part = |output: usize| {
+            self.sensor[output].view((2 * mode, 2 * mode), (2, 2)) * levels[output].powi(2)
         };
         let by_quotient = rotation(quotient);
         let by_reference = rotation(1.0 / shape[reference]);
         let difference = self.response_of_unknowns(mode, output) * levels[output]
             - &by_quotient * self.response_of_unknowns(mode, reference) * levels[reference];
-        let sum = own(output)
-            + &by_quotient * own(reference) * by_quotient.transpose()
+        let sum = sensor_part(output)
+            + &by_quotient * sensor_part(reference) * by_quotient.transpose()
             + &difference * &self.parameters * difference.transpose();
         &by_reference * sum * by_reference.transpose()
     }
 
     /// Returns pole, shape and participations of a mode with their joint covariance.
     ///
-    /// To first order the shape of output i is A⁺ times its noise − B_i dθ, and an unmeasured force
-    /// on the mode itself turns and scales all its entries alike.
-    pub(crate) fn of_mode(&self, fit: &Fit<'_>, mode: usize, shape: &[C]) -> ModeParameters {
+    /// To first order the error of entry i of the shape is A⁺ times the noise of output i minus B_i
+    /// dθ; an unmeasured force on the mode multiplies all entries by the same complex factor.
+    pub(crate) fn mode_parameters(
+        &self,
+        fit: &Fit<'_>,
+        mode: usize,
+        shape: &[C],
+    ) -> ModeParameters {
         let (model, levels) = (&fit.model, &fit.weights.level);
         let (outputs, inputs, loads) = (shape.len(), fit.lines.inputs(), fit.lines.loads.len());
         let (size, gauge) = (2 + 2 * outputs + 2 * inputs, model.gauge[mode]);
         let mut values = DVector::zeros(size);
         let mut response = DMatrix::zeros(size, self.scale.len());
-        let mut own = DMatrix::zeros(size, size);
-        // Response to the common factor that the mode's own unmeasured force puts on the shape.
+        let mut sensor_part = DMatrix::zeros(size, size);
+        // Change of the entries with the complex factor that the unmeasured force puts on the
+        // shape.
         let mut common = DMatrix::zeros(size, 2);
         let mut cross = DMatrix::zeros(size, self.scale.len());
         let pole = model.poles[mode];
@@ -165,8 +183,8 @@ impl Covariance {
             (values[at], values[at + 1]) = (value.re, value.im);
             let followed = self.response_of_unknowns(mode, output) * -level;
             response.rows_mut(at, 2).copy_from(&followed);
-            let noise = self.own[output].view((2 * mode, 2 * mode), (2, 2)) * level.powi(2);
-            own.view_mut((at, at), (2, 2)).copy_from(&noise);
+            let noise = self.sensor[output].view((2 * mode, 2 * mode), (2, 2)) * level.powi(2);
+            sensor_part.view_mut((at, at), (2, 2)).copy_from(&noise);
             common.rows_mut(at, 2).copy_from(&(rotation(direction) * level));
             let with_score = self.process[mode].cross.map(|value| (value * direction).re * level);
             cross.rows_mut(at, 2).copy_from(&with_score);
@@ -180,29 +198,29 @@ impl Covariance {
                 (response[(at, pair)], response[(at + 1, pair + 1)]) = (1.0, 1.0);
             }
         }
-        let between = cross * &self.inverse * response.transpose();
+        let cross_covariance = cross * &self.inverse * response.transpose();
         let covariance = &response * &self.parameters * response.transpose()
-            + own
+            + sensor_part
             + &common * &self.process[mode].own * common.transpose()
-            + &between
-            + between.transpose();
+            + &cross_covariance
+            + cross_covariance.transpose();
         let degrees_of_freedom = self.degrees_of_freedom;
         ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
     }
 
     /// Returns the covariance of ln(−Re λ) and ln Im λ of a mode.
-    pub(crate) fn of_pole(&self, mode: usize) -> Matrix2<f64> {
+    pub(crate) fn pole_covariance(&self, mode: usize) -> Matrix2<f64> {
         self.parameters.fixed_view::<2, 2>(2 * mode, 2 * mode).into_owned()
     }
 }
 
-/// Multiplication by a complex number, as a matrix of real and imaginary parts.
+/// Returns the real 2 × 2 matrix that multiplies (real part, imaginary part) by a complex number.
 fn rotation(z: C) -> DMatrix<f64> {
     DMatrix::from_row_slice(2, 2, &[z.re, -z.im, z.im, z.re])
 }
 
-/// Returns A⁺C (all columns of A), and the rows of modes of (AᵀA)⁻¹ as columns.
-fn followed(
+/// Returns A⁺C (for all columns of A), and the rows of (AᵀA)⁻¹ that belong to modes, as columns.
+fn unknowns_by_parameter(
     lines: &Lines,
     model: &Model,
     projection: &Projection,
@@ -215,15 +233,15 @@ fn followed(
         .zip(&projection.blocks)
         .map(|(block, arrays)| {
             let rows = 2 * block.len();
-            let (places, local) = block_pairs(pairs, block);
+            let (indices, local) = block_pairs(pairs, block);
             let mut derivatives = vec![0.0; rows * 2 * local.len()];
             model.fill_derivatives(lines, block, &arrays.weight, &local, &mut derivatives);
             let cross = transposed_product(&arrays.design, &derivatives, rows);
             let mut part = vec![0.0; columns * size];
             for (k, from) in cross.chunks_exact(arrays.columns.len().max(1)).enumerate() {
-                let place = 2 * places[k / 2] + k % 2;
+                let index = 2 * indices[k / 2] + k % 2;
                 for (column, value) in arrays.columns.iter().zip(from) {
-                    part[place * columns + column] = *value;
+                    part[index * columns + column] = *value;
                 }
             }
             part
@@ -256,22 +274,22 @@ fn sensor_variance(
     let (modes, size) = (fit.model.modes(), 2 * pairs.len());
     let outputs = fit.lines.outputs.len();
     let mut meat = vec![0.0; size * size];
-    let mut own = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
+    let mut unknowns = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
     for (block, products) in fit.lines.blocks.iter().zip(blocks) {
         let ratios = noise_ratios(fit, noise, mean, block);
         let weighted: Vec<f64> =
             shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
         let turned = turn(&products.gram, pairs, &ShapeProducts::new(&weighted, modes), scale);
         meat.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
-        for (own, ratio) in own.iter_mut().zip(&ratios) {
-            own.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
+        for (unknowns, ratio) in unknowns.iter_mut().zip(&ratios) {
+            unknowns.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
         }
     }
-    (meat, own)
+    (meat, unknowns)
 }
 
-/// Returns the mean over the outputs of their sensors' variance over the square of their level, on
-/// every line.
+/// Returns on every line the mean over the outputs of sensor noise variance divided by squared
+/// level.
 fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     let levels = &fit.weights.level;
     let mut mean = vec![0.0; fit.lines.len()];
@@ -282,7 +300,8 @@ fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     mean
 }
 
-/// Returns the variance of each output's sensor noise over the mean of all, averaged over a block.
+/// Returns the ratio of each output's sensor noise variance to the mean of all, averaged over a
+/// block.
 fn noise_ratios(fit: &Fit<'_>, noise: &Noise, mean: &[f64], block: &Block) -> Vec<f64> {
     let ratio = |(sensor, level): (&Vec<f64>, &f64)| {
         let rows: Range<usize> = block.rows.clone();

@@ -8,8 +8,8 @@ use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen
 /// enough for a regular factorisation, near enough that one step separates the eigenvector.
 const SHIFT: f64 = 1e-13;
 
-/// Steps of inverse iteration: the first leaves of other eigenvectors what rounding does, the
-/// second less.
+/// Number of steps of inverse iteration: the first reduces other eigenvectors to rounding errors,
+/// the second removes these.
 const STEPS: usize = 2;
 
 pub(crate) fn svd<T: ComplexField<RealField = f64>>(
@@ -50,7 +50,8 @@ pub(crate) fn eigenvector(
         shifted[(i, i)] -= shift;
     }
     let factor = shifted.lu();
-    // Entries without structure, the same on every run.
+    // A fixed start vector without structure: it is not orthogonal to the eigenvector, and results
+    // are reproducible.
     let entry = |i: usize| ((i as f64 + 1.0) * 2.3f64.sqrt()).fract() + 0.25;
     let mut vector = DVector::from_fn(len, |i, _| Complex::from(entry(i)));
     for _ in 0..STEPS {

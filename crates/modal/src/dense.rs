@@ -1,4 +1,4 @@
-//! Thin calls of the dense kernels on columns that stand one after the other in a slice.
+//! Calls of the dense kernels on column-major slices.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::householder;
@@ -9,39 +9,39 @@ use faer::{Accum, Conj, MatMut, MatRef, Par};
 
 use crate::limits::DEPENDENT_COLUMN;
 
-/// Replaces the first `factored` columns of a matrix by those of their triangular factor, and the
-/// others by Qᵀ times them; below the triangle the reflections remain.
+/// Replaces the first `factored` columns of a matrix by their triangular factor R and the other
+/// columns by Qᵀ times them; the reflectors stay below the triangle.
 pub(crate) fn triangularise(columns: &mut [f64], rows: usize, factored: usize) {
     let size = rows.min(factored);
     if size == 0 {
         return;
     }
-    let (left, right) = columns.split_at_mut(rows * factored);
-    let others = right.len() / rows;
+    let (factor, remainder) = columns.split_at_mut(rows * factored);
+    let remaining = remainder.len() / rows;
     let block = qr::recommended_block_size::<f64>(rows, factored);
     let scratch =
         qr::qr_in_place_scratch::<f64>(rows, factored, block, Par::Seq, Default::default()).or(
             householder::apply_block_householder_sequence_transpose_on_the_left_in_place_scratch::<
                 f64,
-            >(rows, block, others),
+            >(rows, block, remaining),
         );
     let mut memory = MemBuffer::new(scratch);
     let stack = MemStack::new(&mut memory);
-    let mut left = MatMut::from_column_major_slice_mut(left, rows, factored);
+    let mut factor = MatMut::from_column_major_slice_mut(factor, rows, factored);
     let mut reflectors = vec![0.0; block * size];
     let mut reflectors = MatMut::from_column_major_slice_mut(&mut reflectors, block, size);
-    qr::qr_in_place(left.rb_mut(), reflectors.rb_mut(), Par::Seq, stack, Default::default());
+    qr::qr_in_place(factor.rb_mut(), reflectors.rb_mut(), Par::Seq, stack, Default::default());
     householder::apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj(
-        left.rb(),
+        factor.rb(),
         reflectors.rb(),
         Conj::No,
-        MatMut::from_column_major_slice_mut(right, rows, others),
+        MatMut::from_column_major_slice_mut(remainder, rows, remaining),
         Par::Seq,
         stack,
     );
 }
 
-/// Returns AᵀB of matrices with `rows` rows, columns one after the other.
+/// Returns AᵀB of column-major matrices with `rows` rows.
 pub(crate) fn transposed_product(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     let (from, to) = (a.len() / rows, b.len() / rows);
     let mut product = vec![0.0; from * to];
@@ -106,7 +106,7 @@ pub(crate) fn add_product(
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Triangle {
     pub(crate) size: usize,
-    /// Columns one after the other.
+    /// Entries, column-major.
     pub(crate) entries: Vec<f64>,
 }
 
@@ -119,11 +119,11 @@ impl Triangle {
             to[..count].copy_from_slice(&columns[column * rows..column * rows + count]);
         }
         let mut triangle = Self { size, entries };
-        triangle.leave_dependent_columns_out();
+        triangle.exclude_dependent_columns();
         triangle
     }
 
-    fn leave_dependent_columns_out(&mut self) {
+    fn exclude_dependent_columns(&mut self) {
         let size = self.size;
         for column in 0..size {
             let entries = &self.entries[column * size..(column + 1) * size];

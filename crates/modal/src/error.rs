@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Why no modes can be identified.
+/// Reason for which no modes can be identified.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModalError {
@@ -42,7 +42,8 @@ pub enum ModalError {
     DependentInputs {
         /// Index of the input.
         input: usize,
-        /// Root-mean-square of what is its own, relative to its own.
+        /// Root-mean-square of the part that the other inputs do not explain, relative to that of
+        /// the input.
         own_share: f64,
     },
     /// No mode is significant.
@@ -72,10 +73,10 @@ pub enum ModalError {
     Decomposition {
         /// Matrix that was decomposed.
         what: &'static str,
-        /// Size of it.
+        /// Number of its rows.
         size: usize,
     },
-    /// Line data of other sizes than those of the estimate.
+    /// The numbers of channels of line data and estimate differ.
     #[error(
         "the data has {inputs} inputs and {outputs} outputs, the modes {model_inputs} and \
          {model_outputs}"

@@ -22,14 +22,14 @@ use crate::synthesis::add_transients;
 
 type C = Complex<f64>;
 
-/// Modes with everything that was estimated beside them.
+/// Identified modes with the residual terms and the noise that were estimated with them.
 #[derive(Debug, Clone)]
 pub struct ModalEstimate {
     modes: Vec<IdentifiedMode>,
     /// Parameters of `modes` with their joint covariances.
     parameters: Vec<ModeParameters>,
     constraint_tests: Vec<ConstraintTest>,
-    /// Modes of the model that were not asked for.
+    /// Modes of the model that were not requested by frequency.
     others: Vec<IdentifiedMode>,
     dropped: Vec<DroppedCandidate>,
     powers: ResidualPowers,
@@ -56,9 +56,9 @@ impl ModalEstimate {
         let (lines, model) = (fit.lines, &fit.model);
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
         let gains = removal_losses(fit);
-        let (asked, rest): (Vec<usize>, Vec<usize>) =
+        let (requested, unrequested): (Vec<usize>, Vec<usize>) =
             (0..model.modes()).partition(|mode| stated[*mode]);
-        let parameters = |mode: usize| covariance.of_mode(fit, mode, &shapes[mode]);
+        let parameters = |mode: usize| covariance.mode_parameters(fit, mode, &shapes[mode]);
         let constrained = |(index, &mode): (usize, &usize)| {
             let free = parameters(mode);
             let tests = constraint::test(constraints, &free, index);
@@ -68,8 +68,9 @@ impl ModalEstimate {
             (identified, (parameters, tests))
         };
         let (modes, (parameters_of_modes, tests)): (Vec<_>, (Vec<_>, Vec<_>)) =
-            asked.par_iter().enumerate().map(constrained).unzip();
-        let other = |mode| identified_mode(fit, noise, &parameters(mode), mode, gains[mode]);
+            requested.par_iter().enumerate().map(constrained).unzip();
+        let unrequested_mode =
+            |mode| identified_mode(fit, noise, &parameters(mode), mode, gains[mode]);
         let columns = model.residual_columns(lines);
         let inputs = lines.inputs();
         let residuals = (0..lines.outputs.len())
@@ -83,7 +84,7 @@ impl ModalEstimate {
             modes,
             parameters: parameters_of_modes,
             constraint_tests: tests.concat(),
-            others: rest.into_par_iter().map(other).collect(),
+            others: unrequested.into_par_iter().map(unrequested_mode).collect(),
             dropped,
             powers: model.powers.clone(),
             reference: model.reference,
@@ -119,8 +120,8 @@ impl ModalEstimate {
         self.modes.iter().zip(&self.parameters).filter_map(compared).collect()
     }
 
-    /// Compares these modes with those of another record, or of another part of the same record:
-    /// what a structure that changes, warms up or comes loose does to each mode, with p-values.
+    /// Compares these modes with the modes of another record, or of another part of the same
+    /// record, and tests which of them have changed (by damage, temperature or loosening).
     ///
     /// # Errors
     /// [`IndicatorError::Size`] if the numbers of outputs differ.
@@ -134,7 +135,7 @@ impl ModalEstimate {
         &self.constraint_tests
     }
 
-    /// Returns the candidates that are no modes of the result, with the reason.
+    /// Returns the rejected candidates with the reason.
     pub fn dropped(&self) -> &[DroppedCandidate] {
         &self.dropped
     }
@@ -155,12 +156,12 @@ impl ModalEstimate {
         &self.noise_spectrum
     }
 
-    /// Returns the logarithm of the likelihood at the weights of the fit, without constants.
+    /// Returns the log-likelihood at the weights of the fit, without constants.
     pub fn log_likelihood(&self) -> f64 {
         self.log_likelihood
     }
 
-    /// Returns the powers of jω that stand for what lies outside the band.
+    /// Returns the powers of jω that represent modes outside the band.
     pub fn residual_powers(&self) -> &ResidualPowers {
         &self.powers
     }
@@ -173,21 +174,24 @@ impl ModalEstimate {
     /// Returns the frequency response at ω (rad/s), outputs × inputs.
     pub fn response(&self, omega: f64) -> DMatrix<C> {
         let s = C::new(0.0, omega);
-        let turn = C::new(0.0, omega / self.reference);
+        let scaled_frequency = C::new(0.0, omega / self.reference);
         DMatrix::from_fn(self.residuals.len(), self.inputs, |output, input| {
-            let of_mode = |mode: &IdentifiedMode| {
+            let modal_term = |mode: &IdentifiedMode| {
                 let residue = mode.residue(output, input);
                 residue / (s - mode.pole) + residue.conj() / (s - mode.pole.conj())
             };
-            let modal: C = self.modes.iter().chain(&self.others).map(of_mode).sum();
-            let own = self.powers.forces.iter().zip(&self.residuals[output][input]);
-            modal + own.map(|(power, value)| turn.powi(*power) * *value).sum::<C>()
+            let modal: C = self.modes.iter().chain(&self.others).map(modal_term).sum();
+            let residual_terms = self.powers.forces.iter().zip(&self.residuals[output][input]);
+            modal
+                + residual_terms
+                    .map(|(power, value)| scaled_frequency.powi(*power) * *value)
+                    .sum::<C>()
         })
     }
 
     /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its
-    /// open records are estimated from its outputs, one load of the modes per record and residual
-    /// terms per output.
+    /// open records are estimated from its outputs: modal loads per record, and residual terms per
+    /// output.
     ///
     /// # Errors
     /// [`ModalError::Size`] if the numbers of inputs or outputs differ.
@@ -211,19 +215,24 @@ impl ModalEstimate {
 
 fn explained(fit: &Fit<'_>) -> Vec<f64> {
     let lines = fit.lines;
-    let mut rest = vec![0.0; lines.outputs.len()];
+    let mut residual_power = vec![0.0; lines.outputs.len()];
     for (block, arrays) in lines.blocks.iter().zip(&fit.projection.blocks) {
         let n = block.len();
         for (output, column) in arrays.residual.chunks_exact(2 * n).enumerate() {
             let scale = fit.weights.level[output];
             for line in 0..n {
                 let power = column[line].powi(2) + column[n + line].powi(2);
-                rest[output] += power * (scale / arrays.weight[line]).powi(2);
+                residual_power[output] += power * (scale / arrays.weight[line]).powi(2);
             }
         }
     }
     let total = |output: &Vec<C>| output.iter().map(|z| z.norm_sqr()).sum::<f64>();
-    lines.outputs.iter().zip(&rest).map(|(output, rest)| 1.0 - rest / total(output)).collect()
+    lines
+        .outputs
+        .iter()
+        .zip(&residual_power)
+        .map(|(output, residual_power)| 1.0 - residual_power / total(output))
+        .collect()
 }
 
 fn log_likelihood(fit: &Fit<'_>) -> f64 {

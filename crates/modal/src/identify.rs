@@ -1,4 +1,4 @@
-//! Identification of modes from line data: start, search, noise and number of modes.
+//! Identification of modes from line data: initial estimate, search, noise and number of modes.
 
 use std::f64::consts::TAU;
 
@@ -18,24 +18,25 @@ use crate::noise::{Noise, shapes};
 use crate::order::{add_best, removal_losses, required_gain};
 use crate::projection::Weights;
 use crate::residues::with_participations;
-use crate::rules::doubtful_modes;
+use crate::rules::drop_reasons;
 use crate::search::Fit;
 
-/// What is looked for.
+/// Settings of an identification of modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalSettings {
     /// Number of modes; `None` chooses it by the likelihood.
     pub modes: Option<usize>,
-    /// Frequencies (Hz), each of a mode that is to be reported (within 2 %) however weak it is;
-    /// other modes are part of the model, but not reported. Empty: all modes are reported.
+    /// Frequencies (Hz) of modes to report (within 2 %), even if they are weak; other modes are
+    /// part of the model, but not reported. Empty: all modes are reported.
     pub near_hz: Vec<f64>,
     /// Largest number of modes that is tried.
     pub max_modes: usize,
-    /// Whether unmeasured forces through the modes are part of the noise.
+    /// `true` if unmeasured forces through the modes are part of the noise.
     pub unmeasured_forces: bool,
-    /// Powers of jω for what lies outside the band; `None` chooses them by the data.
+    /// Powers of jω that represent modes outside the band; `None` chooses them by Akaike's
+    /// criterion.
     pub residual_powers: Option<ResidualPowers>,
-    /// Constraints that the modes meet; each is also tested alone
+    /// Constraints that are imposed on the modes; each is also tested alone
     /// ([`ModalEstimate::constraint_tests`]).
     pub constraints: Vec<ModalConstraint>,
 }
@@ -56,10 +57,10 @@ impl Default for ModalSettings {
 /// Identifies the modes in the band of the data.
 ///
 /// Maximum likelihood without a window: poles and participations are searched, shapes and residual
-/// terms are linear; the ends of each open record are one more load that all outputs share.
+/// terms are linear; the transient of each open record is one more load, common to all outputs.
 ///
 /// # Errors
-/// [`ModalError`] if the data cannot carry a mode, or if no mode is significant.
+/// [`ModalError`] if the data do not suffice for a mode, or if no mode is significant.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -75,7 +76,7 @@ pub fn identify_modes(
     for constraint in &settings.constraints {
         constraint.check(lines.outputs.len(), lines.inputs())?;
     }
-    let mut search = Identification::start(&lines, settings)?;
+    let mut search = Identification::new(&lines, settings)?;
     search.choose_modes();
     search.choose_powers();
     search.apply_rules();
@@ -104,8 +105,8 @@ struct Identification<'a> {
 }
 
 impl<'a> Identification<'a> {
-    /// Starts at the poles of the subspace method, or near the stated frequencies.
-    fn start(lines: &'a Lines, settings: &'a ModalSettings) -> Result<Self, ModalError> {
+    /// Searches from the poles of the subspace method, and from the requested frequencies.
+    fn new(lines: &'a Lines, settings: &'a ModalSettings) -> Result<Self, ModalError> {
         let powers = settings.residual_powers.clone().unwrap_or_else(|| first_powers(lines));
         let mut poles = initial_poles(lines)?;
         log::debug!("{} poles to start with", poles.len());
@@ -123,24 +124,25 @@ impl<'a> Identification<'a> {
         let mut fit = Fit::new(lines, model, weights);
         fit.search_roughly();
         let noise = Noise::from_fit(&fit, None);
-        let mut start = Self { lines, settings, fit, noise, dropped: Vec::new() };
-        start.remove_impossible();
-        // A first search of all has no weights; process noise is judged when these are there.
-        start.noise = Noise::from_fit(&start.fit, None);
-        start.search_with_noise();
-        start.remove_impossible();
-        start.update_noise();
-        Ok(start)
+        let mut identification = Self { lines, settings, fit, noise, dropped: Vec::new() };
+        identification.remove_impossible();
+        // The first search is unweighted; unmeasured forces are estimated after a search with
+        // weights.
+        identification.noise = Noise::from_fit(&identification.fit, None);
+        identification.search_with_noise();
+        identification.remove_impossible();
+        identification.update_noise();
+        Ok(identification)
     }
 
-    /// Estimates the noise again and searches with its weights.
+    /// Estimates the noise from the current fit and searches again with its weights.
     fn update_noise(&mut self) {
         let process = self.settings.unmeasured_forces.then(|| self.noise.process.clone());
         self.noise = Noise::from_fit(&self.fit, process);
         self.search_with_noise();
     }
 
-    /// Searches with the weights of the noise as it is.
+    /// Searches with the weights of the current noise estimate.
     fn search_with_noise(&mut self) {
         let shapes = shapes(&self.fit.projection, &self.fit.weights, self.fit.model.modes());
         self.fit.weights = self.noise.weights(self.lines, &self.fit.model, &shapes);
@@ -154,7 +156,8 @@ impl<'a> Identification<'a> {
         );
     }
 
-    /// Takes modes out that are not worth their parameters, and adds those that are.
+    /// Removes modes that gain less than the penalty of their parameters, and adds candidates that
+    /// gain more.
     fn choose_modes(&mut self) {
         let required = required_gain(self.lines);
         self.remove_impossible();
@@ -167,7 +170,7 @@ impl<'a> Identification<'a> {
                 Ok(()) => {
                     self.update_noise();
                     self.remove_impossible();
-                    // A mode that only takes the place of another would be added for ever.
+                    // A candidate that only replaces another mode would be added without end.
                     if self.fit.model.modes() <= before {
                         break;
                     }
@@ -188,21 +191,22 @@ impl<'a> Identification<'a> {
 
     /// Returns the number of modes in the band.
     fn modes_in_band(&self) -> usize {
-        self.fit.model.poles.iter().filter(|pole| self.lines.holds(**pole)).count()
+        self.fit.model.poles.iter().filter(|pole| self.lines.contains(**pole)).count()
     }
 
-    /// Takes out roots that are damped too much for a resonance, and roots outside the band that
-    /// are not worth their parameters; returns whether there were any.
+    /// Removes roots that are damped too much for a resonance, and roots outside the band that gain
+    /// less than the penalty of their parameters; returns whether there were any.
     ///
-    /// A strong mode outside the band stays: residual terms alone would bias the modes near the
-    /// edge.
+    /// A strong mode outside the band is kept: with residual terms alone, modes near the edge would
+    /// be biased.
     fn remove_impossible(&mut self) -> bool {
         let required = required_gain(self.lines);
         let losses = removal_losses(&self.fit);
         let reason = |(pole, loss): (&Complex<f64>, &f64)| {
             if -pole.re / pole.norm() > MAX_DAMPING {
                 Some(DropReason::TooDamped)
-            } else if !self.lines.reaches(*pole) || !self.lines.holds(*pole) && *loss < required {
+            } else if !self.lines.reaches(*pole) || !self.lines.contains(*pole) && *loss < required
+            {
                 Some(DropReason::OutsideBand)
             } else {
                 None
@@ -214,15 +218,17 @@ impl<'a> Identification<'a> {
         reasons.iter().any(Option::is_some)
     }
 
-    /// Takes out modes whose removal costs less than their parameters, until none is left.
+    /// Removes modes whose loss is below the penalty of their parameters, until all others are
+    /// significant.
     ///
-    /// Of neighbours, which may share what they explain, one is taken out at a time.
+    /// Neighbours may explain the same response; therefore only one of them is removed at a time.
     fn remove_insignificant(&mut self, required: f64) {
         while self.settings.modes.is_none() {
             let losses = removal_losses(&self.fit);
-            let kept = self.protected();
-            let mut order: Vec<usize> =
-                (0..losses.len()).filter(|mode| losses[*mode] < required && !kept[*mode]).collect();
+            let protected = self.protected();
+            let mut order: Vec<usize> = (0..losses.len())
+                .filter(|mode| losses[*mode] < required && !protected[*mode])
+                .collect();
             order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
             let poles = &self.fit.model.poles;
             let mut reasons: Vec<Option<DropReason>> = vec![None; losses.len()];
@@ -244,7 +250,7 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the modes that were asked for by their frequencies: no rule takes them out.
+    /// Returns which modes were requested by frequency: no rule removes them.
     fn protected(&self) -> Vec<bool> {
         if self.settings.near_hz.is_empty() {
             return vec![false; self.fit.model.modes()];
@@ -252,11 +258,11 @@ impl<'a> Identification<'a> {
         stated_modes(&self.fit.model.poles, &self.settings.near_hz)
     }
 
-    /// Keeps the modes that bring most, up to a stated number.
+    /// Keeps the modes with the largest gains, up to a stated number.
     fn remove_beyond(&mut self, most: usize) {
         while self.modes_in_band() > most {
             let losses = removal_losses(&self.fit);
-            let inside = |mode: &usize| self.lines.holds(self.fit.model.poles[*mode]);
+            let inside = |mode: &usize| self.lines.contains(self.fit.model.poles[*mode]);
             let least =
                 (0..losses.len()).filter(inside).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
             let Some(mode) = least else { return };
@@ -266,7 +272,7 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Takes the modes with a reason out and searches again.
+    /// Removes the modes with a reason and searches again.
     fn remove(&mut self, reasons: &[Option<DropReason>]) {
         if reasons.iter().all(Option::is_none) {
             return;
@@ -276,16 +282,19 @@ impl<'a> Identification<'a> {
                 self.dropped.push(DroppedCandidate::new(*pole, *reason));
             }
         }
-        let kept: Vec<usize> = (0..reasons.len()).filter(|mode| reasons[*mode].is_none()).collect();
-        self.fit.model.select(&kept);
-        self.noise.process =
-            kept.iter().map(|mode| self.noise.process.get(*mode).copied().unwrap_or(0.0)).collect();
+        let retained: Vec<usize> =
+            (0..reasons.len()).filter(|mode| reasons[*mode].is_none()).collect();
+        self.fit.model.select(&retained);
+        self.noise.process = retained
+            .iter()
+            .map(|mode| self.noise.process.get(*mode).copied().unwrap_or(0.0))
+            .collect();
         self.fit.refresh();
         self.fit.search_roughly();
     }
 
-    /// Chooses the residual powers by Akaike's criterion: bias of the poles is worse than a few
-    /// unknowns more.
+    /// Chooses the residual powers by Akaike's criterion: too few terms bias the poles, too many
+    /// only add variance.
     fn choose_powers(&mut self) {
         if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
             return;
@@ -311,11 +320,11 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Takes out modes that the likelihood keeps for a reason other than a resonance.
+    /// Removes modes that are significant but no resonances of the structure.
     fn apply_rules(&mut self) {
         while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
             let Some(covariance) = self.covariance_of_all() else { return };
-            let mut reasons = doubtful_modes(&self.fit, &self.noise, &covariance);
+            let mut reasons = drop_reasons(&self.fit, &self.noise, &covariance);
             for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
                 *reason = reason.filter(|_| !protected);
             }
@@ -328,14 +337,14 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the covariance of the fit. Modes outside the band that make it singular are taken
-    /// out: the band says too little of them.
+    /// Returns the covariance of the fit; removes modes outside the band that make it singular,
+    /// because the band does not determine them.
     fn covariance_of_all(&mut self) -> Option<Covariance> {
         let covariance = Covariance::new(&self.fit, &self.noise);
         if covariance.is_some() || self.modes_in_band() == self.fit.model.modes() {
             return covariance;
         }
-        let reason = |pole| (!self.lines.holds(pole)).then_some(DropReason::OutsideBand);
+        let reason = |pole| (!self.lines.contains(pole)).then_some(DropReason::OutsideBand);
         let reasons: Vec<_> = self.fit.model.poles.iter().map(|pole| reason(*pole)).collect();
         self.remove(&reasons);
         self.update_noise();
@@ -365,7 +374,10 @@ impl<'a> Identification<'a> {
         let covariance = self.covariance_of_all().ok_or(failed)?;
         let poles = &self.fit.model.poles;
         let mut stated = stated_modes(poles, &self.settings.near_hz);
-        stated.iter_mut().zip(poles).for_each(|(stated, pole)| *stated &= self.lines.holds(*pole));
+        stated
+            .iter_mut()
+            .zip(poles)
+            .for_each(|(stated, pole)| *stated &= self.lines.contains(*pole));
         if !stated.contains(&true) {
             return Err(self.no_mode());
         }
@@ -375,13 +387,13 @@ impl<'a> Identification<'a> {
     }
 }
 
-/// Powers to start with.
+/// Returns the initial residual powers.
 fn first_powers(lines: &Lines) -> ResidualPowers {
     let transients = if lines.inputs() == 0 { Vec::new() } else { vec![0, 1, 2] };
     ResidualPowers { forces: vec![-4, -2, 0, 2, 4], transients }
 }
 
-/// Powers that are compared.
+/// Returns the sets of residual powers that are compared.
 fn power_sets() -> Vec<ResidualPowers> {
     let forces = [
         vec![-2, 0, 2],
@@ -393,25 +405,26 @@ fn power_sets() -> Vec<ResidualPowers> {
     forces.into_iter().map(|forces| ResidualPowers { forces, transients: vec![0, 1, 2] }).collect()
 }
 
-/// Relative distance within which a pole is the one that a stated frequency means.
-const STATED_REACH: f64 = 0.02;
+/// Maximum relative distance of a pole from a requested frequency that it matches.
+const STATED_DISTANCE: f64 = 0.02;
 
-/// Returns lightly damped poles at the stated frequencies that no pole is near.
+/// Returns lightly damped poles at the requested frequencies without a pole nearby.
 fn missing_poles(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
     const DAMPING: f64 = 5e-3;
     let omegas = near_hz.iter().map(|hz| TAU * hz);
-    let is_missing =
-        |omega: &f64| poles.iter().all(|pole| (pole.norm() - omega).abs() > STATED_REACH * omega);
+    let is_missing = |omega: &f64| {
+        poles.iter().all(|pole| (pole.norm() - omega).abs() > STATED_DISTANCE * omega)
+    };
     omegas.filter(is_missing).map(|omega| Complex::new(-DAMPING, 1.0) * omega).collect()
 }
 
-/// Returns the modes nearest to the stated frequencies; all if none is stated.
+/// Returns which modes are nearest to the requested frequencies; all if none is requested.
 fn stated_modes(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<bool> {
     let mut stated = vec![near_hz.is_empty(); poles.len()];
     for omega in near_hz.iter().map(|hz| TAU * hz) {
         let distance = |mode: &usize| (poles[*mode].norm() - omega).abs();
         let nearest = (0..poles.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        if let Some(mode) = nearest.filter(|mode| distance(mode) < STATED_REACH * omega) {
+        if let Some(mode) = nearest.filter(|mode| distance(mode) < STATED_DISTANCE * omega) {
             stated[mode] = true;
         }
     }

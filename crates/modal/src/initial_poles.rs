@@ -1,10 +1,10 @@
-//! First estimate of the poles: subspace method on the lines, and clusters of its roots over the
-//! orders.
+//! Initial poles: roots of a subspace method on the lines for many orders, and clusters of these
+//! roots.
 //!
 //! The band is mapped to most of the unit circle, z = e^{j(ω − ω_a)Δ}; block rows are the lines
-//! times powers of z. Their products depend on differences of powers alone: one correlation per lag
-//! gives all. Past inputs and outputs are the instruments; future inputs and the transient of each
-//! record are projected out.
+//! times powers of z. The products of two block rows depend only on the difference of their powers:
+//! one correlation per lag gives all of them. Past inputs and outputs are the instruments; future
+//! inputs and the transient of each record are projected out.
 //!
 //! # Source
 //! McKelvey, Akçay & Ljung, IEEE Trans. Automatic Control 41 (1996) 960 (subspace on spectral
@@ -28,9 +28,9 @@ use crate::stabilisation::{Pole, Stabilisation};
 
 type C = Complex<f64>;
 
-/// Share of the power of a block row that regularises its products.
+/// Regularisation of a product matrix, relative to the mean of its diagonal.
 const RIDGE: f64 = 1e-10;
-/// Number of orders whose roots are compared.
+/// Maximum number of orders whose roots are compared.
 const ORDERS: usize = 16;
 /// Largest order.
 const MAX_ORDER: usize = 72;
@@ -54,14 +54,15 @@ impl Root {
     }
 }
 
-/// Returns the poles that most orders of the subspace method agree on.
+/// Returns the poles on which the orders of the subspace method agree.
 pub(crate) fn initial_poles(lines: &Lines) -> Result<Vec<C>, ModalError> {
     let (roots, orders) = subspace_roots(lines)?;
     Ok(clusters(roots, orders))
 }
 
-/// Returns the poles of the subspace models of rising order, from which the identification starts; the
-/// vectors, which say nothing here, have one entry of 1.
+/// Returns the poles of the subspace models of rising order, the initial poles of the
+/// identification. The vectors have a single entry of 1: these models are compared by their poles
+/// only.
 ///
 /// # Errors
 /// As [`identify_modes`](crate::identify_modes).
@@ -76,8 +77,8 @@ pub fn stabilisation_of(data: &LineData) -> Result<Stabilisation, ModalError> {
     Ok(Stabilisation::new(models.collect()))
 }
 
-/// Returns the number of modes with which the identification starts, before any is tested: the poles that
-/// most orders of the subspace method agree on.
+/// Returns the number of initial modes, before any is tested: the poles on which the orders of the
+/// subspace method agree.
 ///
 /// # Errors
 /// As [`identify_modes`](crate::identify_modes).
@@ -87,7 +88,7 @@ pub fn initial_mode_count(data: &LineData) -> Result<usize, ModalError> {
     Ok(initial_poles(&lines)?.len())
 }
 
-/// Returns the roots in the band of a range of orders, and the number of orders.
+/// Returns the roots in the band for a range of orders, and the number of orders.
 pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalError> {
     let channels = leading_components(lines)?;
     let Some(shifts) = shifts(lines, channels.len()) else {
@@ -105,19 +106,19 @@ pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalE
     orders.dedup();
     let roots: Result<Vec<Vec<C>>, ModalError> =
         orders.par_iter().map(|order| shift_roots(&basis, channels.len(), *order)).collect();
-    let mut kept = Vec::new();
+    let mut retained = Vec::new();
     for (roots, order) in roots?.into_iter().zip(&orders) {
         for z in roots {
             let rate = z.ln();
             let turns = if rate.im < 0.0 { TAU } else { 0.0 };
             let pole = C::new(rate.re / step, low + (rate.im + turns) / step);
             if pole.re < 0.0 && pole.im > low && pole.im < high {
-                kept.push(Root { pole, order: *order });
+                retained.push(Root { pole, order: *order });
             }
         }
     }
-    kept.retain(|root| root.damping() < MAX_INITIAL_DAMPING);
-    Ok((kept, orders.len()))
+    retained.retain(|root| root.damping() < MAX_INITIAL_DAMPING);
+    Ok((retained, orders.len()))
 }
 
 /// Returns the number of block rows, or `None` if the lines are too few for two.
@@ -201,7 +202,7 @@ impl Products {
         Ok(products)
     }
 
-    /// Returns channel and power of z of each row.
+    /// Returns channel and power of z for each row.
     fn rows(&self) -> Vec<(usize, isize)> {
         let (inputs, all) = (self.inputs, self.inputs + self.outputs);
         let shifts = self.shifts as isize;
@@ -214,19 +215,22 @@ impl Products {
             .collect()
     }
 
-    /// Adds the products of one record, its transient projected out.
+    /// Adds the products of one record after projecting out its transient.
     fn add(&mut self, lags: &Lags, open: bool) -> Result<(), ModalError> {
         let rows = self.rows();
         let size = rows.len();
-        let part = Mat::from_fn(size, size, |a, b| lags.of(rows[a], rows[b]));
+        let part = Mat::from_fn(size, size, |a, b| lags.correlation(rows[a], rows[b]));
         self.gram += &part;
         if open {
-            let ends: Vec<(usize, isize)> = (0..self.shifts)
+            let transient: Vec<(usize, isize)> = (0..self.shifts)
                 .map(|power| (self.inputs + self.outputs, power as isize))
                 .collect();
-            let own = Mat::from_fn(ends.len(), ends.len(), |a, b| lags.of(ends[a], ends[b]));
-            let cross = Mat::from_fn(ends.len(), size, |a, b| lags.of(ends[a], rows[b]));
-            self.gram -= cross.adjoint() * solve_ridged(own, &cross)?;
+            let gram = Mat::from_fn(transient.len(), transient.len(), |a, b| {
+                lags.correlation(transient[a], transient[b])
+            });
+            let cross =
+                Mat::from_fn(transient.len(), size, |a, b| lags.correlation(transient[a], rows[b]));
+            self.gram -= cross.adjoint() * solve_ridged(gram, &cross)?;
         }
         Ok(())
     }
@@ -236,17 +240,17 @@ impl Products {
         let future = self.inputs * self.shifts;
         let past = (self.inputs + self.outputs) * self.shifts;
         let size = self.gram.nrows();
-        let rest = if future == 0 {
+        let projected = if future == 0 {
             self.gram.clone()
         } else {
-            let own = self.gram.submatrix(0, 0, future, future).to_owned();
+            let inputs = self.gram.submatrix(0, 0, future, future).to_owned();
             let cross = self.gram.submatrix(0, future, future, size - future).to_owned();
-            let kept = self.gram.submatrix(future, future, size - future, size - future);
-            kept - cross.adjoint() * solve_ridged(own, &cross)?
+            let remainder = self.gram.submatrix(future, future, size - future, size - future);
+            remainder - cross.adjoint() * solve_ridged(inputs, &cross)?
         };
         let outputs = self.outputs * self.shifts;
-        let instruments = rest.submatrix(0, 0, past, past).to_owned();
-        let cross = rest.submatrix(0, past, past, outputs).to_owned();
+        let instruments = projected.submatrix(0, 0, past, past).to_owned();
+        let cross = projected.submatrix(0, past, past, outputs).to_owned();
         let explained = cross.adjoint() * solve_ridged(instruments, &cross)?;
         let failed = ModalError::Decomposition { what: "future outputs", size: outputs };
         let eigen = explained.self_adjoint_eigen(Side::Lower).map_err(|_| failed)?;
@@ -256,14 +260,14 @@ impl Products {
     }
 }
 
-/// Solves with a Hermitian matrix of products whose diagonal is raised by a little.
-fn solve_ridged(mut own: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError> {
-    let size = own.nrows();
-    let trace = (0..size).map(|k| own[(k, k)].re).sum::<f64>();
+/// Solves with a Hermitian matrix of products after adding [`RIDGE`] to its diagonal.
+fn solve_ridged(mut matrix: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError> {
+    let size = matrix.nrows();
+    let trace = (0..size).map(|k| matrix[(k, k)].re).sum::<f64>();
     for k in 0..size {
-        own[(k, k)] += C::from(RIDGE * trace / size.max(1) as f64 + f64::MIN_POSITIVE);
+        matrix[(k, k)] += C::from(RIDGE * trace / size.max(1) as f64 + f64::MIN_POSITIVE);
     }
-    match own.llt(Side::Lower) {
+    match matrix.llt(Side::Lower) {
         Ok(factor) => Ok(factor.solve(right)),
         Err(_) => Err(ModalError::Decomposition { what: "products of inputs and outputs", size }),
     }
@@ -277,7 +281,7 @@ struct Lags {
 }
 
 impl Lags {
-    fn of(&self, (a, i): (usize, isize), (b, j): (usize, isize)) -> C {
+    fn correlation(&self, (a, i): (usize, isize), (b, j): (usize, isize)) -> C {
         if i >= j {
             self.sums[(i - j) as usize][a + self.channels * b]
         } else {
@@ -292,16 +296,16 @@ fn lags(channels: &[Vec<C>], turn: &[C], count: usize) -> Lags {
     let right = faer::MatRef::from_column_major_slice(&conjugate, turn.len(), n);
     let sum = |lag: usize| -> Vec<C> {
         let power: Vec<C> = turn.iter().map(|z| z.powu(lag as u32)).collect();
-        let turned = |v: &Vec<C>| v.iter().zip(&power).map(|(v, z)| v * z).collect::<Vec<C>>();
-        let left: Vec<C> = channels.iter().flat_map(turned).collect();
-        let left = faer::MatRef::from_column_major_slice(&left, turn.len(), n);
-        let product = left.transpose() * right;
+        let shift = |v: &Vec<C>| v.iter().zip(&power).map(|(v, z)| v * z).collect::<Vec<C>>();
+        let shifted: Vec<C> = channels.iter().flat_map(shift).collect();
+        let shifted = faer::MatRef::from_column_major_slice(&shifted, turn.len(), n);
+        let product = shifted.transpose() * right;
         (0..n).flat_map(|b| (0..n).map(move |a| (a, b))).map(|(a, b)| product[(a, b)]).collect()
     };
     Lags { channels: n, sums: (0..count).into_par_iter().map(sum).collect() }
 }
 
-/// Returns the roots of the shift of the leading `order` directions.
+/// Returns the eigenvalues of the shift matrix of the leading `order` directions.
 fn shift_roots(basis: &Mat<C>, outputs: usize, order: usize) -> Result<Vec<C>, ModalError> {
     let rows = basis.nrows() - outputs;
     let upper = basis.submatrix(0, 0, rows, order).to_owned();
@@ -316,15 +320,15 @@ fn shift_roots(basis: &Mat<C>, outputs: usize, order: usize) -> Result<Vec<C>, M
     shift.eigenvalues().map_err(|_| failed)
 }
 
-/// Returns the medians of roots that are one over the orders, sorted by frequency.
+/// Returns the medians of the clusters that the roots of all orders form, sorted by frequency.
 ///
-/// The roots with the most orders near them are taken first; roots nearer than 0.3 half-widths to a
-/// cluster that was taken belong to it.
+/// The cluster with the most orders is taken first; roots within 0.3 half-widths of its median
+/// belong to it and are removed.
 pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
-    let mut rest = roots;
+    let mut remaining = roots;
     let mut poles = Vec::new();
     let least = (MIN_ORDER_SHARE * orders as f64).max(1.0);
-    while let Some(members) = largest_cluster(&rest) {
+    while let Some(members) = largest_cluster(&remaining) {
         if (distinct_orders(&members) as f64) < least {
             break;
         }
@@ -335,9 +339,9 @@ pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
         };
         let centre = C::new(median(|root| root.pole.re), median(|root| root.pole.im));
         let size = centre.norm();
-        let reach = (-0.3 * centre.re).max(5e-5 * size);
+        let radius = (-0.3 * centre.re).max(5e-5 * size);
         let is_member = |root: &Root| members.iter().any(|member| member.pole == root.pole);
-        rest.retain(|root| !is_member(root) && (root.size() - size).abs() >= reach);
+        remaining.retain(|root| !is_member(root) && (root.size() - size).abs() >= radius);
         poles.push(centre);
     }
     poles.sort_by(|a: &C, b: &C| a.im.total_cmp(&b.im));
@@ -347,9 +351,9 @@ pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
 fn largest_cluster(roots: &[Root]) -> Option<Vec<Root>> {
     let near = |centre: &Root| -> Vec<Root> {
         let (size, damping) = (centre.size(), centre.damping());
-        let reach = CLUSTER_FREQUENCY.min((2.0 * damping).max(4e-4)) * size;
+        let radius = CLUSTER_FREQUENCY.min((2.0 * damping).max(4e-4)) * size;
         let is_near = |root: &&Root| {
-            (root.size() - size).abs() < reach
+            (root.size() - size).abs() < radius
                 && (root.damping() - damping).abs() < CLUSTER_DAMPING * damping + 1e-4
         };
         roots.iter().filter(is_near).copied().collect()

@@ -1,4 +1,4 @@
-//! Line data in the arrangement of the search: loads (forces and transients) and blocks of lines.
+//! Line data arranged for the search: loads (forces and transients) and blocks of lines.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use mechid_spectra::{LineData, Transient};
 use nalgebra::Complex;
 
 use crate::ModalError;
-use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS, OUTSIDE_REACH};
+use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS, OUTSIDE_DISTANCE};
 
 /// One column of the extended inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,16 +100,16 @@ impl Lines {
     }
 
     /// Returns whether a pole lies in the band.
-    pub(crate) fn holds(&self, pole: Complex<f64>) -> bool {
+    pub(crate) fn contains(&self, pole: Complex<f64>) -> bool {
         let (low, high) = self.band();
         pole.im >= low && pole.im <= high
     }
 
-    /// Returns whether a pole lies in the band or so near to it that its resonance may show there
-    /// as more than a residual term.
+    /// Returns whether a pole lies in the band or so near to it that residual terms may not
+    /// describe its resonance.
     pub(crate) fn reaches(&self, pole: Complex<f64>) -> bool {
         let (low, high) = self.band();
-        let margin = OUTSIDE_REACH * (high - low);
+        let margin = OUTSIDE_DISTANCE * (high - low);
         pole.im > (low - margin).max(0.0) && pole.im < high + margin
     }
 
@@ -129,7 +129,7 @@ impl Lines {
         (power / count.max(1) as f64).sqrt()
     }
 
-    /// Checks that the channels can carry modes.
+    /// Checks that the channels suffice to identify modes.
     pub(crate) fn check(&self) -> Result<(), ModalError> {
         if self.outputs.is_empty() {
             return Err(ModalError::NoOutput);
@@ -156,30 +156,30 @@ impl Lines {
     fn check_independence(&self) -> Result<(), ModalError> {
         let mut basis: Vec<Vec<Complex<f64>>> = Vec::new();
         for input in 0..self.inputs() {
-            let mut rest = self.amplitude[input].clone();
-            let level = rest.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            let mut remainder = self.amplitude[input].clone();
+            let level = remainder.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
             for _ in 0..2 {
                 for direction in &basis {
-                    let products = direction.iter().zip(&rest).map(|(q, z)| q.conj() * z);
+                    let products = direction.iter().zip(&remainder).map(|(q, z)| q.conj() * z);
                     let part: Complex<f64> = products.sum();
-                    for (z, q) in rest.iter_mut().zip(direction) {
+                    for (z, q) in remainder.iter_mut().zip(direction) {
                         *z -= part * q;
                     }
                 }
             }
-            let length = rest.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            let length = remainder.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
             let own_share = length / level;
             if own_share < DEPENDENT_INPUTS {
                 return Err(ModalError::DependentInputs { input, own_share });
             }
-            rest.iter_mut().for_each(|z| *z /= length);
-            basis.push(rest);
+            remainder.iter_mut().for_each(|z| *z /= length);
+            basis.push(remainder);
         }
         Ok(())
     }
 }
 
-/// Returns the channels whose power is nothing beside that of the strongest.
+/// Returns the channels with negligible power, relative to the strongest channel.
 fn dead(channels: &[Vec<Complex<f64>>]) -> Vec<usize> {
     let power = |channel: &Vec<Complex<f64>>| channel.iter().map(|z| z.norm_sqr()).sum::<f64>();
     let powers: Vec<f64> = channels.iter().map(power).collect();

@@ -1,9 +1,9 @@
-//! Results: modes with standard errors, what was dropped, and what the modes predict.
+//! Results of an identification: modes with standard errors, and rejected candidates.
 
 use mechid_numerics::Uncertain;
 use nalgebra::Complex;
 
-/// One mode.
+/// Identified mode with standard errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifiedMode {
     /// Pole λ = −ζω₀ + jω₀√(1 − ζ²), in rad/s.
@@ -31,12 +31,13 @@ pub struct IdentifiedMode {
     pub unmeasured_ratio: Option<f64>,
     /// Decrease of −2 log L that this mode brings.
     pub gain: f64,
-    /// Whether the mode lies within a few half-widths of an edge of the band.
+    /// `true` if the mode lies within a few half-widths of an edge of the band.
     pub near_edge: bool,
 }
 
 impl IdentifiedMode {
-    /// Returns the residue of an output and an input: what is over jω − λ in their response.
+    /// Returns the residue of an output and an input: the numerator of 1/(jω − λ) in their
+    /// response.
     pub fn residue(&self, output: usize, input: usize) -> Complex<f64> {
         self.shape[output] * self.participation[input]
     }
@@ -55,8 +56,8 @@ impl IdentifiedMode {
         self.participation.iter().map(|value| value / scale).collect()
     }
 
-    /// Returns the modal mass for the shape as it is scaled here, if `output` measures the
-    /// `derivative`-th time derivative of the displacement at which `input` acts as a force.
+    /// Returns the modal mass for the scaling of `shape`, if `output` measures the `derivative`-th
+    /// time derivative of the displacement at which `input` acts as a force.
     ///
     /// With mass-normalised shapes ψ the residue of a displacement is ψ_i ψ_j/(2jω_d) for light,
     /// proportional damping; the mass of a shape scaled to `shape` is shape_i²/ψ_i². It is in kg if
@@ -68,11 +69,11 @@ impl IdentifiedMode {
     }
 }
 
-/// Why a candidate is no mode of the result.
+/// Reason for which a candidate was rejected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The likelihood gains less than the parameters of a mode must bring.
+    /// The likelihood gains less than the penalty of the parameters of a mode.
     Insignificant {
         /// Decrease of −2 log L.
         gain: f64,
@@ -84,7 +85,7 @@ pub enum DropReason {
         /// Standard error of the damping ratio.
         standard_error: f64,
     },
-    /// The damping is that of no resonance: the root stands for what lies outside the band.
+    /// The damping is too high for a resonance: the root represents modes outside the band.
     TooDamped,
     /// The root left the band.
     OutsideBand,
@@ -98,26 +99,26 @@ pub enum DropReason {
         /// Ratio of unmeasured to measured force.
         ratio: f64,
     },
-    /// The number of modes was stated, and others bring more.
+    /// The number of modes was stated, and other modes gain more.
     BeyondNumber {
         /// Decrease of −2 log L.
         gain: f64,
     },
 }
 
-/// A candidate that is no mode of the result.
+/// Rejected candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DroppedCandidate {
     /// Natural frequency, in Hz.
     pub frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Why it was dropped.
+    /// Reason of the rejection.
     pub reason: DropReason,
 }
 
 impl DroppedCandidate {
-    /// Takes pole (rad/s) and reason.
+    /// Creates the record of a rejected pole (rad/s).
     pub(crate) fn new(pole: Complex<f64>, reason: DropReason) -> Self {
         let size = pole.norm();
         Self { frequency_hz: size / std::f64::consts::TAU, damping_ratio: -pole.re / size, reason }

@@ -1,5 +1,4 @@
-//! Pole, shape and participations of one mode with their joint covariance, and the numbers that are
-//! derived from them.
+//! Pole, shape and participations of one mode with their joint covariance, and derived quantities.
 
 use std::f64::consts::TAU;
 
@@ -70,7 +69,7 @@ impl ModeParameters {
 
     /// Returns the covariance of real and imaginary part of Σ_k f_k z_k, for complex parameters z_k
     /// at `index`.
-    fn of_sum(&self, terms: &[(usize, C)]) -> Matrix2<f64> {
+    fn covariance_of_sum(&self, terms: &[(usize, C)]) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         for &(a, f) in terms {
             for &(b, g) in terms {
@@ -82,19 +81,20 @@ impl ModeParameters {
 
     /// Returns the shape with its covariance; `None` if an entry is not finite.
     pub(crate) fn shape_with_covariance(&self) -> Option<ShapeWithCovariance> {
-        let p = self.outputs;
-        let index = |row: usize| Self::shape_index(row % p) + row / p;
-        let covariance =
-            DMatrix::from_fn(2 * p, 2 * p, |i, j| self.covariance[(index(i), index(j))]);
-        let shape = DVector::from_fn(p, |output, _| self.shape(output));
+        let outputs = self.outputs;
+        let index = |row: usize| Self::shape_index(row % outputs) + row / outputs;
+        let covariance = DMatrix::from_fn(2 * outputs, 2 * outputs, |i, j| {
+            self.covariance[(index(i), index(j))]
+        });
+        let shape = DVector::from_fn(outputs, |output, _| self.shape(output));
         ShapeWithCovariance::new(shape, covariance).ok()
     }
 
-    /// Returns the mode with these parameters: its shape over the largest entry, and participations
-    /// times this entry.
+    /// Returns the mode with these parameters: its shape divided by the largest entry, and its
+    /// participations multiplied by it.
     pub(crate) fn mode(&self) -> IdentifiedMode {
         let pole = self.pole();
-        let (frequency, damping, between) =
+        let (frequency, damping, frequency_damping_covariance) =
             natural_frequency_and_damping(pole, &self.block(0, 0), self.degrees_of_freedom);
         let shape: Vec<C> = (0..self.outputs).map(|output| self.shape(output)).collect();
         let largest = |a: &usize, b: &usize| shape[*a].norm().total_cmp(&shape[*b].norm());
@@ -103,24 +103,24 @@ impl ModeParameters {
         let errors = |covariance: Matrix2<f64>| {
             C::new(covariance[(0, 0)].max(0.0).sqrt(), covariance[(1, 1)].max(0.0).sqrt())
         };
-        let of_entry = |output: usize| {
+        let entry_error = |output: usize| {
             let by_reference = (at, -shape[output] / (scale * scale));
             let terms = [(Self::shape_index(output), 1.0 / scale), by_reference];
-            if output == reference { C::default() } else { errors(self.of_sum(&terms)) }
+            if output == reference { C::default() } else { errors(self.covariance_of_sum(&terms)) }
         };
-        let of_input = |input: usize| {
+        let participation_error = |input: usize| {
             let terms = [(self.participation_index(input), scale), (at, self.participation(input))];
-            errors(self.of_sum(&terms))
+            errors(self.covariance_of_sum(&terms))
         };
         IdentifiedMode {
             pole,
             natural_frequency_hz: frequency,
             damping_ratio: damping,
-            frequency_damping_covariance: between,
+            frequency_damping_covariance,
             shape: shape.iter().map(|value| value / scale).collect(),
-            shape_standard_error: (0..self.outputs).map(of_entry).collect(),
+            shape_standard_error: (0..self.outputs).map(entry_error).collect(),
             participation: (0..self.inputs).map(|k| self.participation(k) * scale).collect(),
-            participation_standard_error: (0..self.inputs).map(of_input).collect(),
+            participation_standard_error: (0..self.inputs).map(participation_error).collect(),
             driven_share: None,
             unmeasured_ratio: None,
             gain: 0.0,
@@ -129,13 +129,13 @@ impl ModeParameters {
     }
 }
 
-/// Multiplication by a complex number, as a matrix of real and imaginary parts.
+/// Returns the real 2 × 2 matrix that multiplies (real part, imaginary part) by a complex number.
 fn rotation(z: C) -> Matrix2<f64> {
     Matrix2::new(z.re, -z.im, z.im, z.re)
 }
 
-/// Returns natural frequency (Hz), damping ratio and their covariance, from those of ln(−Re λ) and
-/// ln Im λ.
+/// Returns natural frequency (Hz), damping ratio and their covariance from the covariance of ln(−Re
+/// λ) and ln Im λ.
 pub(crate) fn natural_frequency_and_damping(
     pole: C,
     covariance: &Matrix2<f64>,

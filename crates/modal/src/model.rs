@@ -1,8 +1,8 @@
-//! Kernels of the modal model: what a pole does to a load on a line, and its derivative.
+//! Kernels of the modal model: response of a mode to a load on a line, and its derivatives.
 //!
 //! Output i at ω is Σ_r [φ_ir g_r(ω) + φ_ir* g̃_r(ω)] + Σ_e E_e Σ_n c_ien (jω)ⁿ with g_r = Σ_e L_re
 //! E_e h_re, where h is 1/(jω − λ_r) for a force and Δt/(1 − e^{(λ_r − jω)Δt}), the exact transform
-//! of a sampled decay, for the transient of a record; g̃ has λ*, L* in their place.
+//! of a sampled decay, for the transient of a record; g̃ is g with λ* and L* in place of λ and L.
 //!
 //! # Source
 //! Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
@@ -14,7 +14,7 @@ use nalgebra::Complex;
 
 use crate::lines::{Block, Lines, Load};
 
-/// Powers of jω whose real multiples stand for everything outside the band.
+/// Powers of jω of the residual terms, which represent all modes outside the band.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResidualPowers {
     /// Powers for each measured input.
@@ -25,7 +25,7 @@ pub struct ResidualPowers {
 
 impl ResidualPowers {
     /// Returns the powers of a load.
-    pub(crate) fn of_load(&self, load: Load) -> &[i32] {
+    pub(crate) fn for_load(&self, load: Load) -> &[i32] {
         match load {
             Load::Force(_) => &self.forces,
             Load::Transient(_) => &self.transients,
@@ -33,8 +33,8 @@ impl ResidualPowers {
     }
 }
 
-/// Poles, participations and residual powers: all that the search moves, and the layout of what it
-/// does not.
+/// Poles and participations, which the search changes, and residual powers, which define the linear
+/// unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     pub(crate) poles: Vec<Complex<f64>>,
@@ -47,7 +47,7 @@ pub(crate) struct Model {
     pub(crate) reference: f64,
 }
 
-/// Response of one mode to unit loads on one line; `mirror` holds that of the conjugate mode.
+/// Response of one mode to unit loads on one line; `mirror` is the response of the conjugate mode.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Kernel {
     pub(crate) value: Complex<f64>,
@@ -58,14 +58,14 @@ pub(crate) struct Kernel {
 
 impl Kernel {
     /// Returns the kernel of a force at ω.
-    pub(crate) fn of_force(pole: Complex<f64>, omega: f64) -> Self {
+    pub(crate) fn from_force(pole: Complex<f64>, omega: f64) -> Self {
         let value = 1.0 / (Complex::new(0.0, omega) - pole);
         let mirror = 1.0 / (Complex::new(0.0, omega) - pole.conj());
         Self { value, mirror, slope: value * value, mirror_slope: mirror * mirror }
     }
 
     /// Returns the kernel of a transient: `growth` is e^{λΔt}, `delay` is e^{−jωΔt}.
-    fn of_transient(growth: Complex<f64>, delay: Complex<f64>, dt: f64) -> Self {
+    fn from_transient(growth: Complex<f64>, delay: Complex<f64>, dt: f64) -> Self {
         let (x, mirror_x) = (growth * delay, growth.conj() * delay);
         let (value, mirror) = (dt / (1.0 - x), dt / (1.0 - mirror_x));
         let (slope, mirror_slope) = (x * value * value, mirror_x * mirror * mirror);
@@ -73,7 +73,7 @@ impl Kernel {
     }
 }
 
-/// Force and transient kernels of one mode on a line of a block.
+/// Returns the force and transient kernels of one mode on a line of a block.
 pub(crate) fn kernels(
     pole: Complex<f64>,
     lines: &Lines,
@@ -81,11 +81,10 @@ pub(crate) fn kernels(
     line: usize,
     growth: Complex<f64>,
 ) -> (Kernel, Kernel) {
-    let force = Kernel::of_force(pole, lines.omega[block.rows.start + line]);
-    let transient = block
-        .delay
-        .as_ref()
-        .map_or_else(Kernel::default, |(dt, delay)| Kernel::of_transient(growth, delay[line], *dt));
+    let force = Kernel::from_force(pole, lines.omega[block.rows.start + line]);
+    let transient = block.delay.as_ref().map_or_else(Kernel::default, |(dt, delay)| {
+        Kernel::from_transient(growth, delay[line], *dt)
+    });
     (force, transient)
 }
 
@@ -110,7 +109,7 @@ impl Model {
         let mut next = 2 * self.modes();
         let take = |load: &Load| {
             let start = next;
-            next += self.powers.of_load(*load).len();
+            next += self.powers.for_load(*load).len();
             start..next
         };
         lines.loads.iter().map(take).collect()
@@ -118,7 +117,7 @@ impl Model {
 
     /// Returns the number of linear unknowns of each output.
     pub(crate) fn columns(&self, lines: &Lines) -> usize {
-        let residuals = lines.loads.iter().map(|load| self.powers.of_load(*load).len());
+        let residuals = lines.loads.iter().map(|load| self.powers.for_load(*load).len());
         2 * self.modes() + residuals.sum::<usize>()
     }
 
@@ -150,7 +149,7 @@ impl Model {
     /// by `weight`.
     pub(crate) fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]) {
         let n = block.len();
-        let (modes, rest) = columns.split_at_mut(4 * n * self.modes());
+        let (modes, residual_columns) = columns.split_at_mut(4 * n * self.modes());
         for (mode, pair) in modes.chunks_exact_mut(4 * n).enumerate() {
             let (pole, participation) = (self.poles[mode], &self.participation[mode]);
             let growth = growth(pole, block);
@@ -159,14 +158,14 @@ impl Model {
                 let (mut direct, mut mirror) = (Complex::default(), Complex::default());
                 for &load in &block.active {
                     let amplitude = lines.load(load, block.rows.start + line);
-                    let kernel = of_kind(lines.loads[load], force, transient);
+                    let kernel = select_kernel(lines.loads[load], force, transient);
                     direct += participation[load] * amplitude * kernel.value;
                     mirror += participation[load].conj() * amplitude * kernel.mirror;
                 }
                 write_pair(pair, line, n, *weight, direct, mirror);
             }
         }
-        self.fill_residuals(lines, block, weight, rest);
+        self.fill_residuals(lines, block, weight, residual_columns);
     }
 
     /// Writes the columns of the residual powers of a block.
@@ -179,14 +178,14 @@ impl Model {
     ) {
         let n = block.len();
         let active = block.active.iter().flat_map(|load| {
-            self.powers.of_load(lines.loads[*load]).iter().map(move |power| (*load, *power))
+            self.powers.for_load(lines.loads[*load]).iter().map(move |power| (*load, *power))
         });
         for ((load, power), column) in active.zip(columns.chunks_exact_mut(2 * n)) {
-            let turn = Complex::i().powi(power);
+            let phase = Complex::i().powi(power);
             for (line, weight) in weight.iter().enumerate() {
                 let row = block.rows.start + line;
                 let size = (lines.omega[row] / self.reference).powi(power) * weight;
-                let value = lines.load(load, row) * turn * size;
+                let value = lines.load(load, row) * phase * size;
                 (column[line], column[n + line]) = (value.re, value.im);
             }
         }
@@ -194,8 +193,8 @@ impl Model {
 
     /// Writes the derivatives of a block: a pair of columns for each pair of parameters in `pairs`.
     ///
-    /// With a = ∂g/∂λ (or ∂g/∂L) and b that of the conjugate mode, the pair is a + b and j(a − b);
-    /// the derivative of output i is this pair turned by its shape φ_i.
+    /// With a = ∂g/∂λ (or ∂g/∂L) and b, the same of the conjugate mode, the pair is a + b and j(a −
+    /// b); the derivative of output i is this pair turned by its shape φ_i.
     pub(crate) fn fill_derivatives(
         &self,
         lines: &Lines,
@@ -213,7 +212,7 @@ impl Model {
             let chunks = pairs.iter().zip(columns.chunks_exact_mut(4 * n));
             for ((_, load), pair) in chunks.filter(|((owner, _), _)| *owner == mode) {
                 for (line, (force, transient)) in kernels_of_mode.iter().enumerate() {
-                    let kind = |load: usize| of_kind(lines.loads[load], *force, *transient);
+                    let kind = |load: usize| select_kernel(lines.loads[load], *force, *transient);
                     let row = block.rows.start + line;
                     let (direct, mirror) = match load {
                         Some(load) => {
@@ -279,7 +278,7 @@ impl Model {
     }
 }
 
-/// Returns the root-mean-square of each load over the resonance of each mode.
+/// Returns the root-mean-square of each load around the resonance of each mode.
 pub(crate) fn level_near(poles: &[Complex<f64>], lines: &Lines) -> Vec<Vec<f64>> {
     let overall: Vec<f64> = (0..lines.loads.len()).map(|load| lines.load_level(load)).collect();
     let level = |pole: &Complex<f64>| {
@@ -300,8 +299,8 @@ pub(crate) fn level_near(poles: &[Complex<f64>], lines: &Lines) -> Vec<Vec<f64>>
     poles.iter().map(level).collect()
 }
 
-/// Returns the kernel of a kind of load.
-pub(crate) fn of_kind(load: Load, force: Kernel, transient: Kernel) -> Kernel {
+/// Returns the kernel for the type of a load.
+pub(crate) fn select_kernel(load: Load, force: Kernel, transient: Kernel) -> Kernel {
     match load {
         Load::Force(_) => force,
         Load::Transient(_) => transient,

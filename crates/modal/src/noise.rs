@@ -1,7 +1,7 @@
 //! Noise of the outputs: a smooth spectrum per sensor, and unmeasured forces through the modes.
 //!
 //! e(ω) = Σ_r φ_r w_r(ω)/(jω − λ_r) + n(ω), with E|w_r|² = S_r and E|n_i|² = D_i(ω) smooth. A
-//! resonance is a few lines wide, so that no smooth spectrum can follow the first term.
+//! resonance is only a few lines wide; a smooth spectrum cannot follow the first term.
 //!
 //! # Source
 //! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal
@@ -23,7 +23,7 @@ use crate::unmeasured::{ForceModel, ForceSums, Posterior};
 
 type C = Complex<f64>;
 
-/// Spectra of the noise of a fit.
+/// Noise of a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
     /// Variance D_i of each sensor's noise on every line.
@@ -33,9 +33,8 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Estimates the noise from the residuals of a fit; `process` are first variances of the
-    /// unmeasured forces,
-    /// `None` leaves these out.
+    /// Estimates the noise from the residuals of a fit; `process` contains initial variances of the
+    /// unmeasured forces, `None` ignores unmeasured forces.
     pub(crate) fn from_fit(fit: &Fit<'_>, process: Option<Vec<f64>>) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
         let residuals = Residuals::new(fit);
@@ -43,7 +42,7 @@ impl Noise {
         noise.sensor = residuals.smooth_power(lines, residuals.power.clone());
         let Some(before) = process.filter(|_| model.modes() > 0) else { return noise };
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
-        noise.process = noise.first_process(lines, model, &shapes, &residuals);
+        noise.process = noise.initial_process(lines, model, &shapes, &residuals);
         if before.len() == model.modes() {
             for (first, before) in noise.process.iter_mut().zip(&before) {
                 *first = before.max(LEAST_FIRST_PROCESS * *first);
@@ -60,10 +59,11 @@ impl Noise {
         noise
     }
 
-    /// Returns the weights that one matrix for all outputs allows.
+    /// Returns the weights as a level of each output and a shape that all outputs share.
     ///
-    /// The level of each output is that of its sensor; the common shape is the mean of the sensors'
-    /// times 1 + Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the modes.
+    /// The level of an output is the level of its sensor noise. The common shape is the mean shape
+    /// of the sensor noise times 1 + Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the
+    /// modes.
     pub(crate) fn weights(&self, lines: &Lines, model: &Model, shapes: &[Vec<C>]) -> Weights {
         let count = lines.len() as f64;
         let directions = self.directions(shapes);
@@ -89,8 +89,8 @@ impl Noise {
     /// Takes one scoring step of the logarithms of the variances of the unmeasured forces, and
     /// returns the largest step.
     ///
-    /// The information of a force counts what it shares with the others, so that forces of close
-    /// modes do not overshoot together.
+    /// The information of a force includes the part that it shares with others, so that the forces
+    /// of close modes do not overshoot together.
     fn improve_process(&mut self, sums: &[ForceSums]) -> f64 {
         let mut largest: f64 = 0.0;
         for (process, sum) in self.process.iter_mut().zip(sums) {
@@ -115,8 +115,8 @@ impl Noise {
         directions
     }
 
-    /// Returns what the lines say of each unmeasured force, and the expected power of each sensor's
-    /// own noise, given the residuals.
+    /// Returns the score and information of each unmeasured force, and the expected power of each
+    /// sensor's noise, given the residuals.
     fn expectation(
         &self,
         lines: &Lines,
@@ -127,7 +127,7 @@ impl Noise {
         let directions = self.directions(shapes);
         let directions = directions.as_slice();
         let forces = ForceModel { noise: self, lines, model, shapes, residuals, directions };
-        let of_block = |block: &Block| {
+        let block_expectation = |block: &Block| {
             let mut sums = vec![ForceSums::default(); model.modes()];
             let mut power: Vec<Vec<f64>> =
                 residuals.power.iter().map(|power| power[block.rows.clone()].to_vec()).collect();
@@ -143,38 +143,39 @@ impl Noise {
             }
             (sums, power)
         };
-        let parts: Vec<_> = lines.blocks.par_iter().map(of_block).collect();
-        let mut all = vec![ForceSums::default(); model.modes()];
+        let parts: Vec<_> = lines.blocks.par_iter().map(block_expectation).collect();
+        let mut total = vec![ForceSums::default(); model.modes()];
         let mut powers = vec![Vec::with_capacity(lines.len()); self.sensor.len()];
         for (sums, power) in parts {
-            for (all, part) in all.iter_mut().zip(&sums) {
-                all.add(part);
+            for (total, part) in total.iter_mut().zip(&sums) {
+                total.add(part);
             }
             powers.iter_mut().zip(&power).for_each(|(to, part)| to.extend_from_slice(part));
         }
-        (all, powers)
+        (total, powers)
     }
 
-    /// Returns first variances of the unmeasured forces: the power of the residuals along each
+    /// Returns initial variances of the unmeasured forces: the power of the residuals along each
     /// shape near its resonance.
-    fn first_process(
+    fn initial_process(
         &self,
         lines: &Lines,
         model: &Model,
         shapes: &[Vec<C>],
         residuals: &Residuals,
     ) -> Vec<f64> {
-        let of_mode = |mode: usize| {
+        let initial_variance = |mode: usize| {
             let (pole, shape) = (model.poles[mode], &shapes[mode]);
-            if !lines.holds(pole) {
-                // What it does in the band is smooth, as the noise of the sensors is.
+            if !lines.contains(pole) {
+                // The response of a mode outside the band is smooth there; the sensor noise
+                // includes it.
                 return 0.0;
             }
             let nearest = lines.omega.iter().map(|w| (w - pole.im).abs()).fold(f64::MAX, f64::min);
-            let reach = (-pole.re).max(nearest);
+            let half_width = (-pole.re).max(nearest);
             let (mut sum, mut count) = (0.0, 0.0);
             for line in 0..lines.len() {
-                if (lines.omega[line] - pole.im).abs() <= reach {
+                if (lines.omega[line] - pole.im).abs() <= half_width {
                     let along: C = (0..shape.len())
                         .map(|k| shape[k].conj() * residuals.error[k][line] / self.sensor[k][line])
                         .sum();
@@ -185,11 +186,12 @@ impl Noise {
             }
             sum / count
         };
-        (0..model.modes()).into_par_iter().map(of_mode).collect()
+        (0..model.modes()).into_par_iter().map(initial_variance).collect()
     }
 }
 
-/// Residuals in the units of the outputs, corrected for what the fit has absorbed of the noise.
+/// Residuals in the units of the outputs, corrected for the share of the noise that the fit
+/// absorbs.
 pub(crate) struct Residuals {
     pub(crate) error: Vec<Vec<C>>,
     power: Vec<Vec<f64>>,
@@ -207,8 +209,8 @@ impl Residuals {
                 let (real, imaginary) = column.split_at(n);
                 for line in 0..n {
                     let row = block.rows.start + line;
-                    let rest = (1.0 - leverage[row] - searched).max(0.05).sqrt();
-                    let scale = fit.weights.level[output] / (arrays.weight[line] * rest);
+                    let remaining = (1.0 - leverage[row] - searched).max(0.05).sqrt();
+                    let scale = fit.weights.level[output] / (arrays.weight[line] * remaining);
                     error[output][row] = C::new(real[line], imaginary[line]) * scale;
                 }
             }
@@ -221,15 +223,15 @@ impl Residuals {
     fn smooth_power(&self, lines: &Lines, power: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let records = record_rows(lines);
         let outputs = power.into_par_iter().zip(&lines.outputs);
-        let of_output = |(power, output): (Vec<f64>, &Vec<C>)| {
+        let smoothed = |(power, output): (Vec<f64>, &Vec<C>)| {
             let level = output.iter().map(|z| z.norm_sqr()).sum::<f64>() / output.len() as f64;
             smooth(&power, &records, level * LEAST_NOISE * LEAST_NOISE)
         };
-        outputs.map(of_output).collect()
+        outputs.map(smoothed).collect()
     }
 }
 
-/// Returns the rows of each record, or of neighbouring records with the same loads.
+/// Returns the rows of each record; neighbouring records with the same loads count as one.
 fn record_rows(lines: &Lines) -> Vec<Range<usize>> {
     let mut records: Vec<Range<usize>> = Vec::new();
     for (index, block) in lines.blocks.iter().enumerate() {
@@ -242,46 +244,47 @@ fn record_rows(lines: &Lines) -> Vec<Range<usize>> {
     records
 }
 
-/// Returns the least number of lines in the window of a noise spectrum.
+/// Returns the minimum number of lines in the averaging window of a noise spectrum.
 pub(crate) fn noise_window(lines: &Lines) -> usize {
-    let of_record = |rows: Range<usize>| (2 * reach(rows.len()) + 1).min(rows.len());
-    record_rows(lines).into_iter().map(of_record).min().unwrap_or(0)
+    let window = |rows: Range<usize>| (2 * half_window(rows.len()) + 1).min(rows.len());
+    record_rows(lines).into_iter().map(window).min().unwrap_or(0)
 }
 
-/// Returns the number of lines on either side in a noise spectrum of a record.
-fn reach(lines: usize) -> usize {
+/// Returns the number of lines on either side in the averaging window of a record.
+fn half_window(lines: usize) -> usize {
     ((lines as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW)
 }
 
-/// Moving mean within each record, at least `floor`, with a window that shrinks at its ends.
+/// Returns the moving mean within each record, at least `floor`; the window is cut at the ends of
+/// the record.
 fn smooth(power: &[f64], records: &[Range<usize>], floor: f64) -> Vec<f64> {
     let mut mean = vec![0.0; power.len()];
     for rows in records {
         let (values, count) = (&power[rows.clone()], rows.len());
-        let reach = reach(count);
+        let side = half_window(count);
         let mut sums = vec![0.0; count + 1];
         for (k, value) in values.iter().enumerate() {
             sums[k + 1] = sums[k] + value;
         }
         for k in 0..count {
-            let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(count));
+            let (from, to) = (k.saturating_sub(side), (k + side + 1).min(count));
             mean[rows.start + k] = ((sums[to] - sums[from]) / (to - from) as f64).max(floor);
         }
     }
     mean
 }
 
-/// Returns the share of its noise that the fit absorbs on every line.
+/// Returns the share of the noise that the fit absorbs on every line.
 fn leverage(projection: &Projection) -> Vec<f64> {
     let size = projection.triangle.size;
     let mut inverse = vec![0.0; size * size];
     (0..size).for_each(|k| inverse[k * size + k] = 1.0);
     projection.triangle.solve(&mut inverse);
-    let of_block = |arrays: &crate::projection::BlockArrays| -> Vec<f64> {
+    let absorbed_share = |arrays: &crate::projection::BlockArrays| -> Vec<f64> {
         let n = arrays.weight.len();
         let mut local = Vec::with_capacity(arrays.columns.len() * size);
         for column in inverse.chunks_exact(size.max(1)) {
-            local.extend(arrays.columns.iter().map(|place| column[*place]));
+            local.extend(arrays.columns.iter().map(|index| column[*index]));
         }
         let mut directions = vec![0.0; 2 * n * size];
         add_product(&mut directions, &arrays.design, &local, 2 * n, arrays.columns.len(), 1.0);
@@ -291,7 +294,7 @@ fn leverage(projection: &Projection) -> Vec<f64> {
         }
         share
     };
-    let parts: Vec<Vec<f64>> = projection.blocks.par_iter().map(of_block).collect();
+    let parts: Vec<Vec<f64>> = projection.blocks.par_iter().map(absorbed_share).collect();
     parts.concat()
 }
 
@@ -313,9 +316,11 @@ pub(crate) fn modal_gain(pole: C, omega: f64) -> C {
     1.0 / (C::new(0.0, omega) - pole)
 }
 
-/// Step of the logarithms of the variances of unmeasured forces that ends their iteration.
+/// Step of the log variances of unmeasured forces that ends their iteration.
 const SETTLED: f64 = 0.05;
-/// Largest step of the logarithm of a variance: a force that is not there shrinks by it each time.
+/// Maximum step of the log variance of an unmeasured force: a force that does not exist shrinks by
+/// this factor in each step.
 const MAX_SCORING_STEP: f64 = 1.0;
-/// Share of its first estimate below which the variance of an unmeasured force does not start.
+/// Minimum initial variance of an unmeasured force, relative to its initial estimate from the
+/// residuals.
 const LEAST_FIRST_PROCESS: f64 = 0.01;

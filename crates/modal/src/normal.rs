@@ -1,8 +1,8 @@
 //! Normal equations of poles and participations, with the linear unknowns projected out (Kaufman).
 //!
 //! The derivative of output i with respect to a pair of parameters is one pair of columns for all
-//! outputs, turned by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one
-//! product CᵀC, whatever the number of outputs.
+//! outputs, multiplied by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one
+//! product CᵀC for any number of outputs.
 //!
 //! # Source
 //! Kaufman, BIT 15 (1975) 49.
@@ -14,7 +14,8 @@ use crate::lines::{Block, Lines};
 use crate::model::Model;
 use crate::projection::{BlockArrays, Projection};
 
-/// Number of partial sums, each over neighbouring blocks: it fixes the order of the sums.
+/// Number of partial sums, each over neighbouring blocks: a fixed number makes results independent
+/// of the number of processors.
 const LANES: usize = 8;
 
 /// Curvature G and gradient of half the cost in the parameters of the search.
@@ -22,13 +23,13 @@ const LANES: usize = 8;
 pub(crate) struct NormalEquations {
     /// Number of parameters.
     pub(crate) size: usize,
-    /// Symmetric curvature, columns one after the other.
+    /// Symmetric curvature, column-major.
     pub(crate) curvature: Vec<f64>,
     /// (∂A x)ᵀ r: the direction in which the cost falls.
     pub(crate) descent: Vec<f64>,
 }
 
-/// Sums over blocks.
+/// Partial sums over neighbouring blocks.
 #[derive(Debug, Clone, Default)]
 struct Lane {
     /// CᵀC, lower triangle.
@@ -41,21 +42,22 @@ struct Lane {
     turned: Vec<f64>,
 }
 
-/// Outputs' shapes in whitened units: real parts in row 2r, imaginary parts in row 2r + 1, as
-/// columns over outputs.
+/// Returns the shapes in whitened units: row 2r holds the real parts of mode r for all outputs, row
+/// 2r + 1 the imaginary parts.
 pub(crate) fn whitened_shapes(projection: &Projection, modes: usize) -> Vec<f64> {
     let columns = projection.triangle.size.max(1);
     let outputs = projection.unknowns.len() / columns;
     let mut shapes = vec![0.0; outputs * 2 * modes];
-    for (output, own) in projection.unknowns.chunks_exact(columns).enumerate() {
-        for (row, value) in own[..2 * modes].iter().enumerate() {
+    for (output, unknowns) in projection.unknowns.chunks_exact(columns).enumerate() {
+        for (row, value) in unknowns[..2 * modes].iter().enumerate() {
             shapes[row * outputs + output] = *value;
         }
     }
     shapes
 }
 
-/// Pairs of parameters that act on a block: all poles, and participations of its loads.
+/// Returns indices and pairs of the parameters that affect a block: all poles, and participations
+/// of its loads.
 pub(crate) fn block_pairs(
     pairs: &[(usize, Option<usize>)],
     block: &Block,
@@ -95,7 +97,7 @@ impl NormalEquations {
         Self::assemble(&sum.gram, sum.descent, &pairs, model, &products)
     }
 
-    /// Turns CᵀP⊥C by the shapes and scales it to the parameters.
+    /// Multiplies CᵀP⊥C by the shapes and scales it to the parameters.
     fn assemble(
         projected: &[f64],
         mut descent: Vec<f64>,
@@ -134,7 +136,7 @@ impl ShapeProducts {
     }
 
     /// Returns xx, xy, yx, yy of two modes.
-    fn of(&self, r: usize, s: usize) -> [f64; 4] {
+    fn pair(&self, r: usize, s: usize) -> [f64; 4] {
         let entry = |row: usize, column: usize| self.sums[column * 2 * self.modes + row];
         let (x, y, u, v) = (2 * r, 2 * r + 1, 2 * s, 2 * s + 1);
         [entry(x, u), entry(x, v), entry(y, u), entry(y, v)]
@@ -156,7 +158,7 @@ pub(crate) fn turn(
     };
     for (b, &(s, _)) in pairs.iter().enumerate() {
         for (a, &(r, _)) in pairs.iter().enumerate().skip(b) {
-            let [xx, xy, yx, yy] = products.of(r, s);
+            let [xx, xy, yx, yy] = products.pair(r, s);
             let (i, j) = (2 * a, 2 * b);
             let (c00, c01) = (entry(i, j), entry(i, j + 1));
             let (c10, c11) = (entry(i + 1, j), entry(i + 1, j + 1));
@@ -182,14 +184,14 @@ pub(crate) fn turn(
     result
 }
 
-/// Subtracts from CᵀC what the linear unknowns can follow.
+/// Subtracts from CᵀC the part that the linear unknowns explain.
 fn project(sum: &mut Lane, projection: &Projection) {
     let (columns, size) = (projection.triangle.size, sum.descent.len());
     projection.triangle.solve_transposed(&mut sum.cross);
     if columns > 0 && size > 0 {
-        let mut followed = vec![0.0; size * size];
-        gram(&sum.cross, columns, &mut followed);
-        sum.gram.iter_mut().zip(&followed).for_each(|(to, part)| *to -= part);
+        let mut explained = vec![0.0; size * size];
+        gram(&sum.cross, columns, &mut explained);
+        sum.gram.iter_mut().zip(&explained).for_each(|(to, part)| *to -= part);
     }
 }
 
@@ -213,31 +215,31 @@ impl Lane {
         shapes: &[f64],
     ) {
         let rows = 2 * block.len();
-        let (places, local) = block_pairs(pairs, block);
+        let (indices, local) = block_pairs(pairs, block);
         self.derivatives.resize(2 * local.len() * rows, 0.0);
         model.fill_derivatives(lines, block, &arrays.weight, &local, &mut self.derivatives);
-        self.add_products(&places, arrays, rows);
+        self.add_products(&indices, arrays, rows);
         let outputs = lines.outputs.len();
         self.turned.clear();
         self.turned.resize(rows * 2 * model.modes(), 0.0);
         add_product(&mut self.turned, &arrays.residual, shapes, rows, outputs, 1.0);
-        for ((place, (mode, _)), pair) in
-            places.iter().zip(&local).zip(self.derivatives.chunks_exact(2 * rows))
+        for ((index, (mode, _)), pair) in
+            indices.iter().zip(&local).zip(self.derivatives.chunks_exact(2 * rows))
         {
             let (u, v) = pair.split_at(rows);
             let turned = &self.turned[2 * mode * rows..(2 * mode + 2) * rows];
             let (x, y) = turned.split_at(rows);
-            self.descent[2 * place] += dot(u, x) + dot(v, y);
-            self.descent[2 * place + 1] += dot(v, x) - dot(u, y);
+            self.descent[2 * index] += dot(u, x) + dot(v, y);
+            self.descent[2 * index + 1] += dot(v, x) - dot(u, y);
         }
     }
 
-    /// Adds CᵀC and AᵀC of a block at the places of its parameters and columns.
-    fn add_products(&mut self, places: &[usize], arrays: &BlockArrays, rows: usize) {
-        let (count, size) = (2 * places.len(), self.descent.len());
+    /// Adds CᵀC and AᵀC of a block at the indices of its parameters and columns.
+    fn add_products(&mut self, indices: &[usize], arrays: &BlockArrays, rows: usize) {
+        let (count, size) = (2 * indices.len(), self.descent.len());
         self.local_gram.resize(count * count, 0.0);
         gram(&self.derivatives, rows, &mut self.local_gram);
-        let at = |local: usize| 2 * places[local / 2] + local % 2;
+        let at = |local: usize| 2 * indices[local / 2] + local % 2;
         for column in 0..count {
             let to = &mut self.gram[at(column) * size..(at(column) + 1) * size];
             for row in column..count {
@@ -344,13 +346,13 @@ mod tests {
         let mut outputs = DMatrix::<f64>::zeros(rows, 3);
         let mut top = 0;
         for arrays in &fit.projection.blocks {
-            let own = 2 * arrays.weight.len();
+            let unknowns = 2 * arrays.weight.len();
             for (local, place) in arrays.columns.iter().enumerate() {
-                let from = &arrays.design[local * own..(local + 1) * own];
-                whole.view_mut((top, *place), (own, 1)).copy_from_slice(from);
+                let from = &arrays.design[local * unknowns..(local + 1) * unknowns];
+                whole.view_mut((top, *place), (unknowns, 1)).copy_from_slice(from);
             }
-            outputs.view_mut((top, 0), (own, 3)).copy_from_slice(&arrays.outputs);
-            top += own;
+            outputs.view_mut((top, 0), (unknowns, 3)).copy_from_slice(&arrays.outputs);
+            top += unknowns;
         }
         let solution = (whole.transpose() * &whole).lu().solve(&(whole.transpose() * &outputs));
         let rest = &outputs - whole * solution.unwrap();

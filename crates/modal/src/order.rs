@@ -1,4 +1,4 @@
-//! Number of modes: candidates in the residual, and what a mode is worth in the likelihood.
+//! Number of modes: candidates in the residual, and the gain in likelihood of each mode.
 
 use nalgebra::Complex;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ const GRID_STEP: f64 = 0.5;
 /// Share of the required gain that the scan must show before a candidate is tried.
 const TRIAL_GAIN: f64 = 0.5;
 
-/// A mode that the residual may hold.
+/// Candidate of a further mode in the residual.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) pole: C,
@@ -33,7 +33,8 @@ pub(crate) fn required_gain(lines: &Lines) -> f64 {
     parameters as f64 * ((2 * lines.len()) as f64).ln()
 }
 
-/// Returns the increase of the cost if a mode were taken out and nothing else changed.
+/// Returns the increase of the cost if one mode is removed and all other poles and participations
+/// stay as they are.
 pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     let (triangle, modes) = (&fit.projection.triangle, fit.model.modes());
     let columns = triangle.size;
@@ -48,11 +49,11 @@ pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
         let (i, j) = (2 * mode, 2 * mode + 1);
         let (a, b, c) = (product(i, i), product(i, j), product(j, j));
         let determinant = a * c - b * b;
-        let of_output = |unknowns: &[f64]| {
+        let output_loss = |unknowns: &[f64]| {
             let (x, y) = (unknowns[i], unknowns[j]);
             (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
         };
-        fit.projection.unknowns.chunks_exact(columns).map(of_output).sum()
+        fit.projection.unknowns.chunks_exact(columns).map(output_loss).sum()
     };
     (0..modes).map(loss).collect()
 }
@@ -80,7 +81,7 @@ pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
     candidates
 }
 
-/// Returns the distance of the first two lines.
+/// Returns the distance between the first two lines.
 fn line_spacing(lines: &Lines) -> Option<f64> {
     let [first, second] = lines.omega.get(..2)? else { return None };
     Some((second - first).abs()).filter(|spacing| *spacing > 0.0)
@@ -104,8 +105,8 @@ impl Residual {
             weight.extend_from_slice(&arrays.weight);
             for (output, column) in arrays.residual.chunks_exact(2 * n).enumerate() {
                 for line in 0..n {
-                    let place = (block.rows.start + line) * outputs + output;
-                    values[place] = C::new(column[line], column[n + line]);
+                    let index = (block.rows.start + line) * outputs + output;
+                    values[index] = C::new(column[line], column[n + line]);
                 }
             }
         }
@@ -121,15 +122,15 @@ impl Residual {
         spacing: f64,
     ) -> Option<Candidate> {
         let pole = C::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
-        let reach = (SCAN_HALF_WIDTHS * damping * omega).max(MIN_SCAN_LINES as f64 * spacing);
+        let half_range = (SCAN_HALF_WIDTHS * damping * omega).max(MIN_SCAN_LINES as f64 * spacing);
         let (loads, outputs) = (lines.loads.len(), lines.outputs.len());
         let mut square = vec![C::default(); loads * loads];
         let mut cross = vec![C::default(); loads * outputs];
         let mut column = vec![C::default(); loads];
         for block in &lines.blocks {
-            let own = &lines.omega[block.rows.clone()];
-            let first = own.partition_point(|w| *w < omega - reach);
-            let last = own.partition_point(|w| *w <= omega + reach);
+            let omega_block = &lines.omega[block.rows.clone()];
+            let first = omega_block.partition_point(|w| *w < omega - half_range);
+            let last = omega_block.partition_point(|w| *w <= omega + half_range);
             for row in block.rows.start + first..block.rows.start + last.max(first) {
                 let gain = self.weight[row] / (C::new(0.0, lines.omega[row]) - pole);
                 for &load in &block.active {
@@ -137,12 +138,12 @@ impl Residual {
                 }
                 let residual = &self.values[row * outputs..(row + 1) * outputs];
                 for &a in &block.active {
-                    let left = column[a].conj();
+                    let conjugate = column[a].conj();
                     for &b in &block.active {
-                        square[a * loads + b] += left * column[b];
+                        square[a * loads + b] += conjugate * column[b];
                     }
                     let to = &mut cross[a * outputs..(a + 1) * outputs];
-                    to.iter_mut().zip(residual).for_each(|(to, r)| *to += left * r);
+                    to.iter_mut().zip(residual).for_each(|(to, r)| *to += conjugate * r);
                 }
             }
         }
@@ -203,8 +204,8 @@ fn rank_one(
     gain.is_finite().then_some((direction, gain))
 }
 
-/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns
-/// those that were tried, with their gains.
+/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns the
+/// candidates that were tried, with their gains.
 pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candidate>> {
     let mut tried: Vec<Candidate> = Vec::new();
     for candidate in scan(fit) {

@@ -3,7 +3,8 @@
 //!
 //! The responses of a table are fitted by a right matrix fraction H = B(z) A(z)⁻¹ with real
 //! coefficients in z = exp(−j(ω − ω₁)Δ), where Δ maps the band to half the unit circle. Only sums
-//! over the lines enter; those of the highest order contain those of every lower one.
+//! over the lines are needed, and the sums of the highest order contain the sums of every lower
+//! order.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,17 +15,18 @@ use thiserror::Error;
 use crate::decomposition;
 use crate::stabilisation::{Pole, PoleCluster, Stabilisation};
 
-/// Part of the half circle that the band is mapped to: the two ends do not meet with their mirror
-/// images.
+/// Share of the half circle to which the band is mapped: below 1, the edges of the band do not meet
+/// their mirror images.
 const CIRCLE: f64 = 0.995;
 
 /// Largest damping ratio of a pole that counts as a mode of the band.
 const MAX_DAMPING: f64 = 0.1;
 
-/// Smallest share of the orders in which a mode has a pole.
+/// Minimum share of the orders in which a mode must have a pole.
 const MIN_SHARE: f64 = 0.4;
 
-/// Largest number of rows of a companion matrix: its eigenvalues cost the third power.
+/// Maximum number of rows of a companion matrix: the time of its eigenvalues rises with the third
+/// power.
 const MAX_COMPANION: usize = 400;
 
 /// Error of the estimator of frequency responses.
@@ -117,8 +119,8 @@ impl ResponseTable {
     /// Weights every line of every output (lines × outputs) by the inverse of its standard
     /// deviation.
     ///
-    /// The variance of a response that was smoothed over the resonances must not be used: it takes
-    /// a narrow resonance for noise.
+    /// Do not use the scatter about a response that was smoothed over frequency: it mistakes a
+    /// narrow resonance for noise.
     ///
     /// # Errors
     /// [`PlscfError::Size`], [`PlscfError::Value`].
@@ -239,7 +241,8 @@ impl NormalEquations {
         for sums in &outputs {
             total += &sums.denominator;
         }
-        // Row by row of the whitened numerators: the part of each order that they explain.
+        // Row n of the whitened numerators gives the additional part that the numerator of order n
+        // explains.
         let mut explained = DMatrix::zeros(len * inputs, len * inputs);
         let mut reduced = Vec::with_capacity(len);
         for n in 0..len {
@@ -291,16 +294,16 @@ impl NormalEquations {
 
 /// Sums over the lines of one output.
 struct OutputSums {
-    /// L⁻¹ S with the Cholesky factor L of the sums of the numerator: leading rows and columns are
-    /// those of lower orders.
+    /// L⁻¹ S with the Cholesky factor L of the sums of the numerator; its leading rows and columns
+    /// belong to the lower orders.
     whitened: DMatrix<f64>,
     /// Sums of the denominator.
     denominator: DMatrix<f64>,
 }
 
 impl OutputSums {
-    /// All sums are of Toeplitz blocks: products of two powers of z depend on their difference
-    /// alone.
+    /// Sums the products of one output over the lines. The product of two powers of z depends only
+    /// on their difference: all matrices have Toeplitz blocks.
     fn new(table: &ResponseTable, powers: &[Vec<Complex<f64>>], output: usize) -> Option<Self> {
         let (len, q) = (powers[0].len(), table.inputs());
         let mut numerator = vec![0.0; len];

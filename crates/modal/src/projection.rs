@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::dense::{Triangle, add_product, triangularise};
 use crate::lines::{Block, Lines};
 
-/// Standard deviation of the noise, as far as the search needs it: a shape over the lines that all
+/// Approximate standard deviation of the noise for the search: a shape over the lines that all
 /// outputs share, times a level of each output. E|n_i(ω)|² is (shape(ω) level_i)².
 #[derive(Debug, Clone)]
 pub(crate) struct Weights {
@@ -14,8 +14,9 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Returns √2/shape of the lines of a block: it makes real and imaginary parts of variance 1.
-    pub(crate) fn of_block(&self, block: &Block) -> Vec<f64> {
+    /// Returns √2/shape on the lines of a block: the factor that gives real and imaginary parts
+    /// variance 1.
+    pub(crate) fn block_weights(&self, block: &Block) -> Vec<f64> {
         let whiten = |shape: &f64| std::f64::consts::SQRT_2 / shape;
         self.shape[block.rows.clone()].iter().map(whiten).collect()
     }
@@ -45,7 +46,7 @@ impl Design for crate::model::Model {
     }
 }
 
-/// Arrays of one block; they keep their memory from step to step.
+/// Arrays of one block; their memory is reused in every step.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BlockArrays {
     pub(crate) weight: Vec<f64>,
@@ -63,7 +64,7 @@ pub(crate) struct BlockArrays {
     local: Vec<f64>,
 }
 
-/// Linear unknowns of all outputs for given columns, and what remains of the outputs.
+/// Linear unknowns of all outputs for given columns, and the residuals of the outputs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Projection {
     pub(crate) blocks: Vec<BlockArrays>,
@@ -81,7 +82,7 @@ impl Projection {
         self.blocks.resize_with(lines.blocks.len(), BlockArrays::default);
         for (arrays, block) in self.blocks.iter_mut().zip(&lines.blocks) {
             let n = block.len();
-            arrays.weight = weights.of_block(block);
+            arrays.weight = weights.block_weights(block);
             arrays.outputs.resize(2 * n * lines.outputs.len(), 0.0);
             for (output, column) in arrays.outputs.chunks_exact_mut(2 * n).enumerate() {
                 let (real, imaginary) = column.split_at_mut(n);
@@ -96,7 +97,7 @@ impl Projection {
 
     /// Solves for the linear unknowns and returns the cost.
     ///
-    /// Each block is reduced to its triangular factor, the factors to one; no factor Q is formed.
+    /// Each block is reduced to its triangular factor, and these factors to one; Q is never formed.
     pub(crate) fn solve(&mut self, lines: &Lines, design: &impl Design) -> f64 {
         let (columns, outputs) = (design.columns(lines), lines.outputs.len());
         self.blocks.par_iter_mut().zip(&lines.blocks).for_each(|(arrays, block)| {
@@ -108,7 +109,7 @@ impl Projection {
             .blocks
             .par_iter_mut()
             .zip(&lines.blocks)
-            .map(|(arrays, block)| arrays.take_residual(unknowns, columns, 2 * block.len()))
+            .map(|(arrays, block)| arrays.update_residual(unknowns, columns, 2 * block.len()))
             .collect();
         self.cost = costs.iter().sum();
         self.cost
@@ -126,13 +127,13 @@ impl Projection {
         self.stacked.resize(rows * width, 0.0);
         let mut top = 0;
         for arrays in &self.blocks {
-            let (own, count) = (2 * arrays.weight.len(), height(arrays));
-            let places = arrays.columns.iter().copied().chain(columns..width);
-            for (local, place) in places.enumerate() {
+            let (block_rows, count) = (2 * arrays.weight.len(), height(arrays));
+            let indices = arrays.columns.iter().copied().chain(columns..width);
+            for (local, index) in indices.enumerate() {
                 let upper =
                     if local < arrays.columns.len() { (local + 1).min(count) } else { count };
-                let from = &arrays.stacked[local * own..local * own + upper];
-                self.stacked[place * rows + top..place * rows + top + upper].copy_from_slice(from);
+                let from = &arrays.stacked[local * block_rows..local * block_rows + upper];
+                self.stacked[index * rows + top..index * rows + top + upper].copy_from_slice(from);
             }
             top += count;
         }
@@ -149,8 +150,8 @@ impl Projection {
     /// Returns the unknowns of one output in units of the output.
     pub(crate) fn unknowns_of(&self, output: usize, weights: &Weights) -> Vec<f64> {
         let columns = self.triangle.size;
-        let own = &self.unknowns[output * columns..(output + 1) * columns];
-        own.iter().map(|value| value * weights.level[output]).collect()
+        let unknowns = &self.unknowns[output * columns..(output + 1) * columns];
+        unknowns.iter().map(|value| value * weights.level[output]).collect()
     }
 }
 
@@ -166,10 +167,10 @@ impl BlockArrays {
         triangularise(&mut self.stacked, rows, self.columns.len());
     }
 
-    fn take_residual(&mut self, unknowns: &[f64], columns: usize, rows: usize) -> f64 {
+    fn update_residual(&mut self, unknowns: &[f64], columns: usize, rows: usize) -> f64 {
         self.local.clear();
-        for own in unknowns.chunks_exact(columns.max(1)) {
-            self.local.extend(self.columns.iter().map(|column| own[*column]));
+        for output_unknowns in unknowns.chunks_exact(columns.max(1)) {
+            self.local.extend(self.columns.iter().map(|column| output_unknowns[*column]));
         }
         self.residual.clone_from(&self.outputs);
         let inner = self.columns.len();

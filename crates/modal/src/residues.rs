@@ -1,14 +1,14 @@
-//! First participations: free residues at given poles, each reduced to its leading direction.
+//! Initial participations: free residues at given poles, each reduced to its leading direction.
 
 use nalgebra::Complex;
 
 use crate::lines::{Block, Lines};
-use crate::model::{Model, ResidualPowers, growth, kernels, level_near, of_kind, write_pair};
+use crate::model::{Model, ResidualPowers, growth, kernels, level_near, select_kernel, write_pair};
 use crate::projection::{Design, Projection, Weights};
 
-/// Columns of a residue for every mode and load, beside the residual powers.
+/// Linear model with a free residue for every mode and load, and the residual powers.
 struct FreeResidues<'a> {
-    /// Poles and residual powers; its participations are not used.
+    /// Poles and residual powers; the participations are not used.
     model: &'a Model,
 }
 
@@ -26,33 +26,33 @@ impl Design for FreeResidues<'_> {
 
     fn block_columns(&self, lines: &Lines, block: &Block) -> Vec<usize> {
         let modes = self.model.modes();
-        let moved = 2 * modes * (lines.loads.len() - 1);
+        let shift = 2 * modes * (lines.loads.len() - 1);
         let pairs = (0..modes).flat_map(|mode| block.active.iter().map(move |load| (mode, *load)));
-        let own = pairs.flat_map(|(mode, load)| {
+        let modal = pairs.flat_map(|(mode, load)| {
             let first = self.pair(lines, mode, load);
             [first, first + 1]
         });
         let residuals = self.model.block_columns(lines, block).into_iter().skip(2 * modes);
-        own.chain(residuals.map(|column| column + moved)).collect()
+        modal.chain(residuals.map(|column| column + shift)).collect()
     }
 
     fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]) {
         let (n, active) = (block.len(), &block.active);
-        let (own, rest) = columns.split_at_mut(4 * n * self.model.modes() * active.len());
-        let pairs = own.chunks_exact_mut(4 * n * active.len().max(1));
+        let (modal, residual) = columns.split_at_mut(4 * n * self.model.modes() * active.len());
+        let pairs = modal.chunks_exact_mut(4 * n * active.len().max(1));
         for (pole, pairs) in self.model.poles.iter().zip(pairs) {
             let growth = growth(*pole, block);
             for (line, weight) in weight.iter().enumerate() {
                 let (force, transient) = kernels(*pole, lines, block, line, growth);
                 for (pair, &load) in pairs.chunks_exact_mut(4 * n).zip(active) {
                     let amplitude = lines.load(load, block.rows.start + line);
-                    let kernel = of_kind(lines.loads[load], force, transient);
+                    let kernel = select_kernel(lines.loads[load], force, transient);
                     let (a, b) = (amplitude * kernel.value, amplitude * kernel.mirror);
                     write_pair(pair, line, n, *weight, a, b);
                 }
             }
         }
-        self.model.fill_residuals(lines, block, weight, rest);
+        self.model.fill_residuals(lines, block, weight, residual);
     }
 }
 
@@ -86,8 +86,8 @@ pub(crate) fn with_participations(
                 .chunks_exact(columns)
                 .map(|unknowns| {
                     let residue = |load: usize| {
-                        let own = &unknowns[first + 2 * load..first + 2 * load + 2];
-                        Complex::new(own[0], own[1]) * levels[mode][load]
+                        let pair = &unknowns[first + 2 * load..first + 2 * load + 2];
+                        Complex::new(pair[0], pair[1]) * levels[mode][load]
                     };
                     (0..loads).map(residue).collect()
                 })
@@ -101,9 +101,11 @@ pub(crate) fn with_participations(
     model
 }
 
-/// Returns the leading right direction of a matrix given by its rows, by power iteration of RᴴR.
+/// Returns the leading right singular direction of a matrix given by its rows, by power iteration
+/// of RᴴR.
 pub(crate) fn leading_row(rows: &[Vec<Complex<f64>>]) -> Vec<Complex<f64>> {
-    /// Steps of the iteration; a start that is nearly double is as good as either.
+    /// Number of steps of the iteration; if two singular values are nearly equal, either direction
+    /// serves as an initial estimate.
     const STEPS: usize = 30;
     let norm = |row: &Vec<Complex<f64>>| row.iter().map(|z| z.norm_sqr()).sum::<f64>();
     let Some(strongest) = rows.iter().max_by(|a, b| norm(a).total_cmp(&norm(b))) else {

@@ -1,4 +1,4 @@
-//! From a fit and its covariance to the numbers of a mode.
+//! Results of a mode from a fit and its covariance.
 
 use nalgebra::Complex;
 
@@ -16,11 +16,11 @@ fn powers(lines: &Lines, model: &Model, noise: &Noise, mode: usize) -> (f64, f64
     for block in &lines.blocks {
         for row in block.rows.clone() {
             let gain = modal_gain(model.poles[mode], lines.omega[row]).norm_sqr();
-            let of_load = |load: &usize| match lines.loads[*load] {
+            let load_force = |load: &usize| match lines.loads[*load] {
                 Load::Force(_) => model.participation[mode][*load] * lines.load(*load, row),
                 Load::Transient(_) => Complex::default(),
             };
-            let force: Complex<f64> = block.active.iter().map(of_load).sum();
+            let force: Complex<f64> = block.active.iter().map(load_force).sum();
             measured += gain * force.norm_sqr();
             unmeasured += gain * noise.process[mode];
         }
@@ -43,7 +43,8 @@ pub(crate) fn unmeasured_ratio(
     Some((unmeasured / measured).sqrt())
 }
 
-/// Returns one mode of a fit with the numbers of `parameters`; `gain` is what it brings to −2 log L.
+/// Returns one mode of a fit with the values of `parameters`; `gain` is the decrease of −2 log L by
+/// the mode.
 pub(crate) fn identified_mode(
     fit: &Fit<'_>,
     noise: &Noise,

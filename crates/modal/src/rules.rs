@@ -1,4 +1,4 @@
-//! Rules for modes that the likelihood keeps although they are no resonances of the structure.
+//! Rules for modes that are significant in the likelihood but no resonances of the structure.
 
 use std::f64::consts::TAU;
 
@@ -15,20 +15,20 @@ use crate::noise::{Noise, shapes};
 use crate::results::unmeasured_ratio;
 use crate::search::Fit;
 
-/// Returns, for each mode, the reason to take it out, if there is one.
-pub(crate) fn doubtful_modes(
+/// Returns for each mode the reason to remove it, if any.
+pub(crate) fn drop_reasons(
     fit: &Fit<'_>,
     noise: &Noise,
     covariance: &Covariance,
 ) -> Vec<Option<DropReason>> {
     let model = &fit.model;
-    let of_mode = |mode: usize| {
-        if !fit.lines.holds(model.poles[mode]) {
+    let reason = |mode: usize| {
+        if !fit.lines.contains(model.poles[mode]) {
             return None;
         }
         let (_, damping, _) = natural_frequency_and_damping(
             model.poles[mode],
-            &covariance.of_pole(mode),
+            &covariance.pole_covariance(mode),
             covariance.degrees_of_freedom,
         );
         if damping.value < MIN_DAMPING_ERRORS * damping.standard_error {
@@ -41,14 +41,14 @@ pub(crate) fn doubtful_modes(
         }
         None
     };
-    let mut reasons: Vec<Option<DropReason>> = (0..model.modes()).map(of_mode).collect();
+    let mut reasons: Vec<Option<DropReason>> = (0..model.modes()).map(reason).collect();
     let losses = crate::order::removal_losses(fit);
     let shapes = shapes(&fit.projection, &fit.weights, model.modes());
     for a in 0..model.modes() {
         for b in a + 1..model.modes() {
             let width = TWIN_HALF_WIDTHS * (-model.poles[a].re).max(-model.poles[b].re);
             let near = (model.poles[a].im - model.poles[b].im).abs() < width;
-            let inside = [a, b].iter().all(|mode| fit.lines.holds(model.poles[*mode]));
+            let inside = [a, b].iter().all(|mode| fit.lines.contains(model.poles[*mode]));
             if near && inside && reasons[a].is_none() && reasons[b].is_none() {
                 let differ = differ(fit, covariance, [&shapes[a], &shapes[b]], [a, b]);
                 let (weak, strong) = if losses[a] < losses[b] { (a, b) } else { (b, a) };
@@ -85,7 +85,7 @@ fn differ(
         let value = |k: usize| shapes[k][output] / shapes[k][reference];
         let variance = |k: usize| {
             let levels = &fit.weights.level;
-            covariance.of_normalised_shape(modes[k], output, reference, shapes[k], levels)
+            covariance.normalised_entry_covariance(modes[k], output, reference, shapes[k], levels)
         };
         add(value(0) - value(1), variance(0) + variance(1));
     }

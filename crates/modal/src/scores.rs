@@ -1,5 +1,5 @@
-//! Scores of the search: projected derivatives block by block, and what an unmeasured force does to
-//! them.
+//! Scores of the search: projected derivatives of each block, and the effect of an unmeasured force
+//! on them.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -16,11 +16,11 @@ type C = Complex<f64>;
 
 /// Products of one block after projection.
 pub(crate) struct BlockProducts {
-    /// C̃ᵀRC̃, lower triangle, of the whole problem's parameters, with the relative variances R.
+    /// C̃ᵀRC̃ of all parameters with the relative variances R, lower triangle.
     pub(crate) gram: Vec<f64>,
-    /// Rows of modes of A⁺ times R and their transpose.
+    /// A⁺R(A⁺)ᵀ of the rows of A⁺ that belong to modes.
     pub(crate) inverse: Vec<f64>,
-    /// Rows of modes of A⁺ as columns of 2n rows.
+    /// Rows of A⁺ that belong to modes, as columns of 2n rows.
     influence: Vec<f64>,
     /// Projected derivatives, 2n rows.
     derivatives: Vec<f64>,
@@ -31,14 +31,14 @@ pub(crate) struct BlockProducts {
 pub(crate) struct ProcessEffect {
     /// Covariance of the two unknowns.
     pub(crate) own: DMatrix<f64>,
-    /// Covariance with the score, before it is turned by the phase of the shape, `2 × parameters`.
+    /// Covariance with the score, for a shape of phase zero, `2 × parameters`.
     pub(crate) cross: DMatrix<C>,
 }
 
-/// Returns the columns of a block out of columns of the whole problem.
-fn local_rows(all: &[f64], columns: usize, places: &[usize]) -> Vec<f64> {
-    let chunks = all.chunks_exact(columns.max(1));
-    chunks.flat_map(|column| places.iter().map(|place| column[*place])).collect()
+/// Returns the rows of a block from columns of the whole problem.
+fn local_rows(columns_of_all: &[f64], columns: usize, indices: &[usize]) -> Vec<f64> {
+    let chunks = columns_of_all.chunks_exact(columns.max(1));
+    chunks.flat_map(|column| indices.iter().map(|index| column[*index])).collect()
 }
 
 /// Returns columns with the real and the imaginary part of each line times a factor of the line.
@@ -47,8 +47,8 @@ fn scaled(columns: &[f64], factors: &[f64]) -> Vec<f64> {
 }
 
 impl BlockProducts {
-    /// Computes the products of a block; `deviation` is the root of the variance of the sensors'
-    /// noise on each line over that of the weights.
+    /// Computes the products of a block; `deviation` is the standard deviation of the sensor noise
+    /// on each line relative to the weights.
     #[allow(clippy::too_many_arguments, reason = "one call, all of it the same fit")]
     pub(crate) fn new(
         lines: &Lines,
@@ -62,28 +62,28 @@ impl BlockProducts {
     ) -> Self {
         let (rows, size) = (2 * block.len(), 2 * pairs.len());
         let columns = followed.len() / size.max(1);
-        let (places, local) = block_pairs(pairs, block);
-        let mut own = vec![0.0; rows * 2 * local.len()];
-        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut own);
+        let (indices, local) = block_pairs(pairs, block);
+        let mut block_derivatives = vec![0.0; rows * 2 * local.len()];
+        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut block_derivatives);
         let mut derivatives = vec![0.0; rows * size];
-        for (place, pair) in places.iter().zip(own.chunks_exact(2 * rows)) {
-            derivatives[2 * place * rows..(2 * place + 2) * rows].copy_from_slice(pair);
+        for (index, pair) in indices.iter().zip(block_derivatives.chunks_exact(2 * rows)) {
+            derivatives[2 * index * rows..(2 * index + 2) * rows].copy_from_slice(pair);
         }
         let inner = arrays.columns.len();
         let part = local_rows(followed, columns, &arrays.columns);
         add_product(&mut derivatives, &arrays.design, &part, rows, inner, -1.0);
         let mut product = vec![0.0; size * size];
         gram(&scaled(&derivatives, deviation), rows, &mut product);
-        let own_rows = local_rows(inverse_rows, columns, &arrays.columns);
+        let block_inverse = local_rows(inverse_rows, columns, &arrays.columns);
         let mut influence = vec![0.0; rows * 2 * model.modes()];
-        add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
+        add_product(&mut influence, &arrays.design, &block_inverse, rows, inner, 1.0);
         let relative = scaled(&influence, deviation);
         let inverse = transposed_product(&relative, &relative, rows);
         Self { gram: product, inverse, influence, derivatives }
     }
 }
 
-/// What the score of the search is made of.
+/// Data that define the score of the search.
 pub(crate) struct Scores<'a> {
     pub(crate) pairs: &'a [(usize, Option<usize>)],
     pub(crate) shapes: &'a [f64],
@@ -124,12 +124,12 @@ impl Scores<'_> {
             }
             let mut scores = vec![0.0; rows * size];
             for (pair, (p, q)) in along.iter().enumerate() {
-                let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
+                let derivatives = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
                 let (first, second) =
                     scores[2 * pair * rows..(2 * pair + 2) * rows].split_at_mut(rows);
                 for (k, &line) in active.iter().enumerate() {
-                    let u = C::new(own[line], -own[n + line]);
-                    let v = C::new(own[2 * n + line], -own[3 * n + line]);
+                    let u = C::new(derivatives[line], -derivatives[n + line]);
+                    let v = C::new(derivatives[2 * n + line], -derivatives[3 * n + line]);
                     let a = (u * p + v * q) * gain(line) * self.scale[2 * pair];
                     let b = (v * p - u * q) * gain(line) * self.scale[2 * pair + 1];
                     (first[2 * k], first[2 * k + 1]) = (a.re, a.im);
@@ -140,8 +140,8 @@ impl Scores<'_> {
             meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
             let influence = &products.influence[4 * mode * n..(4 * mode + 4) * n];
             let unknown = |row: usize, line: usize| {
-                let own = &influence[2 * row * n..(2 * row + 2) * n];
-                C::new(own[line], -own[n + line]) * gain(line)
+                let derivatives = &influence[2 * row * n..(2 * row + 2) * n];
+                C::new(derivatives[line], -derivatives[n + line]) * gain(line)
             };
             for (k, &line) in active.iter().enumerate() {
                 effect.add_line([unknown(0, line), unknown(1, line)], &scores, rows, k);
@@ -158,14 +158,18 @@ impl Scores<'_> {
             column(a).iter().zip(column(b)).map(|(a, b)| a * b).sum()
         };
         let (x, y) = (2 * mode, 2 * mode + 1);
-        let of = |row: usize| C::new(product(row, x), product(row, y));
-        let along = self.pairs.iter().map(|&(s, _)| (of(2 * s), of(2 * s + 1))).collect();
+        let shape_product = |row: usize| C::new(product(row, x), product(row, y));
+        let along = self
+            .pairs
+            .iter()
+            .map(|&(s, _)| (shape_product(2 * s), shape_product(2 * s + 1)))
+            .collect();
         (along, product(x, x) + product(y, y))
     }
 }
 
 impl ProcessEffect {
-    /// Adds one line: the response of the two unknowns and of the scores to a unit force.
+    /// Adds one line, given the response of the two unknowns and of the scores to a unit force.
     fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
         for (a, value) in unknowns.iter().enumerate() {
             for (b, other) in unknowns.iter().enumerate() {

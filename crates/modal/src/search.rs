@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::normal::NormalEquations;
 use crate::projection::{Projection, Weights};
 
-/// A model at its linear unknowns for given noise.
+/// Model with its linear unknowns for given weights.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit<'a> {
     pub(crate) lines: &'a Lines,
@@ -35,7 +35,7 @@ impl<'a> Fit<'a> {
         self.projection.cost
     }
 
-    /// Takes other weights or another model: whitens again and solves for the linear unknowns.
+    /// Whitens again and solves for the linear unknowns, after a change of weights or model.
     pub(crate) fn refresh(&mut self) {
         self.model.fix_gauge(self.lines);
         self.projection.whiten(self.lines, &self.weights);
@@ -47,7 +47,7 @@ impl<'a> Fit<'a> {
         self.search_until(MAX_STEPS, COST_TOLERANCE);
     }
 
-    /// Takes a few steps, to where noise and number of modes can be judged.
+    /// Takes a few steps: accurate enough to estimate the noise and the number of modes.
     pub(crate) fn search_roughly(&mut self) {
         self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE);
     }
@@ -111,7 +111,7 @@ fn damped_step(normal: &NormalEquations, damping: f64) -> Option<Vec<f64>> {
     Some(solution.iter().zip(&scale).map(|(value, scale)| value * scale).collect())
 }
 
-/// Returns the model after a step, whose poles are bounded in how far they move.
+/// Returns the model after a step; the steps of the poles are bounded.
 fn moved(model: &Model, lines: &Lines, step: &[f64]) -> Model {
     let mut model = model.clone();
     let loads = lines.loads.len();

@@ -1,5 +1,4 @@
-//! Poles of models of rising order: which of them stay where they are, and the clusters that they
-//! form.
+//! Poles of models of rising order: which of them are stable, and the clusters that they form.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -12,21 +11,21 @@ pub const STABLE_FREQUENCY: f64 = 0.01;
 /// Largest relative change of the damping ratio from one order to the next of a stable pole.
 pub const STABLE_DAMPING: f64 = 0.05;
 
-/// Largest loss of the MAC of participations or shapes from one order to the next of a stable pole.
+/// Largest decrease below 1 of the MAC of participations or shapes from one order to the next of a
+/// stable pole.
 pub const STABLE_VECTOR: f64 = 0.02;
 
-/// Smallest relative distance of two poles that are not members of one cluster for frequency alone,
-/// on top of the twofold half-power width: rounding and noise of very lightly damped poles.
+/// Minimum radius of a cluster, in relative frequency: allows for rounding and noise of very
+/// lightly damped poles, whose half-power width is smaller.
 const CLUSTER_FREQUENCY: f64 = 4e-4;
 
-/// Largest relative distance in frequency of two members of a cluster, however strongly they are
-/// damped.
+/// Maximum radius of a cluster, in relative frequency, even for strong damping.
 const CLUSTER_REACH: f64 = 0.005;
 
-/// Largest relative distance in damping of two members of a cluster.
+/// Maximum relative distance in damping of a member from the centre of a cluster.
 const CLUSTER_DAMPING: f64 = 0.3;
 
-/// Distance in units of the decay rate within which a cluster claims every further pole.
+/// Distance from the median of a cluster, in decay rates, within which further poles belong to it.
 const CLUSTER_CLAIM: f64 = 0.3;
 
 /// Pole of a model of one order.
@@ -58,11 +57,11 @@ pub struct StabilisationPole {
     pub order: usize,
     /// The pole.
     pub pole: Pole,
-    /// Whether a pole of the order before is within [`STABLE_FREQUENCY`].
+    /// `true` if a pole of the order before is within [`STABLE_FREQUENCY`].
     pub stable_frequency: bool,
-    /// Whether that pole also agrees within [`STABLE_DAMPING`].
+    /// `true` if that pole also agrees within [`STABLE_DAMPING`].
     pub stable_damping: bool,
-    /// Whether its participation or shape agrees within [`STABLE_VECTOR`].
+    /// `true` if its participation or shape agrees within [`STABLE_VECTOR`].
     pub stable_vector: bool,
 }
 
@@ -73,7 +72,7 @@ impl StabilisationPole {
     }
 }
 
-/// Poles that lie close together over the orders.
+/// Cluster of poles of several orders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoleCluster {
     /// Medians of real and imaginary part, in rad/s, and the common direction of the vectors.
@@ -82,7 +81,7 @@ pub struct PoleCluster {
     pub share: f64,
 }
 
-/// Poles of all orders, rising, with what is stable from one order to the next.
+/// Poles of all orders, rising, each marked as stable or not relative to the order before.
 ///
 /// # Source
 /// Peeters & Van der Auweraer (2005), Proceedings of the 1st International Operational Modal
@@ -100,7 +99,7 @@ impl Stabilisation {
         let mut poles = Vec::new();
         let mut before: Vec<Pole> = Vec::new();
         for (order, model) in models {
-            poles.extend(model.iter().map(|pole| compared(order, pole, &before)));
+            poles.extend(model.iter().map(|pole| with_stability(order, pole, &before)));
             before = model;
         }
         Self { orders, poles }
@@ -145,7 +144,7 @@ impl Stabilisation {
     }
 }
 
-fn compared(order: usize, pole: &Pole, before: &[Pole]) -> StabilisationPole {
+fn with_stability(order: usize, pole: &Pole, before: &[Pole]) -> StabilisationPole {
     let distance = |other: &Pole| (other.pole - pole.pole).norm();
     let nearest = before.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let within = |a: f64, b: f64, tolerance: f64| (a - b).abs() <= tolerance * a.abs();
@@ -168,15 +167,15 @@ fn densest(sorted: &[&StabilisationPole]) -> Option<(Vec<usize>, usize)> {
     let mut best: Option<(Vec<usize>, usize)> = None;
     for centre in 0..sorted.len() {
         let damping = sorted[centre].pole.damping_ratio();
-        let reach = CLUSTER_REACH.min((2.0 * damping).max(CLUSTER_FREQUENCY)) * frequency(centre);
-        let near = |i: &usize| (frequency(*i) - frequency(centre)).abs() < reach;
-        let alike = |i: &usize| {
+        let radius = CLUSTER_REACH.min((2.0 * damping).max(CLUSTER_FREQUENCY)) * frequency(centre);
+        let near = |i: &usize| (frequency(*i) - frequency(centre)).abs() < radius;
+        let is_damped_alike = |i: &usize| {
             let gap = (sorted[*i].pole.damping_ratio() - damping).abs();
             gap < CLUSTER_DAMPING * damping + CLUSTER_FREQUENCY / 4.0
         };
         let below = (0..centre).rev().take_while(near);
         let above = (centre..sorted.len()).take_while(near);
-        let members: Vec<usize> = below.chain(above).filter(alike).collect();
+        let members: Vec<usize> = below.chain(above).filter(is_damped_alike).collect();
         let mut orders: Vec<usize> = members.iter().map(|i| sorted[*i].order).collect();
         orders.sort_unstable();
         orders.dedup();
@@ -187,7 +186,7 @@ fn densest(sorted: &[&StabilisationPole]) -> Option<(Vec<usize>, usize)> {
     best
 }
 
-/// Medians of the poles and the first principal direction of their vectors.
+/// Returns the median pole and the first principal direction of the vectors.
 fn common_pole(members: &[&StabilisationPole]) -> Pole {
     let median = |part: fn(&Complex<f64>) -> f64| {
         let mut values: Vec<f64> = members.iter().map(|m| part(&m.pole.pole)).collect();

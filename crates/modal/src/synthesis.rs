@@ -1,4 +1,4 @@
-//! Transients of records that the modes are to predict.
+//! Transients of the records that the modes predict.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -24,7 +24,7 @@ pub(crate) fn add_transients(
     }
 }
 
-/// Columns of one record: modes' transient responses to 1 and j per line, before the shapes.
+/// Fits and adds the transient of one record.
 fn add_transient(
     lines: &Lines,
     modes: &[&IdentifiedMode],
@@ -49,8 +49,8 @@ fn add_transient(
     let mut normal = Accumulator::new(2 * modes.len());
     let mut triangles = Vec::with_capacity(outputs);
     for output in 0..outputs {
-        let rest = |row: usize| lines.outputs[output][row] - predicted[(row, output)];
-        let (columns, height) = record.reduced(lines, output, rest);
+        let remainder = |row: usize| lines.outputs[output][row] - predicted[(row, output)];
+        let (columns, height) = record.reduced(lines, output, remainder);
         normal.add(&columns, height, powers.len());
         triangles.push(Triangle::new(&columns, height, powers.len() + 2 * modes.len() + 1));
     }
@@ -85,13 +85,13 @@ impl Record<'_> {
         C::i().powi(power) * (omega / self.reference).powi(power)
     }
 
-    /// Returns the triangular factor of an output's columns, residual terms first so that they can
-    /// be projected out of the loads that all outputs share, and the number of rows.
+    /// Returns the triangular factor of an output's columns and its number of rows. The residual
+    /// terms come first, so that they can be projected out of the loads that all outputs share.
     fn reduced(
         &self,
         lines: &Lines,
         output: usize,
-        rest: impl Fn(usize) -> C,
+        remainder: impl Fn(usize) -> C,
     ) -> (Vec<f64>, usize) {
         let (first, height) = (self.powers.len(), 2 * self.rows.len());
         let count = first + 2 * self.modes.len() + 1;
@@ -101,8 +101,8 @@ impl Record<'_> {
                 columns[column * height + 2 * k] = value.re;
                 columns[column * height + 2 * k + 1] = value.im;
             };
-            for (place, power) in self.powers.iter().enumerate() {
-                put(place, self.residual(lines.omega[*row], *power));
+            for (index, power) in self.powers.iter().enumerate() {
+                put(index, self.residual(lines.omega[*row], *power));
             }
             for (mode, (value, mirror)) in kernels.iter().enumerate() {
                 let shape = self.modes[mode].shape[output];
@@ -110,7 +110,7 @@ impl Record<'_> {
                 put(first + 2 * mode, a + b);
                 put(first + 2 * mode + 1, C::i() * (a - b));
             }
-            put(count - 1, rest(*row));
+            put(count - 1, remainder(*row));
         }
         triangularise(&mut columns, height, count);
         (columns, height)
@@ -134,7 +134,7 @@ fn residual_terms(triangle: &Triangle, powers: usize, loads: &[f64]) -> Vec<f64>
     terms
 }
 
-/// Rows of a least-squares problem, reduced as they come.
+/// Rows of a least-squares problem that all outputs share.
 struct Accumulator {
     width: usize,
     rows: Vec<Vec<f64>>,

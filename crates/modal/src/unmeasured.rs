@@ -1,4 +1,5 @@
-//! What the residuals of one line say of the unmeasured forces of the modes near it.
+//! Score and information that the residuals of one line give on the unmeasured forces of the modes
+//! near it.
 
 use nalgebra::Complex;
 
@@ -14,7 +15,8 @@ type C = Complex<f64>;
 pub(crate) struct ForceSums {
     /// Derivative of the log-likelihood with respect to ln S_r: Σ S_r (|b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r).
     pub(crate) score: f64,
-    /// Information on ln S_r, with that it shares with the other forces: Σ_s Σ S_r S_s |b_rᴴV⁻¹b_s|².
+    /// Information on ln S_r, including the part shared with other forces: Σ_s Σ S_r S_s
+    /// |b_rᴴV⁻¹b_s|².
     pub(crate) information: f64,
 }
 
@@ -26,7 +28,7 @@ impl ForceSums {
     }
 }
 
-/// What the posterior of a line is computed from.
+/// Data that define the posterior of a line.
 #[derive(Clone, Copy)]
 pub(crate) struct ForceModel<'a> {
     pub(crate) noise: &'a Noise,
@@ -39,8 +41,8 @@ pub(crate) struct ForceModel<'a> {
     pub(crate) directions: &'a [f64],
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line; it
-/// keeps its memory from line to line.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line; its
+/// memory is reused from line to line.
 #[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,
@@ -48,7 +50,7 @@ pub(crate) struct Posterior {
     process: Vec<f64>,
     /// `[a · size + b]`.
     information: Vec<C>,
-    seen: Vec<C>,
+    projected_error: Vec<C>,
     row: Vec<C>,
     parts: Vec<C>,
 }
@@ -76,8 +78,8 @@ impl Posterior {
         let size = self.active.len();
         self.information.clear();
         self.information.resize(size * size, C::default());
-        self.seen.clear();
-        self.seen.resize(size, C::default());
+        self.projected_error.clear();
+        self.projected_error.resize(size, C::default());
         if size > 0 {
             self.add_sensors(noise, forces.shapes, forces.residuals, line);
             self.add_forces();
@@ -98,7 +100,7 @@ impl Posterior {
             let (precision, error): (f64, C) = (1.0 / sensor[line], error[line]);
             for (a, mode) in self.active.iter().enumerate() {
                 let from = shapes[*mode][output].conj() * precision;
-                self.seen[a] += from * error;
+                self.projected_error[a] += from * error;
                 for (b, other) in self.active[..=a].iter().enumerate() {
                     self.information[a * size + b] += from * shapes[*other][output];
                 }
@@ -106,7 +108,7 @@ impl Posterior {
         }
         for a in 0..size {
             let gain = self.gains[a].conj();
-            self.seen[a] *= gain;
+            self.projected_error[a] *= gain;
             for b in 0..=a {
                 let value = self.information[a * size + b] * gain * self.gains[b];
                 self.information[a * size + b] = value;
@@ -115,7 +117,7 @@ impl Posterior {
         }
     }
 
-    /// Goes from V = D to V = D + Σ S_r b_r b_rᴴ, one force after the other (Sherman & Morrison).
+    /// Updates V = D to V = D + Σ S_r b_r b_rᴴ, one force after the other (Sherman & Morrison).
     fn add_forces(&mut self) {
         let size = self.active.len();
         let mut row = std::mem::take(&mut self.row);
@@ -123,10 +125,10 @@ impl Posterior {
         for (r, process) in self.process.iter().enumerate().filter(|(_, process)| **process > 0.0) {
             row.copy_from_slice(&self.information[r * size..(r + 1) * size]);
             let factor = process / (1.0 + process * row[r].re);
-            let seen = self.seen[r];
+            let projected = self.projected_error[r];
             for a in 0..size {
                 let along = row[a].conj() * factor;
-                self.seen[a] -= along * seen;
+                self.projected_error[a] -= along * projected;
                 let to = &mut self.information[a * size..(a + 1) * size];
                 to.iter_mut().zip(&row).for_each(|(to, value)| *to -= along * value);
             }
@@ -134,27 +136,28 @@ impl Posterior {
         self.row = row;
     }
 
-    /// Adds what this line says of each force.
+    /// Adds score and information of this line for each force.
     pub(crate) fn add_powers(&self, sums: &mut [ForceSums]) {
         let size = self.active.len();
         for (a, mode) in self.active.iter().enumerate() {
             let row = &self.information[a * size..(a + 1) * size];
             let (process, sum) = (self.process[a], &mut sums[*mode]);
-            sum.score += process * (self.seen[a].norm_sqr() - row[a].re);
+            sum.score += process * (self.projected_error[a].norm_sqr() - row[a].re);
             let shared = row.iter().zip(&self.process).map(|(i, other)| other * i.norm_sqr());
             sum.information += process * shared.sum::<f64>();
         }
     }
 
-    /// Returns the expected power of what remains of an error when the unmeasured forces are taken
-    /// off.
+    /// Returns the expected power of an error after subtraction of the response to unmeasured
+    /// forces.
     pub(crate) fn remaining_power(&mut self, shapes: &[Vec<C>], output: usize, error: C) -> f64 {
         let size = self.active.len();
         let parts = &mut self.parts;
         parts.clear();
         let forces = self.active.iter().zip(&self.gains).zip(&self.process);
         parts.extend(forces.map(|((mode, gain), process)| shapes[*mode][output] * gain * *process));
-        let explained: C = parts.iter().zip(&self.seen).map(|(part, seen)| part * seen).sum();
+        let explained: C =
+            parts.iter().zip(&self.projected_error).map(|(part, projected)| part * projected).sum();
         let mut variance = 0.0;
         for (a, part) in parts.iter().enumerate() {
             if self.process[a] > 0.0 {

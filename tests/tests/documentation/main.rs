@@ -40,6 +40,7 @@ const CLEAN: [&str; 15] = [
     "crates/integrate",
     "crates/io",
     "crates/mechid",
+    "crates/modal",
     "crates/model",
     "crates/numerics",
     "crates/plot",

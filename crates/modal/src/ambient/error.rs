@@ -18,7 +18,7 @@ pub enum AmbientError {
         channel: usize,
         /// Number of samples.
         samples: usize,
-        /// Their value, in the unit of the channel.
+        /// Value of the samples, in the unit of the channel.
         value: f64,
     },
     /// A channel has next to no signal in the band.
@@ -32,7 +32,7 @@ pub enum AmbientError {
         channel: usize,
         /// RMS value in the band, in the unit of the channel.
         rms: f64,
-        /// RMS value over that of the strongest channel.
+        /// Ratio of the RMS value to the RMS value of the strongest channel.
         ratio: f64,
     },
     /// A channel is a multiple of another.

@@ -13,10 +13,10 @@ use super::limits::{HARMONIC_LEVEL, TAPERS};
 /// Zero padding of the transform: frequencies are tested every quarter line.
 const PADDING: usize = 4;
 
-/// Steps of the refinement of a frequency, each a third of the one before.
+/// Number of steps of the refinement of a frequency; each step is the one before divided by 1.8.
 const REFINEMENTS: usize = 12;
 
-/// Sinusoid of constant amplitude, such as a machine leaves in an ambient record.
+/// Sinusoid of constant amplitude in an ambient record, usually from a machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
     /// Frequency, in Hz.
@@ -38,7 +38,7 @@ pub struct Harmonic {
 
 /// Returns the harmonics of the channels in a band, by rising frequency.
 ///
-/// A resonance is not a harmonic however sharp it looks: its amplitude and phase wander over the
+/// A resonance is not a harmonic, even if its peak is sharp: its amplitude and phase vary over the
 /// record, so that the tapers disagree.
 ///
 /// # Errors
@@ -93,7 +93,7 @@ pub fn harmonics(record: &Record, band_hz: [f64; 2]) -> Result<Vec<Harmonic>, Am
     Ok(harmonics)
 }
 
-/// Sums of the odd tapers; those of the even ones are zero.
+/// Returns the sums of the tapers; the sums of even tapers are zero.
 fn taper_sums(len: usize) -> Vec<f64> {
     let n1 = (len + 1) as f64;
     let taper =
@@ -109,12 +109,13 @@ fn padded_lines(samples: &[f64], padded: usize) -> Vec<Complex<f64>> {
     // One sample later, as the tapers count: t + 1.
     input[1..=samples.len()].copy_from_slice(samples);
     let mut output = plan.make_output_vec();
-    // The lengths are those of the plan.
+    // The lengths match the plan, so that this cannot fail.
     let _ = plan.process(&mut input, &mut output);
     output
 }
 
-/// Lines of the record under the tapers are differences of lines on either side.
+/// Returns Thomson's F statistic. The transform under a sine taper is the difference of two lines,
+/// one on either side.
 fn f_statistic(lines: &[Complex<f64>], index: usize, sums: &[f64]) -> f64 {
     let half = PADDING / 2;
     let tapered =
@@ -153,8 +154,8 @@ fn refined(samples: &[f64], mut frequency_hz: f64, dt: f64) -> f64 {
     frequency_hz
 }
 
-/// Returns the complex amplitude of a sinusoid of `angle` radians per sample, under a Hann window,
-/// which keeps neighbours out, or without a window.
+/// Returns the complex amplitude of a sinusoid of `angle` radians per sample, with or without a
+/// Hann window, which suppresses leakage from neighbouring sinusoids.
 fn fitted(samples: &[f64], angle: f64, windowed: bool) -> Complex<f64> {
     let len = samples.len() as f64;
     let (turn, slow) = (Complex::cis(-angle), Complex::cis(TAU / len));
@@ -169,7 +170,7 @@ fn fitted(samples: &[f64], angle: f64, windowed: bool) -> Complex<f64> {
     sum * 2.0 / len
 }
 
-/// Excess kurtosis of the signal within two lines of a frequency in cycles per sample.
+/// Returns the excess kurtosis of the signal within two lines of a frequency in cycles per sample.
 fn narrow_kurtosis(samples: &[f64], cycles: f64) -> f64 {
     let len = samples.len() as f64;
     let lines: Vec<Complex<f64>> = (-2..=2)
@@ -191,7 +192,8 @@ fn narrow_kurtosis(samples: &[f64], cycles: f64) -> f64 {
 /// squares.
 ///
 /// # Errors
-/// [`AmbientError::Numerics`] if two frequencies cannot be told apart, [`AmbientError::Signal`].
+/// [`AmbientError::Numerics`] if two frequencies are too close to be separated,
+/// [`AmbientError::Signal`].
 pub(super) fn subtracted(record: &Record, frequencies_hz: &[f64]) -> Result<Record, AmbientError> {
     if frequencies_hz.is_empty() {
         return Ok(record.clone());

@@ -1,4 +1,4 @@
-//! First values of the parameters from poles and shapes of the subspace models.
+//! Initial parameters from poles and shapes of the subspace models.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,16 +13,16 @@ use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
 
-/// Part of the sorted periodograms of a sensor that is taken for its noise.
+/// Quantile of the periodograms of a sensor that is the initial estimate of its noise.
 const NOISE_QUANTILE: f64 = 0.1;
 
-/// Corrections of the amplitudes of the modes, which overlap.
+/// Number of corrections of the amplitudes: repeated, because modes overlap.
 const AMPLITUDE_STEPS: usize = 3;
 
-/// Half width, in decay rates, of the lines that an amplitude is read from.
-const AMPLITUDE_REACH: f64 = 2.0;
+/// Half width, in decay rates, of the lines that determine an amplitude.
+const AMPLITUDE_HALF_WIDTH: f64 = 2.0;
 
-/// Quantities that outputs may be: the kernel, and the phase of ψ of a real mode.
+/// Possible quantities of the outputs: kernel, and phase of ψ for a real mode.
 const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Static, -FRAC_PI_2),
     (Kernel::Static, 0.0),
@@ -31,11 +31,11 @@ const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Vanishing, FRAC_PI_2),
 ];
 
-/// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration, filtered
-/// or not) that explains the lines best; `None` if none has a likelihood.
+/// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration,
+/// filtered or not) that explains the lines best; `None` if none has a likelihood.
 ///
-/// A few steps choose the phase of each kernel; only maxima decide between kernels, whose differences in the
-/// tails of the resonances bias frequency and damping where the wrong one is taken.
+/// A few steps suffice to choose the phase of each kernel. Kernels are compared at their maxima,
+/// because they differ in the tails of the resonances: a wrong kernel biases frequency and damping.
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
@@ -43,16 +43,17 @@ pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let maxima =
         [Kernel::Static, Kernel::Sampled, Kernel::Vanishing].into_iter().filter_map(|kernel| {
             let phases = QUANTITIES.iter().filter(|(other, _)| *other == kernel);
-            let starts = phases.filter_map(|&(kernel, phase)| {
-                let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
-                search(start, &pooled, band.span, Effort::SHORT)
+            let rough_fits = phases.filter_map(|&(kernel, phase)| {
+                let initial =
+                    initial_parameters(modes, band.outputs(), &pooled, band, kernel, phase);
+                search(initial, &pooled, band.span, Effort::SHORT)
             });
-            search_pooled(starts.min_by(lower)?.parameters, band, Effort::TEST)
+            search_pooled(rough_fits.min_by(lower)?.parameters, band, Effort::TEST)
         });
     maxima.min_by(lower)
 }
 
-fn start(
+fn initial_parameters(
     modes: &[Pole],
     outputs: usize,
     pooled: &[PooledLines],
@@ -84,7 +85,8 @@ fn start(
     parameters
 }
 
-/// Scales each shape so that the power along it near its resonance is that of the lines.
+/// Scales each shape so that the model's power along it near its resonance equals the power of the
+/// lines.
 pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],
@@ -95,7 +97,7 @@ pub(super) fn match_amplitudes(
     let factors: Vec<f64> = (0..parameters.layout.modes)
         .map(|r| {
             let pole = parameters.pole(r);
-            let reach = (AMPLITUDE_REACH * -pole.re).max(2.0 * spacing);
+            let reach = (AMPLITUDE_HALF_WIDTH * -pole.re).max(2.0 * spacing);
             let direction = parameters.shape(r);
             let mut powers = [0.0; 2];
             for line in pooled.iter().filter(|line| (line.omega - pole.im).abs() < reach) {
@@ -115,24 +117,24 @@ pub(super) fn match_amplitudes(
     }
 }
 
-/// Strongest sign of a further mode in the whitened lines.
+/// Candidate of a further mode in the whitened lines.
 pub(super) struct Candidate {
     pub pole: Pole,
-    /// Increase of 2 ln L that a mode there promises.
+    /// Expected increase of 2 ln L by a mode there.
     pub gain: f64,
 }
 
-/// Damping ratios at which further modes are looked for.
+/// Damping ratios of the grid that is scanned for further modes.
 const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 
-/// Half width of the lines that one place of the scan uses, in decay rates.
-const SCAN_REACH: f64 = 8.0;
+/// Half width, in decay rates, of the lines that one grid point of the scan uses.
+const SCAN_HALF_WIDTH: f64 = 8.0;
 
 /// Returns candidates of further modes by falling gain: at each pole of a grid the largest
 /// eigenvalue of Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
     let coefficients = Coefficients::new(parameters);
-    let p = band.outputs();
+    let outputs = band.outputs();
     let mut whitened = Vec::with_capacity(band.omega.len());
     for (k, omega) in band.omega.iter().enumerate() {
         let terms = band.noise_terms(*omega, parameters.layout.noise_terms);
@@ -149,15 +151,15 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
         let mut centre = *first;
         while centre < *last {
             let rate = (zeta * centre).max(0.5 * band.spacing());
-            let reach = SCAN_REACH * rate;
+            let reach = SCAN_HALF_WIDTH * rate;
             let from = band.omega.partition_point(|w| *w < centre - reach);
             let to = band.omega.partition_point(|w| *w <= centre + reach);
-            let mut sum = nalgebra::DMatrix::zeros(p, p);
+            let mut sum = nalgebra::DMatrix::zeros(outputs, outputs);
             let (mut total, mut squares) = (0.0, 0.0);
             for (omega, (line, _)) in band.omega[from..to].iter().zip(&whitened[from..to]) {
                 let weight = rate * rate / (rate * rate + (omega - centre).powi(2));
                 sum.gerc(weight.into(), line, line, Complex::from(1.0));
-                for i in 0..p {
+                for i in 0..outputs {
                     sum[(i, i)] -= Complex::from(weight);
                 }
                 total += weight;

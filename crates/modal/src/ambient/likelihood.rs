@@ -7,13 +7,13 @@ use super::lines::PooledLines;
 use super::parameters::{Kernel, Parameters, Span};
 use super::spectrum::{Coefficients, Direction, Kernels, directions};
 
-/// Pooled lines that one task works on: sums are added in the same order on any number of cores.
+/// Number of pooled lines per task: fixed, so that results do not depend on the number of cores.
 const TASK: usize = 64;
 
 /// Returns the factor of a Hermitian matrix if it is positive definite.
 ///
-/// nalgebra takes complex square roots of the pivots, so that those of an indefinite matrix come
-/// out imaginary.
+/// nalgebra takes complex square roots of the pivots: an indefinite matrix gives imaginary pivots
+/// instead of an error.
 pub(super) fn positive_factor(
     matrix: DMatrix<Complex<f64>>,
 ) -> Option<Cholesky<Complex<f64>, Dyn>> {
@@ -22,7 +22,7 @@ pub(super) fn positive_factor(
     factor.l_dirty().diagonal().iter().all(|z| sound(*z)).then_some(factor)
 }
 
-/// Returns the variances of the noise of each sensor where the polynomials are `terms`.
+/// Returns the noise variance of each sensor for values `terms` of the polynomials.
 pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
     (0..parameters.layout.outputs).map(|i| parameters.log_noise(i, terms).exp()).collect()
 }
@@ -50,7 +50,7 @@ pub(super) fn log_determinant(factor: &Cholesky<Complex<f64>, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().iter().map(|z| z.re.ln()).sum::<f64>()
 }
 
-/// Sums over the lines that the gradient is made of.
+/// Sums over the lines for the gradient.
 #[derive(Clone)]
 struct GradientSums {
     /// Σ k Γ + conj Σ k̃ Γ of each mode.
@@ -132,7 +132,7 @@ pub(super) fn gradient(
             let kernels = coefficients.kernels(line.omega, span);
             let variances = noise(parameters, &line.terms);
             let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
-            // Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹ for each of the lines.
+            // Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹ of one line.
             let gamma = &inverse - &inverse * &line.periodogram * &inverse;
             let gamma = gamma * Complex::from(line.count);
             sums.add_line(&coefficients, &kernels, &gamma, &variances, &line.terms);
@@ -156,8 +156,8 @@ fn chained(parameters: &Parameters, c: &Coefficients, sums: &GradientSums) -> DV
     let mut correlation_slopes = DMatrix::zeros(m, m);
     let weights: Vec<_> = (0..m).map(|r| &sums.shapes[r] * c.shapes.column(r)).collect();
     for s in 0..m {
-        let own = sums.shapes[s].tr_mul(&c.covariances.column(s));
-        shape_slopes.set_column(s, &own);
+        let shape_slope = sums.shapes[s].tr_mul(&c.covariances.column(s));
+        shape_slopes.set_column(s, &shape_slope);
     }
     for r in 0..m {
         for s in 0..m {
@@ -173,25 +173,18 @@ fn chained(parameters: &Parameters, c: &Coefficients, sums: &GradientSums) -> DV
             let near = square(c.poles[r] + c.poles[s]);
             let far = square(c.poles[r] + c.poles[s].conj());
             pole_slopes[r] += (along * near + across * far) * q;
-            let (mut own, mut conjugated) = (near, far);
+            let (mut direct, mut conjugated) = (near, far);
             if c.kernel == Kernel::Vanishing {
-                own -= square(c.poles[s]);
+                direct -= square(c.poles[s]);
                 conjugated -= square(c.poles[s].conj());
             }
-            pole_slopes[s] += (along * own + (across * conjugated).conj()) * q;
+            pole_slopes[s] += (along * direct + (across * conjugated).conj()) * q;
         }
     }
     if c.kernel == Kernel::Vanishing {
         let direct = &sums.direct * &c.direct;
         correlation_slopes += c.direct.tr_mul(&direct);
-        let direct = direct * &c.correlation * 2.0;
-        for s in 0..m {
-            let pole = c.poles[s];
-            for i in 0..p {
-                shape_slopes[(i, s)] += pole.inv() * direct[(i, s)];
-                pole_slopes[s] -= c.shapes[(i, s)] * direct[(i, s)] / (pole * pole);
-            }
-        }
+        add_direct(c, &(direct * &c.correlation * 2.0), &mut shape_slopes, &mut pole_slopes);
     }
     let mut gradient = DVector::zeros(layout.len());
     for r in 0..m {
@@ -212,7 +205,24 @@ fn chained(parameters: &Parameters, c: &Coefficients, sums: &GradientSums) -> DV
     gradient
 }
 
-/// Chain rule from Q = C Cᵀ with rows of unit length to the entries below the diagonal.
+/// Adds the derivatives of D Q Dᵀ, weighted by `direct` (outputs × modes), with respect to shapes
+/// and poles.
+fn add_direct(
+    c: &Coefficients,
+    direct: &DMatrix<f64>,
+    shape_slopes: &mut DMatrix<Complex<f64>>,
+    pole_slopes: &mut [Complex<f64>],
+) {
+    for (s, pole) in c.poles.iter().enumerate() {
+        for i in 0..direct.nrows() {
+            shape_slopes[(i, s)] += pole.inv() * direct[(i, s)];
+            pole_slopes[s] -= c.shapes[(i, s)] * direct[(i, s)] / (pole * pole);
+        }
+    }
+}
+
+/// Adds the gradient of the entries of C below the diagonal, by the chain rule from Q = C Cᵀ with
+/// rows of unit length.
 fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &mut DVector<f64>) {
     let (raw, factor) = (parameters.raw_factor(), parameters.factor());
     let by_factor = (slopes + slopes.transpose()) * &factor;
@@ -274,7 +284,7 @@ struct LineInformation<'a> {
 }
 
 impl LineInformation<'_> {
-    /// Adds to the upper triangle.
+    /// Adds the information of this line to the upper triangle.
     fn add(&self, directions: &[Direction], sum: &mut DMatrix<f64>) {
         let x = self.coefficients.shape_directions(self.kernels);
         let whitened = self.inverse * &x;
@@ -314,8 +324,8 @@ impl LineInformation<'_> {
         layout.shape(column / 2) + (column % 2) * layout.outputs + output
     }
 
-    /// tr (P S_a P S_b) of S_a = e_i xᴴ + x e_iᵀ and S_b = e_j yᴴ + y e_jᵀ is
-    /// 2 Re [(P x)_j (P y)_i + P_ji xᴴ P y].
+    /// Adds tr (P S_a P S_b) = 2 Re [(P x)_j (P y)_i + P_ji xᴴ P y] for S_a = e_i xᴴ + x e_iᵀ and
+    /// S_b = e_j yᴴ + y e_jᵀ.
     fn add_shapes(
         &self,
         x: &DMatrix<Complex<f64>>,
@@ -327,16 +337,15 @@ impl LineInformation<'_> {
         for b in 0..columns {
             for a in 0..=b {
                 for j in 0..p {
-                    let column = self.shape_index(b, j);
                     let first = self.shape_index(a, 0);
                     for i in 0..p {
-                        let (row, place) = (first + i, column);
-                        if row > place {
+                        let (row, column) = (first + i, self.shape_index(b, j));
+                        if row > column {
                             continue;
                         }
                         let product = whitened[(j, a)] * whitened[(i, b)]
                             + self.inverse[(j, i)] * gram[(a, b)];
-                        sum[(row, place)] += self.line.count * 2.0 * product.re;
+                        sum[(row, column)] += self.line.count * 2.0 * product.re;
                     }
                 }
             }
@@ -356,15 +365,15 @@ impl LineInformation<'_> {
         }
     }
 
-    /// Adds the information of parameter `index` with the noise, of which `value` is that with the
-    /// variance of each output; a pair of noise parameters is added once.
+    /// Adds the information between parameter `index` and the noise parameters; `value` returns the
+    /// information with the noise variance of an output. A pair of noise parameters is added once.
     fn add_noise(&self, index: usize, sum: &mut DMatrix<f64>, value: impl Fn(usize) -> f64) {
         for (j, variance) in self.variances.iter().enumerate() {
             let value = value(j) * variance;
             for (d, term) in self.line.terms.iter().enumerate() {
-                let other = self.parameters.layout.noise(d, j);
-                if other >= index {
-                    self.put(sum, index, other, value * term);
+                let noise_index = self.parameters.layout.noise(d, j);
+                if noise_index >= index {
+                    self.put(sum, index, noise_index, value * term);
                 }
             }
         }
@@ -381,10 +390,10 @@ impl LineInformation<'_> {
     }
 }
 
-/// Returns the mean part of the expected power of a line that is leakage of the open record.
+/// Returns the mean share of leakage of the open record in the expected power of a line.
 ///
-/// Lines that leakage dominates repeat one another, for all of it comes from the states at the two ends; the
-/// likelihood takes them for independent.
+/// Leakage comes from the states at the two ends and is therefore correlated between lines; the
+/// likelihood assumes independent lines.
 pub(super) fn leakage_share(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
     let coefficients = Coefficients::new(parameters);
     let endless = Span { duration: f64::INFINITY, ..span };

@@ -4,8 +4,8 @@ use nalgebra::{Complex, DMatrix};
 
 use super::parameters::Span;
 
-/// Largest part of the band that lines are pooled over, however far the poles are: the noise
-/// changes too.
+/// Maximum width of pooled lines, as a share of the band: the noise varies, even far from the
+/// poles.
 const WIDEST: f64 = 0.02;
 
 /// Lines of one record in a band, without the excluded ones.
@@ -13,7 +13,7 @@ const WIDEST: f64 = 0.02;
 pub(super) struct BandLines {
     /// Angular frequencies, in rad/s.
     pub omega: Vec<f64>,
-    /// Unitary amplitudes, lines × outputs, each output over its RMS value in the band.
+    /// Unitary amplitudes, lines × outputs, each output divided by its RMS value in the band.
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,
@@ -39,7 +39,7 @@ impl BandLines {
         self.amplitudes.ncols()
     }
 
-    /// Distance of two lines, in rad/s.
+    /// Returns the distance between two lines, in rad/s.
     pub fn spacing(&self) -> f64 {
         std::f64::consts::TAU / self.span.duration
     }
@@ -56,7 +56,7 @@ impl BandLines {
         terms
     }
 
-    /// Pools lines over a `part` of their distance to the nearest of `poles`.
+    /// Pools lines over a share `part` of their distance to the nearest of `poles`.
     pub fn pooled(
         &self,
         poles: &[Complex<f64>],

@@ -52,9 +52,9 @@ pub struct AmbientSettings {
     pub modes: Option<usize>,
     /// Largest number of modes if the likelihood decides.
     pub max_modes: usize,
-    /// Frequencies of sinusoids to leave out, in Hz.
+    /// Frequencies of sinusoids to exclude, in Hz.
     pub without_hz: Vec<f64>,
-    /// Whether harmonics that the record shows are left out too.
+    /// If true, harmonics detected in the record are excluded, too.
     pub exclude_harmonics: bool,
 }
 
@@ -82,7 +82,7 @@ impl Default for AmbientSettings {
 /// # Source
 /// Whittle (1953), Arkiv för Matematik 2, 423–434; Sykulski et al. (2019), Biometrika 106, 251–266
 /// (expected periodogram in Whittle's likelihood); Au (2017), *Operational Modal Analysis*; Peeters
-/// & De Roeck (1999), Mechanical Systems and Signal Processing 13, 855–878 (start).
+/// & De Roeck (1999), Mechanical Systems and Signal Processing 13, 855–878 (initial estimates).
 pub fn identify_ambient(
     record: &Record,
     settings: &AmbientSettings,
@@ -101,19 +101,19 @@ pub fn identify_ambient(
     let most = settings.modes.unwrap_or(settings.max_modes);
     let stabilisation = subspace_models(&record, band_hz, &band.scale, most)?;
     let candidates = candidates(&stabilisation.clusters(MAX_DAMPING, MIN_SHARE), band_hz);
-    let wanted = Wanted { exactly: settings.modes, most: settings.max_modes };
-    let (chosen, dropped) = choose(&candidates, &band, wanted);
+    let requested = Wanted { exactly: settings.modes, most: settings.max_modes };
+    let (chosen, dropped) = choose(&candidates, &band, requested);
     let [from_hz, to_hz] = band_hz;
     let none = AmbientError::NoMode { candidates: dropped.len(), from_hz, to_hz };
-    let Chosen { fit, sound } = chosen.ok_or(none)?;
-    let found = sound.len();
-    if let Some(asked) = settings.modes.filter(|asked| *asked > found) {
-        return Err(AmbientError::FewerModes { asked, found, from_hz, to_hz });
+    let Chosen { fit, sound: accepted } = chosen.ok_or(none)?;
+    let identified = accepted.len();
+    if let Some(asked) = settings.modes.filter(|asked| *asked > identified) {
+        return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
-    let leakage_share = leakage_of(&fit, &band);
+    let leakage_share = fitted_leakage(&fit, &band);
     let scale = RecordScale { span: band.span, scale: &band.scale, leakage_share };
-    let modes = modes_of(&fit, &sound, scale, &sinusoids)?;
-    let factor = fit.parameters.factor().select_rows(&sound);
+    let modes = ambient_modes(&fit, &accepted, scale, &sinusoids)?;
+    let factor = fit.parameters.factor().select_rows(&accepted);
     Ok(AmbientEstimate {
         modes,
         harmonics: sinusoids,
@@ -138,7 +138,7 @@ fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2])
     clusters.into_iter().map(|cluster| cluster.pole.clone()).collect()
 }
 
-fn leakage_of(fit: &Fit, band: &BandLines) -> f64 {
+fn fitted_leakage(fit: &Fit, band: &BandLines) -> f64 {
     let terms = fit.parameters.layout.noise_terms;
     likelihood::leakage_share(
         &fit.parameters,
@@ -147,9 +147,9 @@ fn leakage_of(fit: &Fit, band: &BandLines) -> f64 {
     )
 }
 
-fn modes_of(
+fn ambient_modes(
     fit: &Fit,
-    sound: &[usize],
+    accepted: &[usize],
     scale: RecordScale<'_>,
     sinusoids: &[Harmonic],
 ) -> Result<Vec<AmbientMode>, AmbientError> {
@@ -159,8 +159,8 @@ fn modes_of(
     };
     let covariance = fit.covariance().ok_or(failed.clone())?;
     let spacing_hz = 1.0 / scale.span.duration;
-    let mut modes = Vec::with_capacity(sound.len());
-    for &mode in sound {
+    let mut modes = Vec::with_capacity(accepted.len());
+    for &mode in accepted {
         let mut one = AmbientMode::new(fit, &covariance, mode, scale).ok_or(failed.clone())?;
         let frequency_hz = fit.poles()[mode].im / TAU;
         let width_hz = -fit.poles()[mode].re / TAU + spacing_hz;

@@ -1,4 +1,5 @@
-//! Number of modes: by the likelihood, with rules for poles that no likelihood decides.
+//! Number of modes: decided by the likelihood, with rules for poles that are significant but no
+//! modes.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +13,7 @@ use super::result::{DropReason, DroppedCandidate};
 use super::search::{Effort, Fit, search_pooled};
 use crate::stabilisation::Pole;
 
-/// Number of modes wanted.
+/// Requested number of modes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
     /// Stated number.
@@ -21,10 +22,10 @@ pub(super) struct Wanted {
     pub most: usize,
 }
 
-/// Outcome of the choice.
+/// Selected modes.
 pub(super) struct Chosen {
     pub fit: Fit,
-    /// Modes of the fit that are no poles of the noise.
+    /// Indices of the poles that are modes; the others explain a background or noise.
     pub sound: Vec<usize>,
 }
 
@@ -34,11 +35,11 @@ struct Choice<'a> {
     dropped: Vec<DroppedCandidate>,
 }
 
-/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first),
-/// and lists the candidates that are not among them.
+/// Selects the modes that explain the lines, starting from `candidates` (most certain first), and
+/// lists the rejected candidates.
 ///
 /// Poles that explain lines without being modes (a harmonic, a background, a mode outside the band)
-/// stay in the fit, for the modes would change without them.
+/// stay in the fit: without them the modes would be biased.
 pub(super) fn choose(
     candidates: &[Pole],
     band: &BandLines,
@@ -60,11 +61,11 @@ pub(super) fn choose(
 }
 
 impl Choice<'_> {
-    /// Increase of 2 ln L that a mode must bring: a price per parameter of ln n.
+    /// Returns the minimum increase of 2 ln L by a mode: a penalty of ln n per parameter.
     ///
     /// # Source
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
-    fn price(&self) -> f64 {
+    fn penalty(&self) -> f64 {
         let parameters = 2.0 * self.band.outputs() as f64 + 2.0;
         parameters * (2.0 * self.band.omega.len() as f64).ln()
     }
@@ -85,7 +86,7 @@ impl Choice<'_> {
         });
     }
 
-    /// Separates modes from poles that only explain lines, and keeps the number asked for.
+    /// Separates modes from other poles, and keeps at most the requested number.
     fn judged(&mut self, fit: Fit) -> Chosen {
         let mut sound = Vec::new();
         for mode in 0..fit.parameters.layout.modes {
@@ -113,7 +114,7 @@ impl Choice<'_> {
         modes.filter(|mode| self.broken_rule(fit, *mode).is_none()).count()
     }
 
-    /// Removes modes one after another as long as the likelihood does not need one.
+    /// Removes insignificant modes, one after another.
     fn pruned(&mut self, mut fit: Fit) -> Fit {
         while fit.parameters.layout.modes > 0 {
             if self.wanted.exactly.is_some_and(|n| self.sound_modes(&fit) <= n) {
@@ -126,10 +127,10 @@ impl Choice<'_> {
         fit
     }
 
-    /// Returns the fit without the first mode that the likelihood does not need; those with the
-    /// least evidence are tried first, and strong ones not at all.
+    /// Returns the fit without an insignificant mode, if there is one; modes with the least
+    /// evidence are tested first, strong modes not at all.
     fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
-        let (parameters, needed) = (&fit.parameters, self.price());
+        let (parameters, needed) = (&fit.parameters, self.penalty());
         let covariance = fit.covariance()?;
         let evidence = |mode: usize| (wald(parameters, &covariance, mode), mode);
         let mut weak: Vec<(f64, usize)> = (0..parameters.layout.modes)
@@ -162,11 +163,12 @@ impl Choice<'_> {
     }
 
     fn without(&self, fit: &Fit, mode: usize) -> Option<Fit> {
-        let rest: Vec<usize> = (0..fit.parameters.layout.modes).filter(|r| *r != mode).collect();
-        search_pooled(fit.parameters.reordered(&rest), self.band, Effort::TEST)
+        let remaining: Vec<usize> =
+            (0..fit.parameters.layout.modes).filter(|r| *r != mode).collect();
+        search_pooled(fit.parameters.reordered(&remaining), self.band, Effort::TEST)
     }
 
-    /// Adds modes as long as the likelihood pays for them, and removes those that they replace.
+    /// Adds modes as long as they are significant, and removes the modes that they replace.
     fn extended(&mut self, mut fit: Fit, limit: usize) -> Fit {
         let mut refusals = 0;
         let before = fit.parameters.layout.modes;
@@ -181,8 +183,8 @@ impl Choice<'_> {
                 !refused.iter().any(|other| near(omega, other))
             });
             let Some(candidate) = fresh else { break };
-            // The gain that the scan promises is that of one direction at a rough pole.
-            let promising = candidate.gain > 0.5 * self.price();
+            // The scan only estimates the gain, for one direction at an approximate pole.
+            let promising = candidate.gain > 0.5 * self.penalty();
             if !promising && self.wanted.exactly.is_none() {
                 break;
             }
@@ -194,7 +196,8 @@ impl Choice<'_> {
             }
             match self.with(&fit, &candidate.pole) {
                 Ok(next) => {
-                    // A pole that is no mode may explain a background; only few of them are useful.
+                    // A pole that is not a mode may explain a background; only few such poles are
+                    // useful.
                     let modes = self.sound_modes(&next);
                     refusals += usize::from(modes <= self.sound_modes(&fit));
                     fit = next;
@@ -209,7 +212,7 @@ impl Choice<'_> {
         if fit.parameters.layout.modes > before { self.pruned(fit) } else { fit }
     }
 
-    /// Returns the fit with one more mode, or why there is none.
+    /// Returns the fit with one more mode, or the reason for which it was rejected.
     fn with(&self, fit: &Fit, pole: &Pole) -> Result<Fit, DropReason> {
         let shape = &pole.vector * nalgebra::Complex::from(-pole.pole.re);
         let mut start = fit.parameters.with_mode(pole.pole, &shape);
@@ -222,7 +225,7 @@ impl Choice<'_> {
         match_amplitudes(&mut matched, &pooled, self.band.span, self.band.spacing());
         start.set_shape(added, &matched.shape(added));
         let next = search_pooled(start, self.band, Effort::TEST).ok_or(DropReason::NoMaximum)?;
-        let (gain, needed) = (2.0 * (fit.cost - next.cost), self.price());
+        let (gain, needed) = (2.0 * (fit.cost - next.cost), self.penalty());
         if self.wanted.exactly.is_none() && gain < needed {
             return Err(DropReason::SmallGain { gain, needed });
         }
@@ -230,7 +233,7 @@ impl Choice<'_> {
     }
 }
 
-/// Wald's statistic of a shape against zero.
+/// Returns Wald's statistic of a shape against zero.
 fn wald(parameters: &Parameters, covariance: &nalgebra::DMatrix<f64>, mode: usize) -> f64 {
     let (first, len) = (parameters.layout.shape(mode), 2 * parameters.layout.outputs);
     let block = covariance.view((first, first), (len, len)).into_owned();

@@ -1,18 +1,18 @@
-//! Parameters of the spectral matrix of the outputs, and their places in one vector.
+//! Parameters of the spectral matrix of the outputs, and their indices in one vector.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::limits::CORRELATED_NEIGHBOURS;
 
-/// What a force at rest leaves of the output.
+/// Response of the output to a constant force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kernel {
     /// A static deflection, 1/(s − λ): displacements, and velocities too.
     Static,
-    /// The same without an anti-aliasing filter: frequencies above half the sampling rate fold into
-    /// the band.
+    /// A static deflection in a record without an anti-aliasing filter: frequencies above half the
+    /// sampling rate fold into the band.
     Sampled,
-    /// Nothing, s/(λ(s − λ)): accelerations, and velocities too.
+    /// Zero, s/(λ(s − λ)): accelerations, and velocities too.
     Vanishing,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Span {
     pub sample_interval: f64,
 }
 
-/// Places of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each
+/// Indices of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each
 /// shape, the factors of the correlation of the modal forces, and the noise of each sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
@@ -54,7 +54,8 @@ impl Layout {
         self.modes + mode
     }
 
-    /// First of the real parts of a shape; the imaginary parts follow them.
+    /// Returns the index of the first real part of a shape; its imaginary parts follow the real
+    /// parts.
     pub fn shape(&self, mode: usize) -> usize {
         2 * self.modes + 2 * self.outputs * mode
     }
@@ -67,8 +68,7 @@ impl Layout {
         self.correlation(self.pairs.len()) + term * self.outputs + output
     }
 
-    /// Returns the parameters of poles and correlations: those whose derivatives have no simple
-    /// form.
+    /// Returns the parameters of poles and correlations: their derivatives have no simple form.
     pub fn dense(&self) -> Vec<usize> {
         let correlations = self.correlation(0)..self.noise(0, 0);
         (0..2 * self.modes).chain(correlations).collect()
@@ -121,7 +121,7 @@ impl Parameters {
         }
     }
 
-    /// Returns the rows c of the factor of the correlation, before they are normalised.
+    /// Returns the factor of the correlation before its rows are normalised.
     pub fn raw_factor(&self) -> DMatrix<f64> {
         let mut factor = DMatrix::identity(self.layout.modes, self.layout.modes);
         for (index, &(r, s)) in self.layout.pairs.iter().enumerate() {
@@ -139,54 +139,54 @@ impl Parameters {
         factor
     }
 
-    /// Returns the logarithm of the noise of a sensor where the Chebyshev polynomials are `terms`.
+    /// Returns the log noise variance of a sensor for values `terms` of the Chebyshev polynomials.
     pub fn log_noise(&self, output: usize, terms: &[f64]) -> f64 {
         let value = |(d, t): (usize, &f64)| t * self.values[self.layout.noise(d, output)];
         terms.iter().enumerate().map(value).sum()
     }
 
-    /// Returns the parameters without a mode, or with its index moved to another place.
+    /// Returns the parameters of the modes `order`, in this order.
     pub fn reordered(&self, order: &[usize]) -> Self {
         let layout = Layout::new(order.len(), self.layout.outputs, self.layout.noise_terms);
-        let mut other = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
+        let mut result = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
         let correlation = self.factor() * self.factor().transpose();
         let chosen =
             DMatrix::from_fn(order.len(), order.len(), |i, j| correlation[(order[i], order[j])]);
         let lower = chosen.cholesky().map(|factor| factor.l());
         for (to, &from) in order.iter().enumerate() {
-            other.values[to] = self.values[self.layout.frequency(from)];
-            other.values[order.len() + to] = self.values[self.layout.damping(from)];
-            other.set_shape(to, &self.shape(from));
+            result.values[to] = self.values[self.layout.frequency(from)];
+            result.values[order.len() + to] = self.values[self.layout.damping(from)];
+            result.set_shape(to, &self.shape(from));
         }
-        for (index, &(r, s)) in other.layout.pairs.iter().enumerate() {
+        for (index, &(r, s)) in result.layout.pairs.iter().enumerate() {
             // Rows are normalised again; the diagonal of the raw factor is 1.
             let value = lower.as_ref().map_or(0.0, |l| l[(r, s)] / l[(r, r)]);
-            other.values[other.layout.correlation(index)] = value;
+            result.values[result.layout.correlation(index)] = value;
         }
-        other.copy_noise(self);
-        other
+        result.copy_noise(self);
+        result
     }
 
     /// Returns the parameters with one more mode, whose force is independent, as the last.
     pub fn with_mode(&self, pole: Complex<f64>, shape: &DVector<Complex<f64>>) -> Self {
         let modes = self.layout.modes;
         let layout = Layout::new(modes + 1, self.layout.outputs, self.layout.noise_terms);
-        let mut other = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
+        let mut result = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
         for mode in 0..modes {
-            other.values[mode] = self.values[self.layout.frequency(mode)];
-            other.values[modes + 1 + mode] = self.values[self.layout.damping(mode)];
-            other.set_shape(mode, &self.shape(mode));
+            result.values[mode] = self.values[self.layout.frequency(mode)];
+            result.values[modes + 1 + mode] = self.values[self.layout.damping(mode)];
+            result.set_shape(mode, &self.shape(mode));
         }
-        other.values[modes] = pole.norm().ln();
-        other.values[2 * modes + 1] = (-pole.re / pole.norm()).ln();
-        other.set_shape(modes, shape);
-        for (index, pair) in other.layout.pairs.iter().enumerate() {
+        result.values[modes] = pole.norm().ln();
+        result.values[2 * modes + 1] = (-pole.re / pole.norm()).ln();
+        result.set_shape(modes, shape);
+        for (index, pair) in result.layout.pairs.iter().enumerate() {
             let before = self.layout.pairs.iter().position(|old| old == pair);
             let value = before.map_or(0.0, |old| self.values[self.layout.correlation(old)]);
-            other.values[other.layout.correlation(index)] = value;
+            result.values[result.layout.correlation(index)] = value;
         }
-        other.copy_noise(self);
-        other
+        result.copy_noise(self);
+        result
     }
 
     fn copy_noise(&mut self, from: &Self) {

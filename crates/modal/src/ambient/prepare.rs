@@ -1,4 +1,4 @@
-//! Lines and subspace models of an ambient record, and what makes it unusable.
+//! Lines and subspace models of an ambient record, and checks of the record.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use super::parameters::Span;
 use super::subspace::ssi_cov;
 use crate::stabilisation::Stabilisation;
 
-/// Returns the band, checked, after the channels are.
+/// Checks the channels and returns the checked band.
 pub(super) fn checked_band(
     record: &Record,
     band_hz: Option<[f64; 2]>,
@@ -38,7 +38,7 @@ pub(super) fn checked_band(
     Ok([from_hz, to_hz])
 }
 
-/// Returns the lines of a band without those next to the excluded frequencies.
+/// Returns the lines of a band, without lines next to excluded frequencies.
 pub(super) fn band_lines(
     record: &Record,
     band_hz: [f64; 2],
@@ -46,23 +46,23 @@ pub(super) fn band_lines(
 ) -> Result<BandLines, AmbientError> {
     let data = LineData::from_open_record(None, &record.without_mean(), band_hz)?;
     let (duration, sample_interval) = (record.sampling().duration(), record.sampling().dt());
-    let reach = EXCLUDED_LINES * TAU / duration;
-    let kept: Vec<usize> = (0..data.len())
-        .filter(|k| excluded_hz.iter().all(|f| (data.omega()[*k] - TAU * f).abs() > reach))
+    let half_width = EXCLUDED_LINES * TAU / duration;
+    let included: Vec<usize> = (0..data.len())
+        .filter(|k| excluded_hz.iter().all(|f| (data.omega()[*k] - TAU * f).abs() > half_width))
         .collect();
     let outputs = record.channels();
-    let (lines, needed) = (kept.len(), MIN_LINES_PER_UNKNOWN * (2 * outputs + 2));
+    let (lines, needed) = (included.len(), MIN_LINES_PER_UNKNOWN * (2 * outputs + 2));
     if lines < needed {
         let [from_hz, to_hz] = band_hz;
         return Err(AmbientError::TooFewLines { lines, needed, outputs, from_hz, to_hz });
     }
-    let mut amplitudes = data.outputs().select_rows(&kept);
+    let mut amplitudes = data.outputs().select_rows(&included);
     let mean_square = |channel| amplitudes.column(channel).norm_squared() / lines as f64;
     let scale: Vec<f64> = (0..outputs).map(|channel| f64::sqrt(mean_square(channel))).collect();
     let largest = scale.iter().copied().fold(0.0, f64::max);
     for (channel, &rms) in scale.iter().enumerate() {
         let ratio = rms / largest;
-        // Also where all are zero.
+        // NaN if all channels are zero.
         if ratio.is_nan() || ratio < DEAD_CHANNEL {
             return Err(AmbientError::DeadChannel { channel, rms, ratio });
         }
@@ -71,7 +71,7 @@ pub(super) fn band_lines(
         column /= Complex::from(*rms);
     }
     check_copies(&amplitudes)?;
-    let omega = kept.iter().map(|k| data.omega()[*k]).collect();
+    let omega = included.iter().map(|k| data.omega()[*k]).collect();
     let span = Span { duration, sample_interval };
     Ok(BandLines { omega, amplitudes, scale, span })
 }
@@ -89,7 +89,7 @@ fn check_copies(amplitudes: &DMatrix<Complex<f64>>) -> Result<(), AmbientError> 
     Ok(())
 }
 
-/// Returns subspace models of the record, resampled to the band, each channel over its scale.
+/// Returns subspace models of the record after resampling to the band and scaling of the channels.
 pub(super) fn subspace_models(
     record: &Record,
     band_hz: [f64; 2],
@@ -108,7 +108,7 @@ pub(super) fn subspace_models(
         .ok_or(AmbientError::Numerics { what: "the subspace model", size: highest })
 }
 
-/// Returns the samples of a band, at a rate that suits it, and the time between two of them.
+/// Returns the samples of a band at a rate suited to it, and the sample interval.
 fn resampled(record: &Record, band_hz: [f64; 2], scale: &[f64]) -> (DMatrix<f64>, f64) {
     let (len, duration) = (record.len(), record.sampling().duration());
     let wanted = (RESAMPLING * band_hz[1] * duration).ceil() as usize;
@@ -120,15 +120,15 @@ fn resampled(record: &Record, band_hz: [f64; 2], scale: &[f64]) -> (DMatrix<f64>
     for (channel, unit) in scale.iter().enumerate() {
         let mut input = record.channel(channel).to_vec();
         let mut lines = forward.make_output_vec();
-        let mut kept = inverse.make_input_vec();
-        let count = kept.len().min(lines.len());
-        // The lengths are those of the plans.
+        let mut in_band = inverse.make_input_vec();
+        let count = in_band.len().min(lines.len());
+        // The lengths match the plans, so that this cannot fail.
         let _ = forward.process(&mut input, &mut lines);
         for k in first.max(1)..count.saturating_sub(1) {
-            kept[k] = lines[k] / (len as f64 * unit);
+            in_band[k] = lines[k] / (len as f64 * unit);
         }
         let mut output = inverse.make_output_vec();
-        let _ = inverse.process(&mut kept, &mut output);
+        let _ = inverse.process(&mut in_band, &mut output);
         resampled.column_mut(channel).copy_from_slice(&output);
     }
     (resampled, duration / resampled_len as f64)

@@ -1,4 +1,4 @@
-//! Modes of an ambient record with their uncertainty, and what was found besides.
+//! Modes of an ambient record with their uncertainty, harmonics and rejected candidates.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -31,8 +31,8 @@ pub enum Uncertainty {
         /// Smallest ζωT for an interval.
         needed: f64,
     },
-    /// Much of the lines is leakage of the open record, as of displacements with little noise: differentiate
-    /// the record (velocities or accelerations) or record longer.
+    /// Leakage of the open record contributes too much to the lines, as in displacements with
+    /// little noise: differentiate the record (to velocities or accelerations) or record longer.
     Leakage {
         /// Mean part of the power of a line that is leakage.
         share: f64,
@@ -46,12 +46,12 @@ pub enum Uncertainty {
 pub struct ModalValue {
     /// Estimate.
     pub value: f64,
-    /// Its uncertainty.
+    /// Uncertainty of the value.
     pub uncertainty: Uncertainty,
 }
 
 impl ModalValue {
-    /// Takes a value whose logarithm has the standard error `relative`.
+    /// Creates a value whose logarithm has the standard error `relative`.
     fn new(value: f64, relative: f64, decay_times: f64, share: f64) -> Self {
         let uncertainty = if decay_times < MIN_DECAY_TIMES {
             Uncertainty::RecordTooShort { decay_times, needed: MIN_DECAY_TIMES }
@@ -89,7 +89,8 @@ pub struct AmbientMode {
     pub natural_frequency_hz: ModalValue,
     /// Damping ratio −Re λ/|λ|.
     pub damping_ratio: ModalValue,
-    /// Shape in the units of the channels over that of the largest entry, which is 1.
+    /// Shape, relative to its largest entry, which is 1; units of the channels relative to the unit
+    /// of that entry.
     pub shape: ShapeWithCovariance,
     /// Power density of the force on the mode: the output of the largest entry has the one-sided
     /// power density `force_power`/|jω − λ|² near the resonance, in its unit² (rad/s)²/Hz.
@@ -98,7 +99,8 @@ pub struct AmbientMode {
     pub mpc: Indicator,
     /// ζωT, the length of the record in decay times.
     pub decay_times: f64,
-    /// Index of the harmonic at the frequency of the mode, if there is one: it may be no mode.
+    /// Index of the harmonic at the frequency of the mode, if there is one: the mode may be this
+    /// harmonic.
     pub harmonic: Option<usize>,
 }
 
@@ -106,14 +108,15 @@ pub struct AmbientMode {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The likelihood gains less than the number of parameters costs.
+    /// The likelihood gains less than the penalty of the parameters.
     SmallGain {
         /// Increase of 2 ln L by the mode.
         gain: f64,
         /// Increase that was needed.
         needed: f64,
     },
-    /// The damping ratio is not distinguished from zero, as of a harmonic or a chance peak.
+    /// The damping ratio does not differ from zero significantly, as for a harmonic or a chance
+    /// peak.
     DampingUndetermined {
         /// Damping ratio over its standard error.
         ratio: f64,
@@ -130,7 +133,7 @@ pub enum DropReason {
         /// Number of modes (`modes` or `max_modes`).
         number: usize,
     },
-    /// The likelihood could not be maximised with it.
+    /// The likelihood has no maximum with this candidate.
     NoMaximum,
 }
 
@@ -162,7 +165,7 @@ pub struct AmbientEstimate {
     pub lines: usize,
     /// ln L of the lines, each output over its RMS value in the band.
     pub log_likelihood: f64,
-    /// Mean part of the power of a line that is leakage of the open record.
+    /// Mean share of leakage of the open record in the power of a line.
     pub leakage_share: f64,
     /// Correlation coefficients of the forces on the modes, modes × modes.
     pub force_correlation: DMatrix<f64>,
@@ -207,7 +210,7 @@ impl AmbientMode {
     }
 }
 
-/// Scales of the record behind a fit.
+/// Scales of the record of a fit.
 #[derive(Clone, Copy)]
 pub(super) struct RecordScale<'a> {
     pub span: Span,

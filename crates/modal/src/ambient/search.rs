@@ -7,23 +7,24 @@ use super::limits::{ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
 
-/// Damping of the first step, and factors by which a refused and a successful step change it.
+/// Damping of the first step, and the factors that multiply it after a refused and after a
+/// successful step.
 const FIRST_DAMPING: f64 = 1e-2;
 const HARDER: f64 = 8.0;
 const EASIER: f64 = 0.125;
 
-/// Trials of one step before the search gives up.
+/// Maximum number of trials of one step.
 const TRIALS: usize = 12;
 
-/// Slow steps in a row that end a search.
+/// Number of successive slow steps that ends a search.
 const SLOW_STEPS: usize = 2;
 
-/// Smallest logarithms of a damping ratio and of a noise variance (over the variance in the band):
-/// what is smaller has no effect on the lines.
+/// Minimum logarithms of a damping ratio and of a noise variance (relative to the variance in the
+/// band): smaller values do not affect the lines.
 const LEAST_LOG_DAMPING: f64 = -14.0;
 const LEAST_LOG_NOISE: f64 = -28.0;
 
-/// Information that every parameter has, as part of the largest: keeps the covariance finite along
+/// Minimum information of a parameter, relative to the largest: keeps the covariance finite for
 /// phases that the lines do not determine.
 const LEAST_INFORMATION: f64 = 1e-10;
 
@@ -32,16 +33,17 @@ const LEAST_INFORMATION: f64 = 1e-10;
 pub(super) struct Effort {
     /// Largest number of steps.
     pub iterations: usize,
-    /// Gain of the logarithm of the likelihood of a slow step; two in a row end the search.
+    /// Gain in log-likelihood below which a step is slow; two successive slow steps end the search.
     pub slow: f64,
 }
 
 impl Effort {
-    /// Compares starts.
+    /// Effort to compare initial estimates.
     pub const SHORT: Self = Self { iterations: 6, slow: 0.5 };
-    /// Tests a mode, whose price is a gain of several tens.
+    /// Effort to test a mode: the penalty is a gain of several tens.
     pub const TEST: Self = Self { iterations: 40, slow: 0.5 };
-    /// What remains moves no parameter by a tenth of its standard error.
+    /// Effort of the final search: further steps would move parameters by less than a tenth of
+    /// their standard errors.
     pub const FULL: Self = Self { iterations: 60, slow: 0.005 };
 }
 
@@ -54,7 +56,7 @@ pub(super) struct Fit {
     pub information: DMatrix<f64>,
 }
 
-/// Searches from `start` over pooled lines; `None` where the likelihood has no value at the start.
+/// Searches from `start` over pooled lines; `None` if the likelihood is not defined at `start`.
 pub(super) fn search(
     start: Parameters,
     lines: &[PooledLines],
@@ -84,7 +86,7 @@ pub(super) fn search(
     Some(fit)
 }
 
-/// Makes one step and returns its gain of the logarithm of the likelihood, 0 if there is none.
+/// Makes one step and returns its gain in log-likelihood, 0 if no step succeeds.
 fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> Option<f64> {
     let slope = gradient(&fit.parameters, lines, span)?;
     for _ in 0..TRIALS {
@@ -107,15 +109,15 @@ fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> 
     Some(0.0)
 }
 
-/// Searches from `start`, with lines pooled about the poles of the start and again about those of
-/// the end.
+/// Searches from `start` with lines pooled around its poles, and again with lines pooled around the
+/// resulting poles.
 pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
     let terms = start.layout.noise_terms;
     let first =
         search(start.clone(), &band.pooled(&start.poles(), POOLING, terms), band.span, effort)?;
     let pooled = band.pooled(&first.parameters.poles(), POOLING, terms);
     let mut fit = search(first.parameters, &pooled, band.span, effort)?;
-    // Fits are compared on the same lines, however each was pooled.
+    // The cost is computed on all lines, so that fits with different pooling can be compared.
     fit.cost = cost(&fit.parameters, &band.pooled(&[], 0.0, terms), band.span);
     Some(fit)
 }
@@ -131,8 +133,7 @@ fn damped_step(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-/// Returns the matrix with a unit diagonal, `damping` added to it, and the scale of rows and
-/// columns.
+/// Returns the matrix scaled to a unit diagonal plus `damping`, and the scale of rows and columns.
 fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
     let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
     let floor = LEAST_INFORMATION.powi(2) * largest;
@@ -144,8 +145,8 @@ fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f6
     (scaled, scale)
 }
 
-/// Returns the parameters after a step, which is limited where the likelihood is far from
-/// quadratic.
+/// Returns the parameters after a step; the steps of parameters in which the likelihood is far from
+/// quadratic are limited.
 fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
     let layout = &parameters.layout;
     let mut next = parameters.clone();

@@ -42,9 +42,9 @@ pub(super) struct Coefficients {
 /// Derivative of the coefficients with respect to one parameter of the poles or correlations.
 #[derive(Debug, Clone)]
 pub(super) struct Direction {
-    /// Parameter.
+    /// Index of the parameter.
     pub index: usize,
-    /// Mode whose pole moves, and ∂λ.
+    /// Mode whose pole depends on the parameter, and ∂λ.
     pub pole: Option<(usize, Complex<f64>)>,
     pub covariances: DMatrix<Complex<f64>>,
     pub direct_power: DMatrix<f64>,
@@ -61,7 +61,7 @@ impl Coefficients {
         let (modes, outputs) = (parameters.layout.modes, parameters.layout.outputs);
         let poles = parameters.poles();
         let columns: Vec<_> = (0..modes).map(|mode| parameters.shape(mode)).collect();
-        let shapes = columns_of(outputs, &columns);
+        let shapes = column_matrix(outputs, &columns);
         let factor = parameters.factor();
         let correlation = &factor * factor.transpose();
         let kernel = parameters.kernel;
@@ -126,8 +126,7 @@ impl Coefficients {
         Kernels { value, derivative }
     }
 
-    /// Returns the spectral matrix at a line where the noise of the sensors has the variances
-    /// `noise`.
+    /// Returns the spectral matrix at a line for sensor noise of the variances `noise`.
     pub fn spectrum(&self, kernels: &Kernels, noise: &[f64]) -> DMatrix<Complex<f64>> {
         let outputs = self.shapes.nrows();
         let mut half = DMatrix::zeros(outputs, outputs);
@@ -179,8 +178,8 @@ impl Coefficients {
                 };
                 for i in 0..outputs {
                     let gamma = self.covariances[(i, s)];
-                    let own = value * unit * gamma + mirrored * unit.conj() * gamma.conj();
-                    x[i] += own.conj() + gain * direct[(i, s)];
+                    let modal = value * unit * gamma + mirrored * unit.conj() * gamma.conj();
+                    x[i] += modal.conj() + gain * direct[(i, s)];
                 }
                 for r in 0..modes {
                     let [g, g_mirrored] = self.transfer(r, s);
@@ -243,6 +242,9 @@ fn hermitian_sum(half: &DMatrix<Complex<f64>>, real: &DMatrix<f64>) -> DMatrix<C
     DMatrix::from_fn(rows, columns, |i, j| half[(i, j)] + half[(j, i)].conj() + real[(i, j)])
 }
 
-fn columns_of(rows: usize, columns: &[nalgebra::DVector<Complex<f64>>]) -> DMatrix<Complex<f64>> {
+fn column_matrix(
+    rows: usize,
+    columns: &[nalgebra::DVector<Complex<f64>>],
+) -> DMatrix<Complex<f64>> {
     if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(columns) }
 }

@@ -1,5 +1,5 @@
 //! Covariance-driven stochastic subspace identification (SSI-cov): poles and shapes of models of
-//! rising order from the covariances of the outputs, the start of the likelihood.
+//! rising order from the covariances of the outputs; initial estimates of the likelihood.
 
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -10,9 +10,9 @@ use crate::stabilisation::{Pole, Stabilisation};
 /// Returns the poles and shapes of models of all `orders` (rising), from samples × outputs of zero
 /// mean.
 ///
-/// `block_rows` is the number of block rows of the Hankel matrix of the covariances, whose lags go
-/// up to twice as many samples. `None` if there are fewer samples than lags, or a decomposition
-/// fails.
+/// `block_rows` is the number of block rows of the Hankel matrix of the covariances; the largest
+/// lag is nearly twice that number of samples. `None` if there are fewer samples than lags, or a
+/// decomposition fails.
 ///
 /// # Source
 /// Peeters & De Roeck (1999), Mechanical Systems and Signal Processing 13, 855–878; Van Overschee &

@@ -1,4 +1,4 @@
-//! Returns to rest without oscillation.
+//! Decays without oscillation (overdamped responses).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,35 +6,40 @@ use super::backbone::inverse;
 use super::fit::Data;
 use super::limits::{FASTEST_DECAY, FREE_DECAY_SURE, RATE_REFINEMENTS, SLOWEST_RETURN};
 
-/// Rates of decays without oscillation, with what the record says of them.
+/// Rates of decays without oscillation, with standard errors and criterion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Aperiodic {
     /// Rates per sample and their standard errors, rising.
     pub rates: Vec<[f64; 2]>,
-    /// Bayesian information criterion of white noise beside them.
+    /// Bayesian information criterion of the decays with white noise.
     pub criterion: f64,
 }
 
-/// Returns one decay without oscillation or two of them, as the Bayesian information criterion has it; `None` where even
-/// one does not lower it.
+/// Returns one or two decays without oscillation, whichever has the lower Bayesian information
+/// criterion; `None` if not even one decay lowers it.
 ///
 /// # Source
-/// Schwarz (1978), Annals of Statistics 6, 461–464; Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10,
-/// 413–432.
+/// Schwarz (1978), Annals of Statistics 6, 461–464; Golub & Pereyra (1973), SIAM Journal on
+/// Numerical Analysis 10, 413–432.
 pub(super) fn aperiodic(data: &Data) -> Option<Aperiodic> {
-    let nothing = criterion(data, &[])?;
+    let without_decay = criterion(data, &[])?;
     let one = searched(data, Vec::new())?;
-    let of_one = criterion(data, &one)?;
+    let criterion_of_one = criterion(data, &one)?;
     let two = searched(data, one.clone());
-    let of_two = two.as_ref().and_then(|two| criterion(data, two)).unwrap_or(f64::INFINITY);
-    let (rates, criterion) = if of_two < of_one { (two?, of_two) } else { (one, of_one) };
-    if criterion >= nothing {
+    let criterion_of_two =
+        two.as_ref().and_then(|two| criterion(data, two)).unwrap_or(f64::INFINITY);
+    let (rates, criterion) = if criterion_of_two < criterion_of_one {
+        (two?, criterion_of_two)
+    } else {
+        (one, criterion_of_one)
+    };
+    if criterion >= without_decay {
         return None;
     }
     let errors = errors(data, &rates)?;
     let mut rates: Vec<[f64; 2]> =
         rates.into_iter().zip(errors).map(|(rate, error)| [rate, error]).collect();
-    // Rates of two decays that are one, or of noise, are not known.
+    // The rates are undetermined if two decays coincide or a decay only fits noise.
     if rates.iter().any(|[rate, error]| FREE_DECAY_SURE * error > *rate || error.is_nan()) {
         return None;
     }
@@ -42,7 +47,8 @@ pub(super) fn aperiodic(data: &Data) -> Option<Aperiodic> {
     Some(Aperiodic { rates, criterion })
 }
 
-/// Bayesian information criterion of a fit whose residual has these sums of squares, and so many unknowns.
+/// Returns the Bayesian information criterion of a fit from the sums of squares of its residual and
+/// its number of unknowns.
 pub(super) fn information(data: &Data, squares: impl Iterator<Item = f64>, unknowns: usize) -> f64 {
     let len = data.len() as f64;
     let level = |square: f64| len * (square / len).max(f64::MIN_POSITIVE).ln();
@@ -55,7 +61,7 @@ fn criterion(data: &Data, rates: &[f64]) -> Option<f64> {
     Some(information(data, residual.column_iter().map(|e| e.norm_squared()), unknowns))
 }
 
-/// Returns what the decays and the constant leave.
+/// Returns the residual of the decays and the constant.
 fn residual(data: &Data, rates: &[f64]) -> Option<DMatrix<f64>> {
     let columns = rates.len() + usize::from(data.constant);
     if columns == 0 {
@@ -69,7 +75,7 @@ fn residual(data: &Data, rates: &[f64]) -> Option<DMatrix<f64>> {
     Some(&data.samples - basis * solution)
 }
 
-/// Adds the best further rate to some, first on a grid, and then refines all of them in turn.
+/// Adds the best further rate from a grid to `rates`, and then refines all rates in turn.
 fn searched(data: &Data, rates: Vec<f64>) -> Option<Vec<f64>> {
     let slowest = SLOWEST_RETURN / data.len() as f64;
     let steps = ((FASTEST_DECAY / slowest).ln() / 0.5).ceil() as i32;
@@ -77,29 +83,29 @@ fn searched(data: &Data, rates: Vec<f64>) -> Option<Vec<f64>> {
     let extended = grid.map(|rate| [rates.as_slice(), &[rate]].concat());
     let cost = |rates: &Vec<f64>| criterion(data, rates).unwrap_or(f64::INFINITY);
     let mut best = extended.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
-    let (mut least, mut reach) = (cost(&best), 0.5);
+    let (mut least, mut log_step) = (cost(&best), 0.5);
     for _ in 0..RATE_REFINEMENTS {
         let mut improved = false;
         for at in 0..best.len() {
             for sign in [-1.0, 1.0] {
                 let mut moved = best.clone();
-                moved[at] = (moved[at] * f64::exp(sign * reach)).clamp(slowest, FASTEST_DECAY);
-                let of_moved = cost(&moved);
-                if of_moved < least {
-                    (best, least, improved) = (moved, of_moved, true);
+                moved[at] = (moved[at] * f64::exp(sign * log_step)).clamp(slowest, FASTEST_DECAY);
+                let moved_cost = cost(&moved);
+                if moved_cost < least {
+                    (best, least, improved) = (moved, moved_cost, true);
                 }
             }
         }
         if !improved {
-            reach *= 0.5;
+            log_step *= 0.5;
         }
     }
     least.is_finite().then_some(best)
 }
 
-/// Standard errors of the rates from the derivatives of the residual.
+/// Returns the standard errors of the rates from the derivatives of the residual.
 fn errors(data: &Data, rates: &[f64]) -> Option<Vec<f64>> {
-    let left = residual(data, rates)?;
+    let residuals = residual(data, rates)?;
     let unknowns = rates.len() + usize::from(data.constant);
     let freedom = data.len().checked_sub(unknowns + 1)? as f64;
     let mut information = DMatrix::zeros(rates.len(), rates.len());
@@ -113,7 +119,7 @@ fn errors(data: &Data, rates: &[f64]) -> Option<Vec<f64>> {
     };
     let slopes = (0..rates.len()).map(slopes).collect::<Option<Vec<DMatrix<f64>>>>()?;
     for channel in 0..data.channels() {
-        let variance = left.column(channel).norm_squared() / freedom;
+        let variance = residuals.column(channel).norm_squared() / freedom;
         let columns: Vec<DVector<f64>> =
             slopes.iter().map(|slope| slope.column(channel).into_owned()).collect();
         let jacobian = DMatrix::from_columns(&columns);

@@ -1,4 +1,5 @@
-//! Noise whose samples depend on those before: its prediction errors are white.
+//! Coloured noise as an autoregression: each sample depends on the samples before it, and the
+//! prediction errors are white.
 
 use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 
@@ -7,17 +8,18 @@ use super::limits::{MOST_ORDER, SAMPLES_PER_ORDER};
 pub(super) struct Autoregression {
     /// Coefficients of the best predictions from the last 1, 2 … samples, the latest sample first.
     predictors: Vec<Vec<f64>>,
-    /// Deviation of the error of each prediction from 0, 1 … samples over that of the last.
+    /// Standard deviation of the error of each prediction from 0, 1 … samples, relative to the
+    /// last.
     deviations: Vec<f64>,
 }
 
 impl Autoregression {
-    /// Returns the noise of least Bayesian information criterion.
+    /// Estimates the autoregression with the lowest Bayesian information criterion.
     ///
     /// # Source
-    /// Burg (1975), *Maximum Entropy Spectral Analysis*, thesis, Stanford; Schwarz (1978), Annals of
-    /// Statistics 6, 461–464.
-    pub(super) fn of(noise: &[f64]) -> Self {
+    /// Burg (1975), *Maximum Entropy Spectral Analysis*, thesis, Stanford; Schwarz (1978), Annals
+    /// of Statistics 6, 461–464.
+    pub(super) fn from_noise(noise: &[f64]) -> Self {
         let len = noise.len();
         let most = MOST_ORDER.min(len / SAMPLES_PER_ORDER);
         let (mut forward, mut backward) = (noise.to_vec(), noise.to_vec());
@@ -59,13 +61,13 @@ impl Autoregression {
         self.predictors.len().saturating_sub(1)
     }
 
-    /// Minus twice the logarithm of the determinant by which whitening multiplies volumes.
+    /// Returns minus twice the log determinant of the whitening transformation.
     pub(super) fn log_volume(&self) -> f64 {
         2.0 * self.deviations.iter().map(|d| d.ln()).sum::<f64>()
     }
 
-    /// Returns the prediction errors of `values` from sample `before` on, all of one variance; the first
-    /// of the values is sample `first` of the record.
+    /// Returns the prediction errors of `values` from sample `before` on, all of one variance; the
+    /// first of the values is sample `first` of the record.
     pub(super) fn whitened(&self, values: &[f64], first: usize, before: usize) -> Vec<f64> {
         let mut errors = values[before..].to_vec();
         let order = self.order();
@@ -102,22 +104,23 @@ mod tests {
 
     #[test]
     fn the_order_and_the_coefficient_are_found() {
-        let found = Autoregression::of(&first_order(4000, 1));
+        let found = Autoregression::from_noise(&first_order(4000, 1));
         assert_eq!(found.order(), 1);
         assert!((found.predictors[1][0] - 0.9).abs() < 0.03);
         let white = noise::white(Sampling::new(1.0, 4000).unwrap(), 1, 1.0, 2).unwrap();
-        assert_eq!(Autoregression::of(white.channel(0)).order(), 0);
+        assert_eq!(Autoregression::from_noise(white.channel(0)).order(), 0);
     }
 
     #[test]
     fn whitening_in_pieces_is_whitening_at_once() {
         let x = first_order(300, 3);
-        let noise = Autoregression::of(&x);
+        let noise = Autoregression::from_noise(&x);
         let whole = noise.whitened(&x, 0, 0);
         let later = noise.whitened(&x[100 - noise.order()..], 100 - noise.order(), noise.order());
         assert_eq!(whole[100..], later);
         assert!(noise.order() > 0);
-        // The first sample has the variance of the noise, 1/(1 − 0.9²), the others that of the errors.
+        // The first sample has the variance of the noise, 1/(1 − 0.9²), the others that of the
+        // errors.
         assert!((whole[0] / x[0] - (1.0f64 - 0.81).sqrt()).abs() < 0.05);
     }
 }

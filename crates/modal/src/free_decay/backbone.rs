@@ -13,19 +13,22 @@ use super::limits::{
 };
 use super::poles::linear_columns;
 
-/// Frequency and damping over amplitude of a mode that a sum of decaying oscillations does not describe.
+/// Frequency and damping over amplitude of a mode that a sum of decaying oscillations does not
+/// describe.
 ///
-/// The amplitude a and the phase φ of the mode follow a slow flow, a' = −P(a) and φ' = W(a) with polynomials P and W. A
-/// linear mode has P proportional to a, and W constant.
+/// The amplitude a and the phase φ of the mode follow a slow flow, a' = −P(a) and φ' = W(a) with
+/// polynomials P and W. A linear mode has P proportional to a, and W constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backbone {
-    /// Modes that stand for this one in the linear model, by their places among all modes by rising frequency.
+    /// Modes of the linear model that this one replaces: their indices among all modes by rising
+    /// frequency.
     pub modes: Vec<usize>,
-    /// Frequency and damping from the first amplitude down to the last that the record shows.
+    /// Frequency and damping from the first amplitude down to the last one above the noise.
     pub points: Vec<BackbonePoint>,
-    /// Number of unknowns of the slow flow and its amplitudes, beside those of other modes.
+    /// Number of unknowns of the slow flow and its amplitudes, without the unknowns of other modes.
     pub unknowns: usize,
-    /// Decrease of the Bayesian information criterion from the linear modes to the slow flow, a pure number.
+    /// Decrease of the Bayesian information criterion from the linear modes to the slow flow, a
+    /// pure number.
     pub gain: f64,
 }
 
@@ -42,10 +45,11 @@ pub struct BackbonePoint {
     pub damping_ratio: Uncertain,
 }
 
-/// Polynomials of the slow flow: amplitude over its first value, time over the length of the record.
+/// Polynomials of the slow flow: amplitude relative to its first value, time relative to the length
+/// of the record.
 #[derive(Debug, Clone)]
 struct Flow {
-    /// Coefficients of P from the power 0 on, then of W from the power 0 on.
+    /// Coefficients of P, then of W, each from power 0 upwards.
     values: DVector<f64>,
     order: usize,
 }
@@ -89,7 +93,7 @@ fn horner(coefficients: &[f64], u: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * u + c)
 }
 
-/// Record less the response of all modes but some, whitened by its noise.
+/// Record minus the response of all modes that are not replaced, to be whitened.
 struct Target<'a> {
     data: &'a Data,
     fit: &'a Fit,
@@ -99,10 +103,10 @@ struct Target<'a> {
     deviations: Vec<f64>,
 }
 
-/// A flow with the residual that it leaves.
+/// Slow flow with its residual.
 struct Fitted {
     flow: Flow,
-    /// Whitened residual of all channels over the deviation of their noise.
+    /// Whitened residual of all channels, divided by the standard deviation of their noise.
     residual: DVector<f64>,
     /// Amplitudes of cosine and sine in each channel.
     amplitudes: Vec<[f64; 2]>,
@@ -130,7 +134,7 @@ impl<'a> Target<'a> {
         Self { data, fit, samples, deviations }
     }
 
-    /// Returns the residual of a flow, whose amplitudes and constants are those of least squares.
+    /// Returns the residual of a flow with amplitudes and constants by least squares.
     fn fitted(&self, flow: Flow) -> Option<Fitted> {
         let len = self.data.len();
         let path = flow.path(len)?;
@@ -162,9 +166,11 @@ impl<'a> Target<'a> {
         residual.iter().all(|e| e.is_finite()).then_some(Fitted { flow, residual, amplitudes })
     }
 
-    /// Returns the derivatives of the residual with respect to the coefficients, by central differences.
+    /// Returns the derivatives of the residual with respect to the coefficients, by central
+    /// differences.
     fn jacobian(&self, flow: &Flow) -> Option<DMatrix<f64>> {
-        // Coefficients are phases and nepers over the record.
+        // The coefficients have the size of phases (rad) and nepers over the record: one step suits
+        // all.
         const STEP: f64 = 1e-4;
         let columns = (0..flow.values.len()).map(|at| {
             let moved = |step: f64| {
@@ -177,7 +183,7 @@ impl<'a> Target<'a> {
         Some(DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?))
     }
 
-    /// Searches the flow of least squares.
+    /// Searches the flow with the least squared residual.
     fn settled(&self, start: Flow) -> Option<Fitted> {
         let mut best = self.fitted(start)?;
         for _ in 0..BACKBONE_STEPS {
@@ -198,7 +204,8 @@ impl<'a> Target<'a> {
         Some(best)
     }
 
-    /// Minus twice the log likelihood, but for the constant that the linear modes have, too.
+    /// Returns minus twice the log-likelihood, without the constant that it shares with the linear
+    /// modes.
     fn cost(&self, fitted: &Fitted) -> f64 {
         let len = self.data.len();
         let squares = fitted.residual.as_slice().chunks(len).zip(&self.deviations);
@@ -210,7 +217,8 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Returns the inverse of a matrix of scalar products, whose columns may be of different units; `None` of a singular one.
+/// Returns the inverse of a matrix of scalar products, whose columns may be of different units;
+/// `None` if it is singular.
 pub(super) fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = gram.diagonal().map(|g| if g > 0.0 { g.sqrt().recip() } else { 0.0 });
     let scaling = DMatrix::from_diagonal(&scale);
@@ -219,7 +227,8 @@ pub(super) fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(&scaling * inverse * &scaling)
 }
 
-/// Minimiser of ‖J x − r‖, with columns of unit length and without directions of rounding.
+/// Returns the minimiser of ‖J x − r‖, with columns scaled to unit length and without directions
+/// that only rounding determines.
 fn least_squares(jacobian: DMatrix<f64>, residual: &DVector<f64>) -> Option<DVector<f64>> {
     let lengths: Vec<f64> =
         jacobian.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
@@ -235,8 +244,9 @@ fn least_squares(jacobian: DMatrix<f64>, residual: &DVector<f64>) -> Option<DVec
     Some(step)
 }
 
-/// Response of some modes in the channel where they are largest: amplitudes there and pole per sample.
-fn of_modes(
+/// Returns the channel in which the sum of some modes is largest, and the amplitude there and the
+/// pole per sample of each of them.
+fn reference_response(
     data: &Data,
     fit: &Fit,
     modes: &[usize],
@@ -245,21 +255,22 @@ fn of_modes(
     let complex = |channel: usize, mode: usize| {
         let (linear, pole) = (&fit.channels[channel].linear, &fit.poles[mode]);
         let amplitude = Complex::new(linear[2 * mode], -linear[2 * mode + 1]);
-        // Back to the first sample.
+        // Refers the amplitude to the first sample.
         let back = (-pole.growth * pole.origin(data.len()) as f64).exp();
         [amplitude * back, Complex::new(pole.growth, pole.turn)]
     };
     let size = |channel: &usize| {
-        let each = modes.iter().map(|mode| complex(*channel, *mode)[0]);
-        each.sum::<Complex<f64>>().norm() * scale[*channel]
+        let amplitudes = modes.iter().map(|mode| complex(*channel, *mode)[0]);
+        amplitudes.sum::<Complex<f64>>().norm() * scale[*channel]
     };
     let reference = (0..fit.channels.len()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
     (reference, modes.iter().map(|mode| complex(reference, *mode)).collect())
 }
 
-/// First estimate of the flow: the polynomials of an order that amplitude and phase of the linear modes follow best.
-fn first_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option<Flow> {
-    const PLACES: usize = 400;
+/// Returns the initial flow: polynomials of an order that fit the amplitude and phase rates of the
+/// linear modes best.
+fn initial_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option<Flow> {
+    const SAMPLES: usize = 400;
     let at = |k: f64| {
         let (mut value, mut slope) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
         for [amplitude, pole] in modes {
@@ -270,20 +281,20 @@ fn first_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option<F
         (value.norm(), slope / value * len as f64)
     };
     let (first, _) = at(0.0);
-    let places: Vec<(f64, Complex<f64>)> = (0..PLACES)
-        .map(|place| at(place as f64 / PLACES as f64 * len as f64))
+    let samples: Vec<(f64, Complex<f64>)> = (0..SAMPLES)
+        .map(|index| at(index as f64 / SAMPLES as f64 * len as f64))
         .map(|(size, rate)| (size / first, rate))
         .filter(|(u, rate)| *u > SMALLEST_AMPLITUDE && rate.is_finite())
         .collect();
     let powers = |u: f64, count: usize| (0..count).map(move |power| u.powi(power as i32));
     let polynomial = |count: usize, value: &dyn Fn(f64, Complex<f64>) -> f64| {
-        let rows = places.iter().flat_map(|(u, _)| powers(*u, count).map(move |x| x * *u));
-        let matrix = DMatrix::from_row_iterator(places.len(), count, rows);
+        let rows = samples.iter().flat_map(|(u, _)| powers(*u, count).map(move |x| x * *u));
+        let matrix = DMatrix::from_row_iterator(samples.len(), count, rows);
         let right = DVector::from_iterator(
-            places.len(),
-            places.iter().map(|(u, rate)| value(*u, *rate) * *u),
+            samples.len(),
+            samples.iter().map(|(u, rate)| value(*u, *rate) * *u),
         );
-        (places.len() > count).then(|| least_squares(matrix, &right)).flatten()
+        (samples.len() > count).then(|| least_squares(matrix, &right)).flatten()
     };
     let decay = polynomial(order + 1, &|u, rate| -rate.re * u)?;
     let turn = polynomial(order, &|_, rate| rate.im)?;
@@ -291,16 +302,17 @@ fn first_flow(modes: &[[Complex<f64>; 2]], len: usize, order: usize) -> Option<F
     Some(Flow { values: values.into(), order })
 }
 
-/// Returns the backbone of the strongest mode if it describes the record better than the linear modes near it, by the
-/// Bayesian information criterion; `energies` are those of the modes, `scale` is the unit of each channel of the data.
+/// Returns the backbone of the strongest mode if it describes the record better than the linear
+/// modes near it, by the Bayesian information criterion; `energies` are the energies of the modes,
+/// `scale` is the unit of each channel of the data.
 ///
-/// The modes nearest to the strongest one are replaced, one, two … of them, and the order of the polynomials rises
-/// from two.
+/// The modes nearest to the strongest one are replaced, one, two … of them, and the order of the
+/// polynomials rises from two.
 ///
 /// # Source
-/// Londoño, Neild & Cooper (2015), Journal of Sound and Vibration 339, 205–223 (backbones from resonant decays);
-/// Nayfeh & Mook, *Nonlinear Oscillations* (1979), chapter 2 (the slow flow); Schwarz (1978), Annals of Statistics 6,
-/// 461–464.
+/// Londoño, Neild & Cooper (2015), Journal of Sound and Vibration 339, 205–223 (backbones from
+/// resonant decays); Nayfeh & Mook, *Nonlinear Oscillations* (1979), chapter 2 (the slow flow);
+/// Schwarz (1978), Annals of Statistics 6, 461–464.
 pub(super) fn backbone(
     data: &Data,
     fit: &Fit,
@@ -310,27 +322,28 @@ pub(super) fn backbone(
 ) -> Option<Backbone> {
     let strongest = (0..energies.len()).max_by(|a, b| energies[*a].total_cmp(&energies[*b]))?;
     let turn = |mode: usize| fit.poles[mode].turn;
-    let apart = |mode: &usize| (turn(*mode) - turn(strongest)).abs();
+    let distance = |mode: &usize| (turn(*mode) - turn(strongest)).abs();
     let mut near: Vec<usize> =
-        (0..fit.poles.len()).filter(|m| apart(m) < NEIGHBOURHOOD * turn(strongest)).collect();
-    near.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+        (0..fit.poles.len()).filter(|m| distance(m) < NEIGHBOURHOOD * turn(strongest)).collect();
+    near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     let (len, channels) = (data.len() as f64, data.channels());
-    let of_linear: f64 = fit.channels.iter().map(|of| len * (of.square / len).ln()).sum();
+    let linear_cost: f64 = fit.channels.iter().map(|of| len * (of.square / len).ln()).sum();
     let mut best: Option<(f64, Backbone)> = None;
     for count in 1..=near.len() {
         let replaced = &near[..count];
         let target = Target::new(data, fit, replaced);
         let unknowns = (count * (2 + 2 * channels)) as f64;
-        let (reference, modes) = of_modes(data, fit, replaced, scale);
+        let (reference, modes) = reference_response(data, fit, replaced, scale);
         let mut last = f64::INFINITY;
         for order in LOWEST_ORDER..=HIGHEST_ORDER {
-            let Some(start) = first_flow(&modes, data.len(), order) else { break };
+            let Some(start) = initial_flow(&modes, data.len(), order) else { break };
             if count == 1 && !is_promising(&target, &start) {
                 break;
             }
             let Some(fitted) = target.settled(start) else { break };
-            let own = fitted.flow.values.len() + 2 * channels;
-            let gain = of_linear - target.cost(&fitted) + (unknowns - own as f64) * len.ln();
+            let flow_unknowns = fitted.flow.values.len() + 2 * channels;
+            let gain =
+                linear_cost - target.cost(&fitted) + (unknowns - flow_unknowns as f64) * len.ln();
             if -gain >= last {
                 break;
             }
@@ -339,28 +352,29 @@ pub(super) fn backbone(
                 && best.as_ref().is_none_or(|(most, _)| gain > *most)
                 && let Some(points) = points(&target, &fitted, (reference, scale[reference]), dt)
             {
-                let found = Backbone { modes: replaced.to_vec(), points, unknowns: own, gain };
-                best = Some((gain, found));
+                let candidate =
+                    Backbone { modes: replaced.to_vec(), points, unknowns: flow_unknowns, gain };
+                best = Some((gain, candidate));
             }
         }
     }
     best.map(|(_, backbone)| backbone)
 }
 
-/// Returns whether the first step from a linear mode promises to lower the criterion.
+/// Returns whether the first step from a linear mode is expected to lower the criterion.
 fn is_promising(target: &Target<'_>, start: &Flow) -> bool {
-    let of = || {
+    let expected_gain = || {
         let (fitted, jacobian) = (target.fitted(start.clone())?, target.jacobian(start)?);
         let step = least_squares(jacobian.clone(), &fitted.residual)?;
-        let left = (&fitted.residual - jacobian * step).norm_squared();
-        Some(fitted.residual.norm_squared() - left)
+        let remaining = (&fitted.residual - jacobian * step).norm_squared();
+        Some(fitted.residual.norm_squared() - remaining)
     };
     let penalty = (start.values.len() - 2) as f64 * (target.data.len() as f64).ln();
-    of().is_some_and(|gain: f64| gain > penalty)
+    expected_gain().is_some_and(|gain: f64| gain > penalty)
 }
 
-/// Returns frequency and damping from the first amplitude down to where the noise of the channel, or the end of the
-/// record, hides the mode.
+/// Returns frequency and damping from the first amplitude down to the noise of the channel or the
+/// amplitude at the end of the record.
 fn points(
     target: &Target<'_>,
     fitted: &Fitted,

@@ -16,7 +16,7 @@ pub enum FreeDecayError {
         /// Samples that can be fitted.
         most: usize,
     },
-    /// A channel does not move.
+    /// A channel is constant.
     #[error(
         "channel {} is constant at {}: a free decay needs channels that move",
         channel.saturating_add(1), message::number(*value)
@@ -86,15 +86,15 @@ pub enum FreeDecayError {
     Signal(#[from] mechid_signal::SignalError),
 }
 
-/// Returns decays without oscillation in words.
+/// Describes decays without oscillation in words.
 fn returns(rates: &[[f64; 2]]) -> String {
     let rounded = |value: f64, digits: usize| {
         let rounded = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
         message::number(rounded).to_string()
     };
-    let all =
+    let texts =
         rates.iter().map(|[rate, error]| format!("{} ± {}", rounded(*rate, 4), rounded(*error, 2)));
-    let list = message::list(all, " and ", 2);
+    let list = message::list(texts, " and ", 2);
     match rates.len() {
         1 => format!("a decay of {list} 1/s describes"),
         _ => format!("decays of {list} 1/s describe"),

@@ -16,22 +16,24 @@ use super::fit::{Data, Fit};
 use super::limits::{ESTIMATE_LAGS, LEAST_ONSET, ONSET_SHARE};
 use super::poles::{Pole, linear_columns};
 
-/// A mode of a free response.
+/// Mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayMode {
-    /// Pole and shape with their standard errors; the shape is that of the quantity measured, its largest
-    /// entry being 1.
+    /// Pole and shape with their standard errors; the shape is in the measured quantity, with its
+    /// largest entry 1.
     pub mode: IdentifiedMode,
     /// Amplitude at the first sample in the channel of largest shape, in the unit of the record.
     pub amplitude: Uncertain,
     /// Phase at the first sample in that channel, in rad: the response is A e^{σt} cos(ωt + φ).
     pub phase: f64,
-    /// Sum of the squares of this mode over that of all modes, summed over samples and channels; a ratio.
+    /// Ratio of the sum of squares of this mode to that of all modes, over all samples and
+    /// channels.
     pub energy_share: f64,
 }
 
 impl DecayMode {
-    /// Returns whether the response of the mode decays: the 95 % interval of its growth rate is below zero.
+    /// Returns whether the response of the mode decays: the 95 % interval of its growth rate is
+    /// below zero.
     pub fn decays(&self) -> bool {
         self.mode.growth_rate.interval(0.95).is_ok_and(|[_, high]| high < 0.0)
     }
@@ -44,30 +46,30 @@ pub struct DecayChannel {
     pub offset: f64,
     /// Standard deviation of the residual, in the unit of the record.
     pub noise: f64,
-    /// Order of the autoregression that the noise follows: 0 for white noise.
+    /// Order of the autoregression of the noise: 0 for white noise.
     pub noise_order: usize,
     /// Share of the variance of the channel that the modes explain, a ratio.
     pub explained: f64,
-    /// Autocorrelation of the residual that the autoregression leaves.
+    /// Autocorrelation of the residual after whitening by the autoregression.
     pub whiteness: Correlation,
     /// Residual of the first samples, where a force may still act.
     pub onset: Onset,
 }
 
-/// Residual of the first samples against that of the others.
+/// Comparison of the residual in the first samples with the residual in the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
     /// Number of the first samples.
     pub samples: usize,
-    /// Mean square of their residual over that of the others, a ratio.
+    /// Ratio of the mean square of their residual to that of the others.
     pub ratio: f64,
     /// Probability that noise has a larger ratio, a pure number.
     pub p_value: f64,
 }
 
 impl Onset {
-    /// Tests a residual that should be white.
-    fn of(residual: &[f64]) -> Self {
+    /// Tests the first samples of a residual that should be white.
+    fn new(residual: &[f64]) -> Self {
         let samples = (residual.len() / ONSET_SHARE).max(LEAST_ONSET).min(residual.len() / 2);
         let (first, others) = residual.split_at(samples);
         let mean_square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64;
@@ -78,7 +80,7 @@ impl Onset {
     }
 }
 
-/// Modes found in a free response.
+/// Modes identified from a free response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeDecayEstimate {
     modes: Vec<DecayMode>,
@@ -90,75 +92,78 @@ pub struct FreeDecayEstimate {
 }
 
 impl FreeDecayEstimate {
-    /// Frequency and damping over amplitude of the strongest mode, where they change with it; `None` of a response that
-    /// linear modes describe better.
+    /// Returns frequency and damping over amplitude of the strongest mode; `None` if linear modes
+    /// describe the response better.
     pub fn backbone(&self) -> Option<&Backbone> {
         self.backbone.as_ref()
     }
 
-    /// Sample, counted from 0, at which the response is excited again; `None` if it is not.
+    /// Returns the sample, counted from 0, at which the response is excited again; `None` if it is
+    /// not.
     pub fn restart(&self) -> Option<usize> {
         self.restart
     }
 
-    /// The same, excited again at a sample, unless its strongest mode is not linear.
+    /// Sets the sample of a second excitation; ignored if the strongest mode is nonlinear, which
+    /// explains the same residual.
     pub(super) fn with_restart(self, restart: Option<usize>) -> Self {
         Self { restart: restart.filter(|_| self.backbone.is_none()), ..self }
     }
 
-    /// The modes by rising frequency.
+    /// Returns the modes by rising frequency.
     pub fn modes(&self) -> &[DecayMode] {
         &self.modes
     }
 
-    /// The fit of each channel.
+    /// Returns the fit of each channel.
     pub fn channels(&self) -> &[DecayChannel] {
         &self.channels
     }
 
-    /// The response of all modes with the constants, samples × channels in the unit of the record.
+    /// Returns the response of all modes with the constants, samples × channels in the unit of the
+    /// record.
     pub fn fitted(&self) -> &Record {
         &self.fitted
     }
 
-    /// Number of samples of all channels less the number of unknowns.
+    /// Returns the number of samples of all channels minus the number of unknowns.
     pub fn degrees_of_freedom(&self) -> usize {
         self.degrees_of_freedom
     }
 }
 
-/// Covariance of what a fit found.
+/// Covariance of the unknowns of a fit.
 struct Spread<'a> {
     fit: &'a Fit,
     /// Covariance of growth and turn of each pole, times N².
     poles: DMatrix<f64>,
-    /// Of each channel, derivatives of the linear unknowns with respect to those.
+    /// Derivatives of the linear unknowns of each channel with respect to the poles.
     slopes: Vec<DMatrix<f64>>,
-    /// Of each channel, (R⁻¹R⁻ᵀ) s² of the linear unknowns for poles that are known.
+    /// Covariance (R⁻¹R⁻ᵀ) s² of the linear unknowns of each channel for known poles.
     linear: Vec<DMatrix<f64>>,
     degrees_of_freedom: usize,
 }
 
 impl<'a> Spread<'a> {
-    fn of(data: &Data, fit: &'a Fit) -> Option<Self> {
+    fn new(data: &Data, fit: &'a Fit) -> Option<Self> {
         let nonlinear = 2 * fit.poles.len();
         let linear = linear_columns(&fit.poles, data.constant);
         let (mut freedom, mut stacked) = (0.0, DMatrix::zeros(0, nonlinear));
-        let (mut slopes, mut own) = (Vec::new(), Vec::new());
+        let (mut slopes, mut known_poles) = (Vec::new(), Vec::new());
         for (of, noise) in fit.channels.iter().zip(&fit.noise) {
             let used = (linear + noise.order()) as f64 + nonlinear as f64 / data.channels() as f64;
-            let left = data.len() as f64 - used;
-            if left < 1.0 {
+            let degrees = data.len() as f64 - used;
+            if degrees < 1.0 {
                 return None;
             }
-            freedom += left;
-            let deviation = (of.square / left).sqrt();
+            freedom += degrees;
+            let deviation = (of.square / degrees).sqrt();
             let rows = stacked.nrows();
             stacked = stacked.resize_vertically(rows + nonlinear, 0.0);
             stacked.rows_mut(rows, nonlinear).copy_from(&(&of.across / deviation));
-            slopes.push(-of.own.solve_upper_triangular(&of.along)?);
-            let inverse = of.own.solve_upper_triangular(&DMatrix::identity(linear, linear))?;
-            own.push(&inverse * inverse.transpose() * (deviation * deviation));
+            slopes.push(-of.factor.solve_upper_triangular(&of.along)?);
+            let inverse = of.factor.solve_upper_triangular(&DMatrix::identity(linear, linear))?;
+            known_poles.push(&inverse * inverse.transpose() * (deviation * deviation));
         }
         let upper = stacked.qr().unpack_r();
         let inverse = upper.solve_upper_triangular(&DMatrix::identity(nonlinear, nonlinear))?;
@@ -168,7 +173,7 @@ impl<'a> Spread<'a> {
             fit,
             poles,
             slopes,
-            linear: own,
+            linear: known_poles,
             degrees_of_freedom: freedom as usize,
         })
     }
@@ -179,11 +184,11 @@ impl<'a> Spread<'a> {
         Uncertain { value, standard_error, degrees_of_freedom }
     }
 
-    /// Variance of Re Σ w_c A_c, A_c being the complex amplitude of a mode in channel c, relative to its
-    /// origin.
+    /// Variance of Re Σ w_c A_c, A_c being the complex amplitude of a mode in channel c, relative
+    /// to its origin.
     fn variance(&self, mode: usize, weights: &[(usize, Complex<f64>)]) -> f64 {
         let mut through_poles = DVector::zeros(self.poles.nrows());
-        let mut own = 0.0;
+        let mut variance = 0.0;
         for (channel, weight) in weights {
             // A = a − i b.
             let (cos, sin) = (weight.re, weight.im);
@@ -191,9 +196,9 @@ impl<'a> Spread<'a> {
             through_poles += slopes.row(2 * mode).transpose() * cos;
             through_poles += slopes.row(2 * mode + 1).transpose() * sin;
             let c = self.linear[*channel].view((2 * mode, 2 * mode), (2, 2));
-            own += cos * cos * c[(0, 0)] + 2.0 * cos * sin * c[(0, 1)] + sin * sin * c[(1, 1)];
+            variance += cos * cos * c[(0, 0)] + 2.0 * cos * sin * c[(0, 1)] + sin * sin * c[(1, 1)];
         }
-        own + through_poles.dot(&(&self.poles * &through_poles))
+        variance + through_poles.dot(&(&self.poles * &through_poles))
     }
 
     /// Complex amplitude of a mode in a channel, relative to its origin.
@@ -203,15 +208,15 @@ impl<'a> Spread<'a> {
     }
 }
 
-/// Returns modes and channels of a fit; `scale` is the unit of each channel of the data in that of the record.
-/// `None` if the fit says nothing of some unknown.
+/// Returns modes and channels of a fit; `scale` is the unit of each channel of the data, in the
+/// unit of the record. `None` if the fit does not determine some unknown.
 pub(super) fn estimate(
     record: &Record,
     data: &Data,
     fit: &Fit,
     scale: &[f64],
 ) -> Option<Result<FreeDecayEstimate, FreeDecayError>> {
-    let spread = Spread::of(data, fit)?;
+    let spread = Spread::new(data, fit)?;
     // Squares of the unit itself may be beyond the largest number.
     let unit = scale.iter().copied().fold(0.0, f64::max);
     let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
@@ -340,6 +345,6 @@ fn channel(
         // Channels have unit variance.
         explained: 1.0 - square / len,
         whiteness: whiteness(&white, lags)?,
-        onset: Onset::of(&white),
+        onset: Onset::new(&white),
     })
 }

@@ -1,4 +1,5 @@
-//! The poles that make a record most likely, their number and the colour of the noise being given.
+//! Maximum-likelihood poles of a record for a given number of poles and a given autoregression of
+//! the noise.
 
 use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DMatrixView, DVector};
@@ -7,7 +8,8 @@ use super::autoregression::Autoregression;
 use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING};
 use super::poles::{Pole, columns, linear_columns};
 
-/// Samples × channels, each of unit RMS about its mean, and whether each has a constant.
+/// Samples × channels, each scaled to unit RMS about its mean; `constant` states whether each has a
+/// constant.
 #[derive(Debug)]
 pub(super) struct Data {
     pub samples: DMatrix<f64>,
@@ -20,25 +22,25 @@ pub(super) struct Fit {
     pub poles: Vec<Pole>,
     /// Noise of each channel.
     pub noise: Vec<Autoregression>,
-    /// What follows from the poles for each channel.
+    /// Fit of each channel for these poles.
     pub channels: Vec<ChannelFit>,
 }
 
-/// Linear unknowns of a channel, and what the record says of the poles through it.
+/// Linear unknowns of a channel, and its contribution to the normal equations of the poles.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelFit {
     /// Amplitudes of cosine and sine of each pole, then the constant.
     pub linear: DVector<f64>,
     /// Sum of squares of the whitened residual.
     pub square: f64,
-    /// Triangle of the linear columns.
-    pub own: DMatrix<f64>,
-    /// Derivatives with respect to growth and turn of each pole, times the samples: their part along the
-    /// linear columns …
+    /// Triangular factor of the linear columns.
+    pub factor: DMatrix<f64>,
+    /// Derivatives with respect to growth and turn of each pole, times N: the part in the space of
+    /// the linear columns.
     pub along: DMatrix<f64>,
-    /// … and across.
+    /// Part of the derivatives orthogonal to the linear columns.
     pub across: DMatrix<f64>,
-    /// Residual along those derivatives.
+    /// Residual in the directions of the derivatives.
     pub side: DVector<f64>,
 }
 
@@ -51,7 +53,7 @@ impl Data {
         self.samples.ncols()
     }
 
-    /// Columns of poles, some rows at a time.
+    /// Returns the columns of poles in blocks of rows.
     pub(super) fn chunks(&self, poles: &[Pole]) -> impl Iterator<Item = DMatrix<f64>> {
         let chunk = |first: usize| {
             let end = self.len().min(first + POLE_CHUNK);
@@ -60,7 +62,7 @@ impl Data {
         (0..self.len()).step_by(POLE_CHUNK).map(chunk)
     }
 
-    /// Residual of each channel, samples × channels.
+    /// Returns the residual of each channel, samples × channels.
     pub(super) fn residual(&self, fit: &Fit) -> DMatrix<f64> {
         let mut residual = self.samples.clone();
         let linear = linear_columns(&fit.poles, self.constant);
@@ -73,7 +75,8 @@ impl Data {
         residual
     }
 
-    /// Triangle of \[linear columns | those times k/N | channels\] after whitening.
+    /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
+    /// after whitening.
     fn triangle(
         &self,
         poles: &[Pole],
@@ -87,9 +90,10 @@ impl Data {
             let before = noise.order().min(first);
             let basis = columns(poles, self.constant, first - before, end, self.len());
             let rows = first - before..end;
-            let own = channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
+            let samples =
+                channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
             let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
-            parts.extend(own);
+            parts.extend(samples);
             let white: Vec<DMatrix<f64>>;
             if noise.order() > 0 {
                 white =
@@ -103,7 +107,8 @@ impl Data {
         Some(factor.r().clone())
     }
 
-    /// `None` where the poles are impossible or too near to one another.
+    /// Solves for the linear unknowns; `None` if the poles are impossible or too close to one
+    /// another.
     fn at(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Fit> {
         if !poles.iter().all(|pole| pole.is_possible(self.len())) {
             return None;
@@ -111,29 +116,30 @@ impl Data {
         let (linear, nonlinear) = (linear_columns(poles, self.constant), 2 * poles.len());
         let mut fits: Vec<Option<ChannelFit>> = vec![None; self.channels()];
         while let Some(first) = fits.iter().position(Option::is_none) {
-            // Channels of white noise share their columns.
+            // Channels with white noise have the same columns: one factorisation serves all of
+            // them.
             let shared = |c: &usize| *c == first || noise[*c].order() + noise[first].order() == 0;
             let group: Vec<usize> =
                 (first..self.channels()).filter(|c| fits[*c].is_none()).filter(shared).collect();
             let upper = self.triangle(poles, &noise[first], &group)?;
-            let own = upper.view((0, 0), (linear, linear)).into_owned();
-            for (place, channel) in group.into_iter().enumerate() {
-                let column = upper.column(linear + nonlinear + place);
+            let factor = upper.view((0, 0), (linear, linear)).into_owned();
+            for (index, channel) in group.into_iter().enumerate() {
+                let column = upper.column(linear + nonlinear + index);
                 let right = column.rows(0, linear).into_owned();
-                let solved = own.solve_upper_triangular(&right)?;
+                let solved = factor.solve_upper_triangular(&right)?;
                 if solved.iter().any(|v| !v.is_finite()) {
                     return None;
                 }
-                let turned = slopes(&solved, nonlinear);
+                let combination = slopes(&solved, nonlinear);
                 let square = column.rows_range(linear..).norm_squared();
                 let floor = (POLE_ROUNDING * POLE_ROUNDING) * self.len() as f64;
                 fits[channel] = Some(ChannelFit {
                     square: square + floor,
-                    along: upper.view((0, linear), (linear, nonlinear)) * &turned,
-                    across: upper.view((linear, linear), (nonlinear, nonlinear)) * &turned,
+                    along: upper.view((0, linear), (linear, nonlinear)) * &combination,
+                    across: upper.view((linear, linear), (nonlinear, nonlinear)) * &combination,
                     side: column.rows(linear, nonlinear).into_owned(),
                     linear: solved,
-                    own: own.clone(),
+                    factor: factor.clone(),
                 });
             }
         }
@@ -141,12 +147,12 @@ impl Data {
         Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
     }
 
-    /// Searches the most likely poles from a start, the colour of the noise being given, until a step
-    /// decreases minus twice the log likelihood by less than `tolerance`.
+    /// Searches the maximum-likelihood poles from initial poles for given noise, until a step
+    /// decreases minus twice the log-likelihood by less than `tolerance`.
     ///
     /// # Source
-    /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of Kaufman
-    /// (1975), BIT 15, 49–57; damping after Levenberg and Marquardt.
+    /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of
+    /// Kaufman (1975), BIT 15, 49–57; damping after Levenberg and Marquardt.
     pub(super) fn refined(
         &self,
         poles: &[Pole],
@@ -154,7 +160,7 @@ impl Data {
         tolerance: f64,
     ) -> Option<Fit> {
         let mut fit = self.at(poles, noise)?;
-        let mut cost = fit.misfit(self.len());
+        let mut cost = fit.cost(self.len());
         let mut damping = 0.0;
         for _ in 0..MAX_STEPS {
             let (jacobian, side) = fit.weighted(self.len());
@@ -164,8 +170,8 @@ impl Data {
                 jacobian[(i, j)] / scale[j]
             });
             loop {
-                let (step, promised) = damped_step(&scaled, &side, damping)?;
-                if promised < tolerance || damping > MAX_DAMPING {
+                let (step, expected) = damped_step(&scaled, &side, damping)?;
+                if expected < tolerance || damping > MAX_DAMPING {
                     return Some(fit);
                 }
                 let moved = fit.poles.iter().enumerate().map(|(at, pole)| Pole {
@@ -174,7 +180,7 @@ impl Data {
                 });
                 let moved: Vec<Pole> = moved.collect();
                 let trial = self.at(&moved, noise);
-                let trial = trial.map(|trial| (trial.misfit(self.len()), trial));
+                let trial = trial.map(|trial| (trial.cost(self.len()), trial));
                 if let Some((less, trial)) = trial.filter(|(less, _)| *less < cost) {
                     let gained = cost - less;
                     (fit, cost) = (trial, less);
@@ -192,14 +198,16 @@ impl Data {
 }
 
 impl Fit {
-    /// Minus twice the log likelihood, but for a constant; the levels of the noise are the most likely ones.
-    pub(super) fn misfit(&self, len: usize) -> f64 {
+    /// Returns minus twice the log-likelihood, without constants, at the maximum-likelihood noise
+    /// levels.
+    pub(super) fn cost(&self, len: usize) -> f64 {
         let level = |of: &ChannelFit| len as f64 * (of.square / len as f64).ln();
         self.channels.iter().map(level).sum::<f64>()
             + self.noise.iter().map(Autoregression::log_volume).sum::<f64>()
     }
 
-    /// Derivatives with respect to the poles and residual of all channels, over the deviation of the noise.
+    /// Returns derivatives with respect to the poles and residual of all channels, divided by the
+    /// standard deviation of the noise.
     fn weighted(&self, len: usize) -> (DMatrix<f64>, DVector<f64>) {
         let columns = 2 * self.poles.len();
         let mut jacobian = DMatrix::zeros(columns * self.channels.len(), columns);
@@ -213,7 +221,8 @@ impl Fit {
     }
 }
 
-/// Prediction errors of columns from row `before` on; the first row is sample `first` of the record.
+/// Returns the prediction errors of columns from row `before` on; the first row is sample `first`
+/// of the record.
 fn whitened(
     noise: &Autoregression,
     columns: &DMatrixView<'_, f64>,
@@ -227,8 +236,8 @@ fn whitened(
     white
 }
 
-/// Matrix that makes of the columns times k/N the derivatives of a channel with respect to growth and turn
-/// of each pole, times N.
+/// Returns the matrix that combines the columns times k/N to the derivatives of a channel with
+/// respect to growth and turn of each pole, times N.
 fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
     let mut slopes = DMatrix::zeros(nonlinear, nonlinear);
     for at in (0..nonlinear).step_by(2) {
@@ -241,7 +250,7 @@ fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
     slopes
 }
 
-/// The minimiser y of ‖J y − r‖² + damping·‖y‖² and the decrease of ‖J y − r‖² that it promises.
+/// Returns the minimiser y of ‖J y − r‖² + damping·‖y‖² and the expected decrease of ‖J y − r‖².
 fn damped_step(
     jacobian: &DMatrix<f64>,
     side: &DVector<f64>,
@@ -251,13 +260,13 @@ fn damped_step(
     let mut stacked = DMatrix::zeros(rows + columns, columns + 1);
     stacked.view_mut((0, 0), (rows, columns)).copy_from(jacobian);
     stacked.view_mut((0, columns), (rows, 1)).copy_from(side);
-    // A little keeps the diagonal away from zero.
+    // A minimum damping keeps the diagonal away from zero.
     for j in 0..columns {
         stacked[(rows + j, j)] = damping.max(1e-14).sqrt();
     }
     let upper = stacked.qr().unpack_r();
     let right = upper.column(columns).rows(0, columns).into_owned();
     let step = upper.view((0, 0), (columns, columns)).solve_upper_triangular(&right)?;
-    let promised = side.norm_squared() - (side - jacobian * &step).norm_squared();
-    step.iter().all(|v| v.is_finite()).then_some((step, promised))
+    let expected = side.norm_squared() - (side - jacobian * &step).norm_squared();
+    step.iter().all(|v| v.is_finite()).then_some((step, expected))
 }

@@ -1,4 +1,4 @@
-//! Poles from which a search starts.
+//! Initial poles of a search.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,8 +12,8 @@ use super::limits::{
 };
 use super::poles::{Pole, turns};
 
-/// The decay that a residual of unit variance (samples × channels) holds most of: the peak of the matched
-/// filters of a number of decays.
+/// Returns the strongest decay in a residual of unit variance (samples × channels): the peak of
+/// matched filters with several decay rates.
 pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
     let len = residual.nrows();
     let padded = 2 * len.next_power_of_two();
@@ -47,8 +47,8 @@ pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
     best.map(|(_, pole)| pole.possible(len))
 }
 
-/// What a record says of the poles of any number of decays: the vectors that span its Hankel matrix, the
-/// strongest first.
+/// Principal directions of the Hankel matrix of a record, strongest first; they give the poles of
+/// any number of decays.
 #[derive(Debug)]
 pub(super) struct Subspace {
     vectors: DMatrix<f64>,
@@ -59,12 +59,12 @@ pub(super) struct Subspace {
 }
 
 impl Subspace {
-    /// Decomposes the Hankel matrix of samples × channels whose noise has about the same level in all
-    /// channels; `None` of a record too short for it or of too many channels.
+    /// Decomposes the Hankel matrix of samples × channels whose noise has about the same level in
+    /// all channels; `None` if the record is too short or has too many channels.
     ///
-    /// The matrix has at most [`HANKEL_ROWS`] rows and its products alone are held. A record with nothing
-    /// but low frequencies is read at a lower rate.
-    pub(super) fn of(samples: &DMatrix<f64>) -> Option<Self> {
+    /// The matrix has at most [`HANKEL_ROWS`] rows, and only its products are stored. A record with
+    /// only low frequencies is decimated.
+    pub(super) fn new(samples: &DMatrix<f64>) -> Option<Self> {
         let (len, channels) = samples.shape();
         let rows = (HANKEL_ROWS / channels).min(len / 3);
         let stride = stride(samples)?.min(len / (3 * rows.max(1))).max(1);
@@ -79,7 +79,7 @@ impl Subspace {
                 let sum = |i: usize, j: usize, from: usize, count: usize| {
                     x.rows(i * stride + from, count).dot(&y.rows(j * stride + from, count))
                 };
-                // Along a diagonal the sums move on by one stride.
+                // Along a diagonal the range of each sum moves by one stride.
                 for diagonal in 0..rows {
                     for (i0, j0) in [(diagonal, 0), (0, diagonal)] {
                         let mut value = sum(i0, j0, 0, columns);
@@ -102,11 +102,11 @@ impl Subspace {
         Some(Self { vectors, channels, stride, len })
     }
 
-    /// Poles of so many decays; fewer where real numbers are among them.
+    /// Returns the poles of a number of decays; fewer if some eigenvalues are real.
     ///
     /// # Source
-    /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Roy & Kailath (1989),
-    /// IEEE Transactions on Acoustics, Speech, and Signal Processing 37, 984–995.
+    /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Roy & Kailath
+    /// (1989), IEEE Transactions on Acoustics, Speech, and Signal Processing 37, 984–995.
     pub(super) fn poles(&self, decays: usize) -> Vec<Pole> {
         let rows = self.vectors.nrows() / self.channels;
         let order = 2 * decays;
@@ -132,7 +132,8 @@ impl Subspace {
     }
 }
 
-/// Samples to step on by, so that hardly any power is above half the rate; a power of two.
+/// Returns the stride of a decimation, a power of two, for which hardly any power is above half the
+/// sampling rate.
 fn stride(samples: &DMatrix<f64>) -> Option<usize> {
     let len = samples.nrows();
     let plan = transform::forward(len);

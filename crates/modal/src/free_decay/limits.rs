@@ -1,54 +1,58 @@
-//! Limits that decide something in this crate, each with what happens on either side.
+//! Limits of the identification of free decays, each with the effect of values on either side.
 
-/// Largest order that is tried.
+/// Maximum order of an autoregression.
 pub(crate) const MOST_ORDER: usize = 20;
 
-/// Samples that each order needs.
+/// Minimum number of samples per order of an autoregression.
 pub(crate) const SAMPLES_PER_ORDER: usize = 20;
 
-/// Lags over which a residual is tested for being white.
+/// Number of lags in the whiteness test of a residual.
 pub(crate) const ESTIMATE_LAGS: usize = 20;
 
-/// Number of samples over that of the first ones, which are compared with the others.
+/// Ratio of the length of a record to the length of its onset, whose residual is compared with the
+/// others.
 pub(crate) const ONSET_SHARE: usize = 50;
 
-/// Least number of first samples.
+/// Minimum number of samples of the onset.
 pub(crate) const LEAST_ONSET: usize = 10;
 
-/// Rows made at a time.
+/// Number of rows of a block of columns: bounds the memory.
 pub(crate) const POLE_CHUNK: usize = 4096;
 
-/// Steps of a search.
+/// Maximum number of steps of a search.
 pub(crate) const MAX_STEPS: usize = 50;
 
-/// Decrease of minus twice the log likelihood that ends the last search …
+/// Decrease of minus twice the log-likelihood that ends the last search.
 pub(crate) const FINE: f64 = 1e-7;
 
-/// … and one of those that compare numbers of modes.
+/// Decrease of minus twice the log-likelihood that ends a search in the comparison of numbers of
+/// modes.
 pub(crate) const COARSE: f64 = 1e-2;
 
-/// Damping at which no descent is to be had.
+/// Damping above which a search ends: no step lowers the cost.
 pub(crate) const MAX_DAMPING: f64 = 1e8;
 
-/// Residual over the RMS of a channel below which it is rounding.
+/// Residual of rounding, relative to the RMS of a channel.
 pub(crate) const POLE_ROUNDING: f64 = 1e-12;
 
-/// Largest number of modes that are fitted.
+/// Maximum number of modes.
 pub(crate) const MOST_MODES: usize = 40;
 
-/// Samples that each of the poles needs.
+/// Minimum number of samples per mode.
 pub(crate) const SAMPLES_PER_MODE: usize = 12;
 
-/// Largest number of samples that are fitted.
+/// Maximum number of samples.
 pub(crate) const MOST_SAMPLES: usize = 1 << 18;
 
-/// Standard errors by which a growth rate above zero is no scatter.
+/// Minimum ratio of a growth rate to its standard error that is not scatter.
 pub(crate) const FREE_DECAY_SURE: f64 = 4.0;
 
-/// Growth over the record from which on a mode is written from its end backwards.
+/// Growth over the record, in nepers, above which the amplitude of a mode refers to the last
+/// sample: avoids an overflow.
 pub(crate) const FROM_THE_END: f64 = 3.0;
 
-/// Samples after which an exponential is computed afresh, not from the sample before.
+/// Number of samples after which an exponential is computed directly instead of from the sample
+/// before: limits rounding errors.
 pub(crate) const POLE_AFRESH: usize = 32;
 
 /// Fastest decay, in nepers per sample.
@@ -63,56 +67,62 @@ pub(crate) const MOST_DAMPING: f64 = 0.9;
 /// Highest frequency over half the sampling rate.
 pub(crate) const POLE_HIGHEST: f64 = 0.98;
 
-/// Probability that noise alone gains as much as a further decay must.
+/// Probability that noise alone gains as much as is required of a further decay.
 pub(crate) const FALSE_DECAY: f64 = 1e-3;
 
-/// Numbers of decays that may gain nothing before the search for more ends.
+/// Number of successive decays without gain that ends the search for more.
 pub(crate) const SELECTION_PATIENCE: usize = 2;
 
-/// Rounds in which the colour of the noise and the poles follow one another.
+/// Maximum number of alternate estimates of the noise colour and the poles.
 pub(crate) const COLOUR_ROUNDS: usize = 3;
 
-/// Rows of the Hankel matrix, whatever the number of samples.
+/// Maximum number of rows of the Hankel matrix, for any number of samples.
 pub(crate) const HANKEL_ROWS: usize = 160;
 
-/// Share of the power that may lie above half the rate at which the Hankel matrix is read.
+/// Maximum share of the power above half the decimated sampling rate of the Hankel matrix.
 pub(crate) const INITIAL_ALIASED: f64 = 0.01;
 
-/// Decays over the record that a peak is looked for with, in nepers; each is that much faster than the
-/// last.
+/// Slowest decay of the matched filters over the record, in nepers, and the ratio of each decay to
+/// the one before.
 pub(crate) const FIRST_DECAY: f64 = 2.0;
 pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
-/// Growth over the record that a peak is looked for with, in nepers.
+/// Growth of the matched filter of a growing response over the record, in nepers.
 pub(crate) const INITIAL_GROWTH: f64 = 6.0;
 
-/// Lowest and highest order of the polynomials of a backbone: the lowest has linear and quadratic damping; beyond the
-/// highest, terms are not told apart over the range of one decay.
+/// Lowest and highest order of the polynomials of a backbone: the lowest has linear and quadratic
+/// damping; above the highest, the range of one decay does not determine the terms.
 pub(crate) const LOWEST_ORDER: usize = 2;
 pub(crate) const HIGHEST_ORDER: usize = 6;
 
-/// Gauss–Newton steps of a backbone at most.
+/// Maximum number of Gauss–Newton steps of a backbone.
 pub(crate) const BACKBONE_STEPS: usize = 20;
 
 /// Number of amplitudes at which a backbone is reported.
 pub(crate) const BACKBONE_POINTS: usize = 8;
 
-/// Distance from the strongest mode, over its frequency, within which modes may stand for it: harmonics lie beyond.
+/// Relative distance from the frequency of the strongest mode within which other linear modes may
+/// represent the same nonlinear mode; its harmonics are farther away.
 pub(crate) const NEIGHBOURHOOD: f64 = 0.5;
 
-/// Amplitude over the first below which the first estimate of a backbone takes no value: there the noise decides.
+/// Minimum amplitude, relative to the first, of the data for the initial estimate of a backbone:
+/// noise dominates below it.
 pub(crate) const SMALLEST_AMPLITUDE: f64 = 1e-3;
 
-/// Nepers over the record that a return without oscillation has at least: less is a drift.
+/// Minimum decay of a response without oscillation over the record, in nepers; a slower one is
+/// drift.
 pub(crate) const SLOWEST_RETURN: f64 = 1.0;
 
-/// Rounds in which the rates of a return without oscillation are refined, each by as much or half as much as the last.
+/// Number of refinements of the rates of decays without oscillation; each step equals the last or
+/// half of it.
 pub(crate) const RATE_REFINEMENTS: usize = 40;
 
-/// Number of places of the record at which a second excitation is looked for, and again near the best one.
+/// Number of samples at which a second excitation is tested, over the record and again near the
+/// best of them.
 pub(crate) const RESTART_PLACES: usize = 64;
 
-/// Decrease of the Bayesian information criterion from which a backbone takes the place of linear modes: very strong
-/// evidence after Kass & Raftery (1995), Journal of the American Statistical Association 90, 773–795. Close modes of one
-/// channel can be as well described by either.
+/// Minimum decrease of the Bayesian information criterion at which a backbone replaces linear
+/// modes: very strong evidence according to Kass & Raftery (1995), Journal of the American
+/// Statistical Association 90, 773–795. Close linear modes in one channel may be described equally
+/// well by a backbone.
 pub(crate) const STRONG_EVIDENCE: f64 = 10.0;

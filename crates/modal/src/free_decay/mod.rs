@@ -31,32 +31,33 @@ use self::select::Search;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct FreeDecay {
-    /// Number of modes; `None`: as many as the record shows.
+    /// Number of modes; `None`: chosen by the likelihood.
     pub modes: Option<usize>,
-    /// Largest number of modes to look for where the number is not given.
+    /// Maximum number of modes if the number is not given.
     pub max_modes: usize,
     /// `true` if each channel has an unknown constant.
     pub offset: bool,
 }
 
 impl Default for FreeDecay {
-    /// As many modes as the record shows, at most ten, and a constant in each channel.
+    /// Chooses up to ten modes by the likelihood, with a constant in each channel.
     fn default() -> Self {
         Self { modes: None, max_modes: 10, offset: true }
     }
 }
 
-/// Finds the modes in a free response: sums of decaying oscillations and noise, samples × channels of one
-/// quantity in any unit.
+/// Identifies the modes of a free response, a sum of decaying oscillations and noise, samples ×
+/// channels of one quantity in any unit.
 ///
-/// The modes of all channels share their poles; shapes and constants follow linearly from them. Each channel
-/// has noise of its own level and, where the residual is coloured, of its own colour (an autoregression). Poles,
-/// levels and colours are those of maximum likelihood, and the standard errors those that belong to it.
-/// A further mode must make the record so much more likely as noise does with a probability of 0.1 %.
-/// Searches start from the Hankel matrix of the record and from the strongest decay in the residual.
+/// The modes of all channels share their poles; shapes and constants follow linearly from them.
+/// Each channel has its own noise level and, if its residual is coloured, its own autoregression.
+/// Poles, noise levels and autoregressions are maximum-likelihood estimates with the corresponding
+/// standard errors. A further mode must raise the likelihood by more than noise alone does with a
+/// probability of 0.1 %. Searches start from the Hankel matrix of the record and from the strongest
+/// decay in the residual.
 ///
-/// Modes that do not oscillate (overdamped ones) are not part of the model. The memory needed is a few times
-/// that of the record.
+/// Modes that do not oscillate (overdamped ones) are not part of the model. The memory needed is a
+/// few times the size of the record.
 ///
 /// ```
 /// use mechid_modal::free_decay::{FreeDecay, free_decay};
@@ -70,8 +71,8 @@ impl Default for FreeDecay {
 /// let record = Record::from_channels(sampling, &channels)?;
 /// let measured = noise::add_white(&record, NoiseLevel::FractionOfRms(0.02), 1)?;
 ///
-/// let found = free_decay(&measured, &FreeDecay::default())?;
-/// let [mode] = found.modes() else { panic!("{} modes", found.modes().len()) };
+/// let estimate = free_decay(&measured, &FreeDecay::default())?;
+/// let [mode] = estimate.modes() else { panic!("{} modes", estimate.modes().len()) };
 /// let [low, high] = mode.mode.natural_frequency_hz.interval(0.99)?;
 /// assert!(low < 5.0 && 5.0 < high && high - low < 0.01);
 /// assert!((mode.mode.mode.shape()[1].re + 0.5).abs() < 0.01);
@@ -79,32 +80,24 @@ impl Default for FreeDecay {
 /// ```
 ///
 /// # Errors
-/// [`FreeDecayError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`],
-/// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than can be fitted,
-/// [`FreeDecayError::NoOscillation`] if decays without oscillation describe it better,
-/// [`FreeDecayError::NoDecay`] if no oscillation stands out of the noise, [`FreeDecayError::Grows`] if most of
-/// the response grows, [`FreeDecayError::NotConverged`] if so many modes cannot be told apart.
+/// [`FreeDecayError::SilentChannel`] if a channel is constant, [`SignalError::TooShort`],
+/// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than
+/// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe it
+/// better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
+/// [`FreeDecayError::Grows`] if most of the response grows, [`FreeDecayError::NotConverged`] if the
+/// record does not determine as many modes.
 ///
 /// # Source
-/// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627 (the start); Golub & Pereyra
-/// (1973), SIAM Journal on Numerical Analysis 10, 413–432 (separable least squares); Davies (1987), Biometrika
-/// 74, 33–43 (tests where a parameter exists under the alternative only).
+/// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627 (initial poles);
+/// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432 (separable least
+/// squares); Davies (1987), Biometrika 74, 33–43 (tests where a parameter exists under the
+/// alternative only).
 pub fn free_decay(
     record: &Record,
     settings: &FreeDecay,
 ) -> Result<FreeDecayEstimate, FreeDecayError> {
-    let asked = settings.modes.unwrap_or(settings.max_modes);
-    if asked == 0 || asked > MOST_MODES {
-        return Err(FreeDecayError::NumberOfModes { modes: asked, most: MOST_MODES });
-    }
-    let (samples, most) = (record.len(), MOST_SAMPLES);
-    if samples > most {
-        return Err(FreeDecayError::TooLong { samples, most });
-    }
-    let needed = SAMPLES_PER_MODE * settings.modes.unwrap_or(1) + usize::from(settings.offset);
-    if samples < needed {
-        return Err(SignalError::TooShort { samples, needed }.into());
-    }
+    let asked = checked_number_of_modes(record, settings)?;
+    let samples = record.len();
     let units = units(record)?;
     let scaled = |k: usize, c: usize| record.channel(c)[k] / units[c][0] / units[c][1];
     let data = Data {
@@ -128,7 +121,8 @@ pub fn free_decay(
                     needed,
                 });
             }
-            // The colour of a noise may stand for what a second hit leaves.
+            // A coloured noise model may absorb the effect of a second hit: the fits with white
+            // noise are compared.
             let surplus = selected.white.criterion(&data) - selected.best.criterion(&data);
             excited_again = restart(&data, &selected.white.fit)
                 .filter(|(_, decrease)| *decrease > surplus)
@@ -138,9 +132,9 @@ pub fn free_decay(
     };
     let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
     let fit = data.refined(&best.fit.poles, &best.fit.noise, FINE).ok_or(failed.clone())?;
-    let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
-    let found = found.with_restart(excited_again);
-    for mode in found.modes() {
+    let estimate = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
+    let estimate = estimate.with_restart(excited_again);
+    for mode in estimate.modes() {
         let growth = &mode.mode.growth_rate;
         if mode.energy_share > 0.5 && growth.value > FREE_DECAY_SURE * growth.standard_error {
             return Err(FreeDecayError::Grows {
@@ -150,16 +144,34 @@ pub fn free_decay(
             });
         }
     }
-    Ok(found)
+    Ok(estimate)
 }
 
-/// Refuses a response that one or two decays without oscillation describe better than the oscillations that were found,
-/// by the Bayesian information criterion.
+/// Returns the number of modes, given or at most, that the record and the limits allow.
+fn checked_number_of_modes(record: &Record, settings: &FreeDecay) -> Result<usize, FreeDecayError> {
+    let asked = settings.modes.unwrap_or(settings.max_modes);
+    if asked == 0 || asked > MOST_MODES {
+        return Err(FreeDecayError::NumberOfModes { modes: asked, most: MOST_MODES });
+    }
+    let (samples, most) = (record.len(), MOST_SAMPLES);
+    if samples > most {
+        return Err(FreeDecayError::TooLong { samples, most });
+    }
+    let needed = SAMPLES_PER_MODE * settings.modes.unwrap_or(1) + usize::from(settings.offset);
+    if samples < needed {
+        return Err(SignalError::TooShort { samples, needed }.into());
+    }
+    Ok(asked)
+}
+
+/// Refuses a response that one or two decays without oscillation describe better than the
+/// identified oscillations, by the Bayesian information criterion.
 fn check_oscillation(data: &Data, fit: &Fit, dt: f64) -> Result<(), FreeDecayError> {
     let residual = data.residual(fit);
     let squares = residual.column_iter().map(|e| e.norm_squared());
-    let of_modes = information(data, squares, fit.poles.len() * (2 + 2 * data.channels()));
-    match aperiodic(data).filter(|found| found.criterion < of_modes) {
+    let criterion_of_modes =
+        information(data, squares, fit.poles.len() * (2 + 2 * data.channels()));
+    match aperiodic(data).filter(|decays| decays.criterion < criterion_of_modes) {
         Some(Aperiodic { rates, .. }) => {
             let rates = rates.iter().map(|rate| rate.map(|value| value / dt)).collect();
             Err(FreeDecayError::NoOscillation { rates })
@@ -168,7 +180,7 @@ fn check_oscillation(data: &Data, fit: &Fit, dt: f64) -> Result<(), FreeDecayErr
     }
 }
 
-/// A power of two near the peak of each channel, and the RMS about the mean over it.
+/// Returns a power of two near the peak of each channel, and the RMS about the mean relative to it.
 fn units(record: &Record) -> Result<Vec<[f64; 2]>, FreeDecayError> {
     let unit = |channel: usize| {
         let x = record.channel(channel);
@@ -177,9 +189,10 @@ fn units(record: &Record) -> Result<Vec<[f64; 2]>, FreeDecayError> {
         let mean = x.iter().map(|v| v / power).sum::<f64>() / count;
         let square: f64 = x.iter().map(|v| (v / power - mean).powi(2)).sum();
         let rms = (square / count).sqrt();
-        match power > 0.0 && rms > f64::EPSILON * mean.abs() {
-            true => Ok([power, rms]),
-            false => Err(FreeDecayError::SilentChannel { channel, value: x[0] }),
+        if power > 0.0 && rms > f64::EPSILON * mean.abs() {
+            Ok([power, rms])
+        } else {
+            Err(FreeDecayError::SilentChannel { channel, value: x[0] })
         }
     };
     (0..record.channels()).map(unit).collect()

@@ -1,4 +1,4 @@
-//! Poles of a free decay, and the functions of time that belong to them.
+//! Poles of a free decay, and their functions of time.
 
 use std::f64::consts::PI;
 
@@ -8,23 +8,23 @@ use super::limits::{
     FASTEST_DECAY, FROM_THE_END, MOST_DAMPING, MOST_GROWTH, POLE_AFRESH, POLE_HIGHEST,
 };
 
-/// exp(λ k) at sample k, λ = `growth` + i `turn`.
+/// Pole λ = `growth` + i `turn` of the response exp(λ k) at sample k.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
-    /// Re λ Δt, negative of a decay; nepers per sample.
+    /// Re λ Δt, negative for a decay, in nepers per sample.
     pub growth: f64,
     /// Im λ Δt, in rad per sample.
     pub turn: f64,
 }
 
-/// Lowest and highest turn in a record of `len` samples, in rad per sample: half a cycle in the record,
-/// and nearly half the sampling rate.
+/// Returns the lowest and highest turn in a record of `len` samples, in rad per sample: half a
+/// cycle in the record, and nearly half the sampling rate.
 pub(super) fn turns(len: usize) -> [f64; 2] {
     [PI / len as f64, POLE_HIGHEST * PI]
 }
 
 impl Pole {
-    /// Returns whether a record of `len` samples can tell of it.
+    /// Returns whether a record of `len` samples can determine the pole.
     pub(super) fn is_possible(&self, len: usize) -> bool {
         let [low, high] = turns(len);
         (low..=high).contains(&self.turn)
@@ -32,7 +32,7 @@ impl Pole {
             && -self.growth <= MOST_DAMPING * self.growth.hypot(self.turn)
     }
 
-    /// Returns the nearest one that is possible.
+    /// Returns the nearest pole that a record of `len` samples can determine.
     pub(super) fn possible(self, len: usize) -> Self {
         let [low, high] = turns(len);
         let turn = self.turn.clamp(low, high);
@@ -41,14 +41,14 @@ impl Pole {
         Self { growth: self.growth.clamp(least, MOST_GROWTH / len as f64), turn }
     }
 
-    /// Sample at which its amplitude is taken.
+    /// Returns the sample to which its amplitude refers.
     pub(super) fn origin(&self, len: usize) -> usize {
         if self.growth * len as f64 > FROM_THE_END { len - 1 } else { 0 }
     }
 }
 
-/// Returns the columns e^{σk} cos ωk and e^{σk} sin ωk of each pole, then the constant if there is one, then
-/// both of each pole times k/N; rows are the samples `first` … `end − 1` of N = `len`.
+/// Returns the columns e^{σk} cos ωk and e^{σk} sin ωk of each pole, then the constant if there is
+/// one, then both of each pole times k/N; rows are the samples `first` … `end − 1` of N = `len`.
 pub(super) fn columns(
     poles: &[Pole],
     constant: bool,
@@ -81,7 +81,7 @@ pub(super) fn columns(
     columns
 }
 
-/// Number of linear unknowns of a channel.
+/// Returns the number of linear unknowns of a channel.
 pub(super) fn linear_columns(poles: &[Pole], constant: bool) -> usize {
     2 * poles.len() + usize::from(constant)
 }

@@ -1,4 +1,4 @@
-//! A response that is excited again while it decays.
+//! Detection of a second excitation during a decay.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,32 +6,33 @@ use super::fit::{Data, Fit};
 use super::limits::RESTART_PLACES;
 use super::poles::linear_columns;
 
-/// Returns the first sample of a second excitation, counted from 0, and the decrease of the Bayesian information criterion
-/// by amplitudes of their own before and after it; `None` where nothing lowers it.
+/// Returns the first sample of a second excitation, counted from 0, and the decrease of the
+/// Bayesian information criterion if the amplitudes before and after it are independent; `None` if
+/// no sample lowers it.
 ///
 /// # Source
-/// Bai & Perron (1998), Econometrica 66, 47–78 (changes of coefficients at unknown times); Schwarz (1978), Annals of
-/// Statistics 6, 461–464.
+/// Bai & Perron (1998), Econometrica 66, 47–78 (changes of coefficients at unknown times); Schwarz
+/// (1978), Annals of Statistics 6, 461–464.
 pub(super) fn restart(data: &Data, fit: &Fit) -> Option<(usize, f64)> {
     let len = data.len();
     let coarse = (len / RESTART_PLACES).max(1);
-    let (_, place) = best(data, fit, (coarse..len).step_by(coarse).collect())?;
-    let around = place.saturating_sub(coarse) + 1..(place + coarse).min(len);
+    let (_, sample) = best(data, fit, (coarse..len).step_by(coarse).collect())?;
+    let around = sample.saturating_sub(coarse) + 1..(sample + coarse).min(len);
     let fine = (around.len() / RESTART_PLACES).max(1);
-    let (gain, place) = best(data, fit, around.step_by(fine).collect())?;
+    let (gain, sample) = best(data, fit, around.step_by(fine).collect())?;
     let unknowns = linear_columns(&fit.poles, data.constant) * data.channels() + 1;
     let decrease = gain - unknowns as f64 * (len as f64).ln();
-    (decrease > 0.0).then_some((place, decrease))
+    (decrease > 0.0).then_some((sample, decrease))
 }
 
-/// Returns the place of the largest decrease of minus twice the log likelihood, with the decrease.
-fn best(data: &Data, fit: &Fit, places: Vec<usize>) -> Option<(f64, usize)> {
-    let sums = sums(data, fit, &places);
+/// Returns the largest decrease of minus twice the log-likelihood and its sample.
+fn best(data: &Data, fit: &Fit, candidates: Vec<usize>) -> Option<(f64, usize)> {
+    let sums = sums(data, fit, &candidates);
     let (gram, products) = sums.last()?;
     let squares: Vec<f64> = data.samples.column_iter().map(|x| x.norm_squared()).collect();
     let whole = explained(gram, products)?;
     let len = data.len() as f64;
-    let gain = |(at, place): (usize, &usize)| {
+    let gain = |(at, sample): (usize, &usize)| {
         let (before, of_before) = &sums[at];
         let first = explained(before, of_before)?;
         let second = explained(&(gram - before), &(products - of_before))?;
@@ -39,13 +40,13 @@ fn best(data: &Data, fit: &Fit, places: Vec<usize>) -> Option<(f64, usize)> {
             let ratio = (squares[c] - first[c] - second[c]) / (squares[c] - whole[c]);
             -len * ratio.max(f64::MIN_POSITIVE).ln()
         });
-        Some((parts.sum::<f64>(), *place)).filter(|(gain, _)| gain.is_finite())
+        Some((parts.sum::<f64>(), *sample)).filter(|(gain, _)| gain.is_finite())
     };
-    places.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
+    candidates.iter().enumerate().filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns BᵀB and BᵀX of the rows before each place, and of all rows at the end.
-fn sums(data: &Data, fit: &Fit, places: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
+/// Returns BᵀB and BᵀX of the rows before each sample, and last of all rows.
+fn sums(data: &Data, fit: &Fit, candidates: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
     let linear = linear_columns(&fit.poles, data.constant);
     let mut gram = DMatrix::zeros(linear, linear);
     let mut products = DMatrix::zeros(linear, data.channels());
@@ -54,12 +55,12 @@ fn sums(data: &Data, fit: &Fit, places: &[usize]) -> Vec<(DMatrix<f64>, DMatrix<
         let end = first + basis.nrows();
         let mut row = first;
         while row < end {
-            let stop = places.get(next).copied().unwrap_or(end).min(end);
+            let stop = candidates.get(next).copied().unwrap_or(end).min(end);
             let part = basis.view((row - first, 0), (stop - row, linear));
             gram += part.tr_mul(&part);
             products += part.tr_mul(&data.samples.rows(row, stop - row));
             row = stop;
-            while places.get(next) == Some(&row) {
+            while candidates.get(next) == Some(&row) {
                 sums.push((gram.clone(), products.clone()));
                 next += 1;
             }

@@ -1,4 +1,4 @@
-//! The number of decays in a record, and the colour of its noise.
+//! Choice of the number of decays in a record and of the noise colour.
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -9,17 +9,17 @@ use super::initial_poles::{Subspace, strongest};
 use super::limits::{COARSE, COLOUR_ROUNDS, FALSE_DECAY, SELECTION_PATIENCE};
 use super::poles::{Pole, linear_columns};
 
-/// Decrease of minus twice the log likelihood that a further decay must bring.
+/// Returns the minimum decrease of minus twice the log-likelihood by a further decay.
 ///
-/// A decay has two unknowns of its own and two per channel. Among noise, the best of as many places as there
-/// are samples gains more than this with the probability [`FALSE_DECAY`].
+/// A decay has two unknowns, and two more per channel. In noise alone, the best of as many
+/// frequencies as there are samples gains more than this with the probability [`FALSE_DECAY`].
 pub(super) fn least_gain(len: usize, channels: usize) -> f64 {
     let level = FALSE_DECAY / len as f64;
     let distribution = ChiSquared::new(2.0 * channels as f64 + 2.0);
     distribution.map_or(f64::INFINITY, |chi| bisected(|x| chi.sf(x) - level))
 }
 
-/// Zero of a falling function from 0 on.
+/// Returns the zero of a falling function of a positive variable.
 fn bisected(of: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while of(high) > 0.0 && high < 1e6 {
@@ -32,16 +32,16 @@ fn bisected(of: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
-/// Fit with a number of decays, and what speaks for it.
+/// Fit with a number of decays, and its cost.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub fit: Fit,
-    /// Minus twice the log likelihood, and what the colour of the noise costs.
+    /// Minus twice the log-likelihood plus the penalty of the noise coefficients.
     pub cost: f64,
 }
 
-/// Fits with one number of decays, side by side: a colour of high order can pass for decays that are not
-/// found yet, and then hide them.
+/// Fits with the same number of decays, with white and with coloured noise: an autoregression of
+/// high order may absorb decays that are not yet in the model and hide them.
 #[derive(Debug, Clone)]
 struct Pair {
     white: Candidate,
@@ -59,7 +59,7 @@ impl Pair {
 }
 
 impl Candidate {
-    /// Bayesian information criterion.
+    /// Returns the Bayesian information criterion.
     pub(super) fn criterion(&self, data: &Data) -> f64 {
         let unknowns = self.fit.poles.len() * (2 + 2 * data.channels());
         self.cost + unknowns as f64 * (data.len() as f64).ln()
@@ -70,7 +70,7 @@ impl Candidate {
 #[derive(Debug)]
 pub(super) struct Selected {
     pub best: Candidate,
-    /// The best one with white noise.
+    /// Best fit with white noise.
     pub white: Candidate,
     /// Decrease of minus twice the log likelihood by the first decay.
     pub first_gain: f64,
@@ -91,10 +91,10 @@ impl<'a> Search<'a> {
                 column.add_scalar_mut(-mean);
             }
         }
-        Self { data, raw: Subspace::of(&centred) }
+        Self { data, raw: Subspace::new(&centred) }
     }
 
-    /// The number of decays of least cost, of at most `most`.
+    /// Returns the fits with the number of decays of lowest cost, at most `most`.
     pub(super) fn best(&self, most: usize) -> Option<Selected> {
         let per_decay = least_gain(self.data.len(), self.data.channels());
         let cost = |of: &Candidate| of.cost + per_decay * of.fit.poles.len() as f64;
@@ -108,9 +108,10 @@ impl<'a> Search<'a> {
             }
             let tracks = [(&next.white, &mut best.white), (&next.coloured, &mut best.coloured)];
             for ((next, best), idle) in tracks.into_iter().zip(&mut idle) {
-                match cost(next) < cost(best) {
-                    true => (*best, *idle) = (next.clone(), 0),
-                    false => *idle += 1,
+                if cost(next) < cost(best) {
+                    (*best, *idle) = (next.clone(), 0);
+                } else {
+                    *idle += 1;
                 }
             }
             last = next;
@@ -120,8 +121,8 @@ impl<'a> Search<'a> {
         Some(Selected { best, white, first_gain })
     }
 
-    /// So many decays, those of the record as it is: with the number given, an autoregression must not
-    /// stand for some of them.
+    /// Fits a given number of decays, with the initial poles of the unwhitened record: an
+    /// autoregression must not replace one of them.
     pub(super) fn exactly(&self, decays: usize) -> Option<Candidate> {
         let raw = |wanted: usize| self.raw.as_ref().map(|raw| raw.poles(wanted));
         let mut fit = self.data.refined(&[], &self.white(), COARSE)?;
@@ -140,8 +141,9 @@ impl<'a> Search<'a> {
         vec![Autoregression::default(); self.data.channels()]
     }
 
-    /// The most likely fits with one decay more: from the poles there are with the strongest decay in the
-    /// residual, and from the Hankel matrix; both as the record is and with its noise made white.
+    /// Returns the most likely fits with one more decay. Initial poles are the current poles with
+    /// the strongest decay in the residual, or the poles of the Hankel matrix; the record is used
+    /// as it is, and whitened.
     fn one_more(&self, last: &Pair) -> Option<Pair> {
         let wanted = last.decays() + 1;
         let raw = self.raw.as_ref().map(|raw| raw.poles(wanted));
@@ -149,17 +151,17 @@ impl<'a> Search<'a> {
         let mut coloured = self.candidate(white.fit.clone());
         if last.coloured.fit.noise.iter().any(|noise| noise.order() > 0) {
             let samples = scaled(&self.data.samples, &last.coloured.fit, self.data.constant);
-            let hankel = Subspace::of(&samples).map(|subspace| subspace.poles(wanted));
-            let other = self.extended(&last.coloured.fit, hankel).map(|fit| self.candidate(fit));
-            if let Some(other) = other.filter(|other| other.cost < coloured.cost) {
-                coloured = other;
+            let hankel = Subspace::new(&samples).map(|subspace| subspace.poles(wanted));
+            let whitened = self.extended(&last.coloured.fit, hankel).map(|fit| self.candidate(fit));
+            if let Some(whitened) = whitened.filter(|whitened| whitened.cost < coloured.cost) {
+                coloured = whitened;
             }
         }
         Some(Pair { white, coloured })
     }
 
-    /// The most likely fit with one decay more than `last` and its noise, from the strongest decay in its
-    /// residual or from `poles`.
+    /// Returns the most likely fit with one more decay than `last` and the same noise, from the
+    /// strongest decay in the residual or from `poles`.
     fn extended(&self, last: &Fit, poles: Option<Vec<Pole>>) -> Option<Fit> {
         let wanted = last.poles.len() + 1;
         let starts = [Some(last.poles.clone()), poles].into_iter().flatten();
@@ -167,11 +169,11 @@ impl<'a> Search<'a> {
             let poles = self.completed(poles, &last.noise, wanted)?;
             self.data.refined(&poles, &last.noise, COARSE)
         });
-        let misfit = |fit: &Fit| fit.misfit(self.data.len());
-        fits.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
+        let cost = |fit: &Fit| fit.cost(self.data.len());
+        fits.min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// Adds the strongest decays of the residual until there are as many as wanted.
+    /// Adds the strongest decay of the residual until the number of poles is `wanted`.
     fn completed(
         &self,
         mut poles: Vec<Pole>,
@@ -186,13 +188,13 @@ impl<'a> Search<'a> {
         Some(poles)
     }
 
-    /// A fit, or better one with the colour that its residual has.
+    /// Returns the fit, or a better one with the autoregression of its residual.
     fn candidate(&self, mut fit: Fit) -> Candidate {
         let mut best = self.rated(&fit);
         for _ in 0..COLOUR_ROUNDS {
             let residual = self.data.residual(&fit);
             let noise: Vec<Autoregression> =
-                residual.column_iter().map(|e| Autoregression::of(e.as_slice())).collect();
+                residual.column_iter().map(|e| Autoregression::from_noise(e.as_slice())).collect();
             if noise == fit.noise {
                 break;
             }
@@ -213,12 +215,12 @@ impl<'a> Search<'a> {
     fn rated(&self, fit: &Fit) -> Candidate {
         let len = self.data.len();
         let coefficients: usize = fit.noise.iter().map(Autoregression::order).sum();
-        let cost = fit.misfit(len) + coefficients as f64 * (len as f64).ln();
+        let cost = fit.cost(len) + coefficients as f64 * (len as f64).ln();
         Candidate { cost, fit: fit.clone() }
     }
 }
 
-/// Samples × channels with white noise of unit variance.
+/// Returns samples × channels whitened and scaled to unit variance.
 fn normalised(residual: &DMatrix<f64>, noise: &[Autoregression]) -> DMatrix<f64> {
     let mut white = residual.clone();
     for (mut column, noise) in white.column_iter_mut().zip(noise) {
@@ -232,7 +234,7 @@ fn normalised(residual: &DMatrix<f64>, noise: &[Autoregression]) -> DMatrix<f64>
     white
 }
 
-/// The record without its constants, its noise white and of unit variance.
+/// Returns the record without its constants, whitened and scaled to noise of unit variance.
 fn scaled(samples: &DMatrix<f64>, fit: &Fit, constant: bool) -> DMatrix<f64> {
     let mut scaled = samples.clone();
     let linear = linear_columns(&fit.poles, constant);
@@ -245,7 +247,7 @@ fn scaled(samples: &DMatrix<f64>, fit: &Fit, constant: bool) -> DMatrix<f64> {
         column.copy_from_slice(&whitened);
         column /= (of.square / samples.nrows() as f64).sqrt();
     }
-    // The first samples are whitened otherwise than those that follow.
+    // The first samples are whitened with lower orders and are therefore excluded.
     let most = fit.noise.iter().map(Autoregression::order).max().unwrap_or(0);
     scaled.rows_range(most..).into_owned()
 }

@@ -31,8 +31,8 @@ pub fn complex_mode_indicator(
 }
 
 /// Returns the multivariate mode indicator function: for each line and each of q combinations of
-/// the forces the power of the response in phase with the force over its whole power, rising; lines
-/// × q.
+/// the forces the ratio of the power of the response in phase with the force to its total power,
+/// rising; lines × q.
 ///
 /// It drops from about 1 towards 0 where a real mode is in phase resonance; the responses are
 /// displacements or accelerations over forces.
@@ -53,7 +53,7 @@ pub fn multivariate_mode_indicator(
         let (real, imaginary) = (response.map(|z| z.re), response.map(|z| z.im));
         let in_phase = real.tr_mul(&real);
         let power = &in_phase + imaginary.tr_mul(&imaginary);
-        // The smallest eigenvalues of A f = λ (A + B) f by the Cholesky factor of A + B.
+        // Eigenvalues of A f = λ (A + B) f, by the Cholesky factor of A + B.
         let lower = power.cholesky().ok_or(failed.clone())?.unpack();
         let half = lower.solve_lower_triangular(&in_phase).ok_or(failed.clone())?;
         let whitened = lower.solve_lower_triangular(&half.transpose()).ok_or(failed.clone())?;

@@ -96,11 +96,11 @@ pub fn mac_matrix(
 }
 
 /// Returns the MAC of two uncertain, independent shapes with its standard error and its expected
-/// loss.
+/// decrease.
 ///
-/// Where the shapes agree the MAC is at its maximum: its gradient is zero and errors of the shapes
-/// lower it on average, by `expected_loss`. Terms of second order are therefore part of the
-/// standard error.
+/// If the shapes agree, the MAC is at its maximum: its gradient is zero, and errors of the shapes
+/// lower it on average by `expected_loss`. Terms of second order are therefore part of the standard
+/// error.
 ///
 /// # Errors
 /// [`IndicatorError::Size`], [`IndicatorError::ZeroShape`].
@@ -155,7 +155,7 @@ pub fn mpc_with_error(shape: &ShapeWithCovariance) -> Indicator {
 }
 
 /// Returns the mean phase of the entries of a shape, in rad, in (−π/2, π/2]: the direction in the
-/// complex plane that they scatter about least.
+/// complex plane about which they scatter least.
 ///
 /// # Source
 /// The direction of the first principal component of the real and imaginary parts; Pappa, Elliott &

@@ -1,9 +1,9 @@
-//! Errors of a number that depends on uncertain shapes.
+//! Errors of a quantity that depends on uncertain shapes.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Step of the central differences over the root mean square of the variables: the fourth root of
-/// the rounding error balances rounding and truncation of second differences.
+/// Step of the central differences, relative to the root mean square of the variables: the fourth
+/// root of the rounding error balances rounding and truncation of second differences.
 const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Indicator between 0 and 1, with the effect of the errors of the shapes.
@@ -13,7 +13,7 @@ pub struct Indicator {
     pub value: f64,
     /// Standard error of the value.
     pub standard_error: f64,
-    /// Mean amount by which errors of the shapes lower the value; positive near a maximum.
+    /// Expected decrease of the value by errors of the shapes; positive near a maximum.
     pub expected_loss: f64,
 }
 

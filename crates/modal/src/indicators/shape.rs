@@ -12,8 +12,9 @@ pub struct ShapeWithCovariance {
 }
 
 impl ShapeWithCovariance {
-    /// Takes a shape and the 2p × 2p covariance of its parts, the p real parts first, in squared
-    /// units of the shape; zeros stand for entries without error, as of a finite-element model.
+    /// Creates a shape from its entries and the 2p × 2p covariance of their parts, the p real parts
+    /// first, in squared units of the shape; zero for entries without error, as in a finite-element
+    /// model.
     ///
     /// # Errors
     /// [`IndicatorError::Size`], [`IndicatorError::NotFinite`], [`IndicatorError::ZeroShape`].
@@ -37,7 +38,7 @@ impl ShapeWithCovariance {
         Ok(Self { shape, covariance })
     }
 
-    /// Takes a shape without errors, such as one of a finite-element model.
+    /// Creates a shape without errors, such as one of a finite-element model.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -46,7 +47,7 @@ impl ShapeWithCovariance {
         Self::new(shape, DMatrix::zeros(len, len))
     }
 
-    /// Takes a shape whose entries have independent errors, equal in the real and the imaginary
+    /// Creates a shape whose entries have independent errors, equal in the real and the imaginary
     /// part.
     ///
     /// # Errors
