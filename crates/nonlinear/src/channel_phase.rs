@@ -1,17 +1,17 @@
-//! Phase that the measuring channels add.
+//! Delay and phase of the measuring channels.
 
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::Complex;
 
-/// Delay between force and response, and the phase that both channels have in common.
+/// Delay between force and response, and the phase common to both channels.
 ///
-/// A phase that force and response share, as from equal anti-alias filters, does not matter to a
-/// linear system. To a nonlinear one it does: the powers are those of the response before the filter.
-/// At f the channels show e^(−iφ) of the true signals, φ = p₃ z³ + p₅ z⁵ with z = f/(f_s/2) (a common
-/// delay, which would be the term in z, shows nowhere). The force acts `delay` later than its channel
-/// says.
+/// A common phase, for example of equal anti-alias filters, does not affect a linear system. It
+/// affects a nonlinear one, because the powers of the response are formed before the filter. The
+/// measured lines at frequency f are the true lines times e^(−iφ), φ = p₃ z³ + p₅ z⁵ with z =
+/// f/(f_s/2); a common delay, the term in z, has no effect. The force acts `delay` later than its
+/// channel shows.
 ///
 /// # Source
 /// Ours. The odd polynomial is the series of any filter's phase about zero frequency.
@@ -31,18 +31,18 @@ pub struct ChannelPhase {
 }
 
 impl ChannelPhase {
-    /// Factors from the measured lines of force and response to the true ones, at `omega` (rad/s)
-    /// and this part of half the sampling rate.
+    /// Returns the factors from the measured to the true lines of force and response at `omega`
+    /// (rad/s), the share `z` of half the sampling rate.
     pub(super) fn corrections(&self, omega: f64, z: f64) -> [Complex<f64>; 2] {
         let common = z * z * z * (self.cubic + self.quintic * z * z);
         [Complex::cis(common - omega * self.delay), Complex::cis(common)]
     }
 
-    /// Force and response as they were before the channels, of records taken as a period (N, and m,
+    /// Returns force and response before the channels, for records that are one period (N, and m,
     /// m/s or m/s²; samples × channels).
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if the records have not the same time axis, or overflow.
+    /// [`EstimateError::Signal`] if the time axes of the records differ, or values overflow.
     pub fn correct(
         &self,
         force: &Record,
@@ -52,11 +52,11 @@ impl ChannelPhase {
         Ok((self.turn(force, 0, false)?, self.turn(response, 1, false)?))
     }
 
-    /// A response, predicted from a corrected force, as the channel would show it (samples ×
-    /// channels, in its unit).
+    /// Returns a response predicted from a corrected force as the channel would measure it (samples
+    /// × channels, in its unit).
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if the samples add up to more than a number can hold.
+    /// [`EstimateError::Signal`] if values overflow.
     pub fn as_measured(&self, response: &Record) -> Result<Record, EstimateError> {
         self.turn(response, 1, true)
     }
@@ -78,8 +78,8 @@ impl ChannelPhase {
     }
 }
 
-/// Displacement lines of a response, up to but without half the sampling rate; the mean is kept of a
-/// displacement and zero for what has been differentiated.
+/// Returns the displacement lines of a response below half the sampling rate; the mean is kept for
+/// displacements and zero for velocities and accelerations.
 pub(super) fn displacement_lines(
     response: &Spectrum,
     measured: ResponseQuantity,

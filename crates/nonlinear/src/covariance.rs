@@ -1,4 +1,4 @@
-//! Standard errors that hold for a residual of any colour, and for one that comes and goes with the
+//! Standard errors that hold for a residual of any spectrum, also if its variance changes with the
 //! response.
 
 use nalgebra::{Complex, DMatrix, DVector};
@@ -8,17 +8,18 @@ use super::grid::Grid;
 use super::scatter::{Misfit, PeriodScatter};
 use crate::limits::{COVARIANCE_MOST, TIME_CONSTANTS};
 
-/// Covariance of all parameters, and what it rests on.
+/// Covariance of all parameters, and its origin.
 pub(super) struct Uncertainty {
     pub(super) covariance: DMatrix<f64>,
     pub(super) standard_errors: StandardErrors,
     pub(super) freedom: usize,
     pub(super) misfit: Option<Misfit>,
-    /// Bias of the parameters by noise in their regressors, as the periods show it; zero where they do not.
+    /// Bias of the parameters by noise in their regressors, estimated from several periods; zero
+    /// without them.
     pub(super) bias: DVector<f64>,
 }
 
-/// What the periods show of the noise in an estimate.
+/// Effect of noise on an estimate, from the scatter of the periods.
 pub(super) struct ByPeriods {
     pub(super) scatter: PeriodScatter,
     pub(super) misfit: Misfit,
@@ -27,12 +28,13 @@ pub(super) struct ByPeriods {
 }
 
 impl Uncertainty {
-    /// That of the scatter of the periods as long as the residual is no more than their noise, otherwise that of the
-    /// residual or, where that could be taken as white only, of the scatter in proportion to the misfit; the degrees of
-    /// freedom are those of the first `wanted` parameters.
+    /// Uses the scatter of the periods if the residual does not exceed their noise. Otherwise uses
+    /// the blocks of the residual or, for a record too short for blocks, the scatter times the
+    /// ratio of residual to noise. The degrees of freedom are the least of the first `wanted`
+    /// parameters.
     ///
     /// # Source
-    /// Birge (1932), Physical Review 40, 207–227, for errors in proportion to a misfit.
+    /// Birge (1932), Physical Review 40, 207–227, for standard errors scaled by the residual.
     pub(super) fn new(
         by_periods: Option<ByPeriods>,
         wanted: usize,
@@ -56,7 +58,8 @@ impl Uncertainty {
     }
 }
 
-/// Blocks for an experiment of this duration (s), whose slowest free response decays at `rate` (1/s).
+/// Returns the number of blocks for an experiment of this duration (s) whose slowest free response
+/// decays at `rate` (1/s).
 pub(super) fn block_count(duration: f64, rate: f64) -> usize {
     match duration * rate / TIME_CONSTANTS {
         blocks if blocks.is_finite() => (blocks as usize).clamp(1, COVARIANCE_MOST),
@@ -64,24 +67,25 @@ pub(super) fn block_count(duration: f64, rate: f64) -> usize {
     }
 }
 
-/// Scores (regressor times residual) and Gram matrices of the regressors, summed over blocks of time.
+/// Scores (regressor times residual) and Gram matrices of the regressors, summed over blocks of
+/// time.
 ///
-/// The white formula s²(AᵀA)⁻¹ takes the residual as independent of its neighbours and of the
-/// response. What a model of a nonlinear system leaves is neither. Leaving out one block after the
-/// other shows how much the estimate depends on each, whatever the reason.
+/// The formula s²(AᵀA)⁻¹ assumes a residual that is white and independent of the response. The
+/// residual of a nonlinear model is neither. The estimates without one block at a time show the
+/// variance without this assumption.
 ///
 /// # Source
 /// Künsch (1989), Annals of Statistics 17, 1217–1241 (the jackknife by blocks of a series); Bell &
-/// McCaffrey (2002), Survey Methodology 28, 169–181, for what it corrects of the plain sum of
+/// McCaffrey (2002), Survey Methodology 28, 169–181, for the correction of the plain sum of
 /// squares; Newey & West (1987), Econometrica 55, 703–708, for the problem.
 pub(super) struct BlockScores {
     blocks: Vec<(DVector<f64>, DMatrix<f64>)>,
     parameters: usize,
 }
 
-/// One equation or channel of one experiment, sample by sample.
+/// Regressors and residual of one equation or channel of one experiment, as time signals.
 pub(super) struct InTime {
-    /// Places of parameters and their regressors.
+    /// Indices of parameters and their regressors.
     pub(super) regressors: Vec<(usize, Vec<f64>)>,
     pub(super) residual: Vec<f64>,
 }
@@ -100,12 +104,12 @@ impl BlockScores {
             for InTime { regressors, residual } in parts {
                 let len = residual.len();
                 let range = block * len / blocks..(block + 1) * len / blocks;
-                for (row, left) in regressors {
-                    let left = &left[range.clone()];
-                    score[*row] += dot(left, &residual[range.clone()]);
+                for (row, regressor) in regressors {
+                    let regressor = &regressor[range.clone()];
+                    score[*row] += dot(regressor, &residual[range.clone()]);
                     for (column, right) in regressors {
                         if row <= column {
-                            gram[(*row, *column)] += dot(left, &right[range.clone()]);
+                            gram[(*row, *column)] += dot(regressor, &right[range.clone()]);
                         }
                     }
                 }
@@ -119,9 +123,9 @@ impl BlockScores {
         self.blocks.len()
     }
 
-    /// (B − 1)/B Σ d dᵀ over B blocks, d = (AᵀA − A_bᵀA_b)⁻¹ s_b being the change of the estimate
-    /// without block b, and `inverse` = (AᵀA)⁻¹; with the degrees of freedom of that of the first
-    /// `wanted` parameters that has least. `None` if a parameter rests on one block alone.
+    /// Returns the covariance (B − 1)/B Σ d dᵀ over B blocks, where d = (AᵀA − A_bᵀA_b)⁻¹ s_b is
+    /// the change of the estimate without block b and `inverse` = (AᵀA)⁻¹, and the least degrees of
+    /// freedom of the first `wanted` parameters. `None` if a parameter depends on one block only.
     pub(super) fn covariance(
         &self,
         inverse: &DMatrix<f64>,
@@ -131,8 +135,8 @@ impl BlockScores {
         let mut sum = DMatrix::zeros(self.parameters, self.parameters);
         for (score, gram) in &self.blocks {
             // (G − G_b)⁻¹ = (I − G⁻¹G_b)⁻¹ G⁻¹.
-            let rest = DMatrix::identity(self.parameters, self.parameters) - inverse * gram;
-            let change = rest.lu().solve(&(inverse * score))?;
+            let remaining = DMatrix::identity(self.parameters, self.parameters) - inverse * gram;
+            let change = remaining.lu().solve(&(inverse * score))?;
             if change.iter().any(|d| !d.is_finite()) {
                 return None;
             }
@@ -141,10 +145,10 @@ impl BlockScores {
         Some((sum * ((blocks - 1.0) / blocks), self.degrees_of_freedom(inverse, wanted)))
     }
 
-    /// Satterthwaite's degrees of freedom of a variance to which the blocks contribute as unequally as
-    /// they carry information, (Σ w)²/Σ w² − 1 with w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk; of that of the
-    /// first `wanted` parameters k that has least. An initial state, which stands behind them, rests on
-    /// the first block alone and says nothing of the others.
+    /// Returns the least of Satterthwaite's degrees of freedom of the first `wanted` parameters k:
+    /// (Σ w)²/Σ w² − 1 with the information w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk of each block.
+    /// Initial states, which follow these parameters, depend on the first block only and are
+    /// ignored.
     fn degrees_of_freedom(&self, inverse: &DMatrix<f64>, wanted: usize) -> usize {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);
@@ -153,27 +157,28 @@ impl BlockScores {
             squares += variances.component_mul(&variances);
             sums += variances;
         }
-        let of = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
-        let each = sums.iter().zip(squares.iter()).take(wanted).map(of);
-        let least = each.fold(f64::INFINITY, f64::min);
-        // Never more than blocks, never less than one.
+        let freedom = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
+        let freedoms = sums.iter().zip(squares.iter()).take(wanted).map(freedom);
+        let least = freedoms.fold(f64::INFINITY, f64::min);
+        // One at least, and fewer than the number of blocks.
         (least as usize).clamp(1, self.blocks.len().max(2) - 1)
     }
 }
 
-/// A weighted column of lines as a signal whose square sum is that of its real and imaginary parts.
+/// Returns a weighted column of lines as a time signal with the same sum of squares as its real and
+/// imaginary parts.
 pub(super) fn in_time(
     grid: &Grid,
     lines: usize,
     rows: &[usize],
     values: &[Complex<f64>],
 ) -> Vec<f64> {
-    let mut all = vec![Complex::ZERO; lines];
+    let mut spectrum = vec![Complex::ZERO; lines];
     for (row, value) in rows.iter().zip(values) {
-        // The mean carries the factor √2 of its row.
-        all[*row] = if *row == 0 { value / std::f64::consts::SQRT_2 } else { *value };
+        // The weight of the mean has a factor √2, which is not part of the signal.
+        spectrum[*row] = if *row == 0 { value / std::f64::consts::SQRT_2 } else { *value };
     }
-    let mut samples = grid.to_samples(all.into_iter());
+    let mut samples = grid.to_samples(spectrum.into_iter());
     let scale = (2.0 / samples.len() as f64).sqrt();
     samples.iter_mut().for_each(|x| *x *= scale);
     samples

@@ -1,4 +1,5 @@
-//! Distortion: evidence against a linear system at the level of the force, before any model of it.
+//! Nonlinear distortion: evidence against a linear system at the level of the force, before a model
+//! is fitted.
 
 use std::fmt;
 
@@ -16,16 +17,16 @@ use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
 use crate::limits::{DISTORTION_DRIVEN, DISTORTION_PAIRS, DISTORTION_SIGNIFICANT};
 
-/// Response on lines without force, against that on lines with force.
+/// Response on lines without force, relative to the response on lines with force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Level {
-    /// Ratio of the RMS on these lines, less what noise puts there, to that on the driven lines, in
-    /// dB; −∞ if there is no more than noise.
+    /// Ratio of the RMS on these lines, without the noise power, to the RMS on the driven lines, in
+    /// dB; −∞ if there is only noise.
     pub db: f64,
     /// Number of lines.
     pub lines: usize,
-    /// Power on these lines over that of the noise, a pure number; `None` of a single period.
+    /// Ratio of the power on these lines to the noise power; `None` for a single period.
     pub over_noise: Option<f64>,
 }
 
@@ -38,7 +39,7 @@ pub struct Kind {
     pub name: String,
     /// Coefficient if the term is the only one, in the unit of the term.
     pub coefficient: f64,
-    /// Part of the squared equation error of a linear model that it explains, a ratio.
+    /// Share of the squared equation error of a linear model that the term explains.
     pub explained: f64,
     /// Probability that noise alone makes one of the kinds explain as much.
     pub p_value: f64,
@@ -47,19 +48,19 @@ pub struct Kind {
 /// Evidence against a linear system in steady periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distortion {
-    /// Level on even lines, where odd ones alone are driven: even nonlinearities, such as x².
+    /// Level on even lines if only odd lines are driven: even nonlinearities, such as x².
     pub even: Option<Level>,
     /// Level on odd lines that are not driven: odd nonlinearities, such as x³.
     pub odd: Option<Level>,
-    /// Part of the force, a ratio, that a linear model leaves on the lines of the band, each weighted
-    /// as the response of the linear model to it.
+    /// Share of the force (RMS) on the lines of the band that a linear model does not explain,
+    /// weighted by the response of the linear model to it.
     pub linear_leaves: f64,
-    /// The kinds of terms, the one that explains most first.
+    /// Kinds of terms, by decreasing explained share.
     pub kinds: Vec<Kind>,
 }
 
-/// Kinds of terms that are looked for: exponents of displacement and velocity, and their name;
-/// quadratic damping has none.
+/// Kinds of terms that are tested: exponents of displacement and velocity (none for quadratic
+/// damping), and name.
 const KINDS: [(Option<[u32; 2]>, &str); 4] = [
     (Some([2, 0]), "quadratic stiffness"),
     (Some([3, 0]), "cubic stiffness"),
@@ -67,23 +68,25 @@ const KINDS: [(Option<[u32; 2]>, &str); 4] = [
     (Some([0, 3]), "cubic damping"),
 ];
 
-/// Looks for even and odd distortion, and for the one term that explains most of what a linear model
-/// leaves, in whole periods of force (N) and response of one or several experiments at the lines of a band.
+/// Detects even and odd distortion, and finds the single term that explains most of the residual of
+/// a linear model, in whole periods of force (N) and response of one or several experiments at the
+/// lines of a band.
 ///
-/// The linear model is one for all experiments, none of which need determine it alone. The levels are those of the
-/// experiment where they are largest.
+/// All experiments share one linear model; a single one need not determine it. The levels are
+/// reported for the experiment with the largest.
 ///
-/// What a nonlinear system adds stands on the sums and differences of the driven lines: of odd lines
-/// an even power fills the even ones, an odd power the odd ones. Where all odd lines are driven, odd
-/// distortion hides beneath the linear response; there the squares and cubes of displacement and
-/// velocity, as columns of the equation error, show it all the same.
+/// A nonlinear system responds at sums and differences of the driven lines: if odd lines are
+/// driven, an even power responds at even lines and an odd power at odd lines. If all odd lines are
+/// driven, odd distortion coincides with the linear response; the squares and cubes of displacement
+/// and velocity, as regressors of the equation error, still detect it.
 ///
 /// # Errors
 /// As [`equation_error`](super::equation_error), and as [`RepeatedPeriods::new`].
 ///
 /// # Source
-/// Schoukens, Vaes & Pintelon (2016), IEEE Control Systems 36(3), 38–69 (detection lines); Kerschen,
-/// Worden, Vakakis & Golinval (2006), Mechanical Systems and Signal Processing 20, 505–592.
+/// Schoukens, Vaes & Pintelon (2016), IEEE Control Systems 36(3), 38–69 (detection lines);
+/// Kerschen, Worden, Vakakis & Golinval (2006), Mechanical Systems and Signal Processing 20,
+/// 505–592.
 pub fn distortion(
     lines: &Lines,
     experiments: &[[&Record; 2]],
@@ -98,17 +101,17 @@ pub fn distortion(
     let lines = Lines::new(lines.sampling(), data.lines().iter().copied())?;
     let [mut even, mut odd] = [None::<Level>; 2];
     for [force, response] in experiments {
-        let found = levels(&lines, force, response, measured)?;
-        for (most, found) in [&mut even, &mut odd].into_iter().zip(found) {
-            if most.is_none_or(|most| found.is_some_and(|found| found.db > most.db)) {
-                *most = found;
+        let experiment = levels(&lines, force, response, measured)?;
+        for (most, level) in [&mut even, &mut odd].into_iter().zip(experiment) {
+            if most.is_none_or(|most| level.is_some_and(|level| level.db > most.db)) {
+                *most = level;
             }
         }
     }
     Ok(Distortion { even, odd, linear_leaves, kinds })
 }
 
-/// Levels on even lines, and on odd ones that are not driven, where odd lines alone are driven.
+/// Returns the levels on even lines and on odd lines without force, if only odd lines are driven.
 fn levels(
     lines: &Lines,
     force: &Record,
@@ -122,9 +125,12 @@ fn levels(
         let chosen = lines.as_slice().iter().filter(|n| **n % 2 == parity && !driven.contains(n));
         chosen.copied().collect()
     };
-    let level = |parity: usize| match odd_only {
-        true => level(lines, force, response, measured, &driven, &free(parity)),
-        false => Ok(None),
+    let level = |parity: usize| {
+        if odd_only {
+            level(lines, force, response, measured, &driven, &free(parity))
+        } else {
+            Ok(None)
+        }
     };
     Ok([level(0)?, level(1)?])
 }
@@ -154,8 +160,9 @@ fn level(
         1 => None,
         _ => {
             let (noise, n) = (off.noise(Pooling::PerLine)?, response.channels());
-            let of = |row: usize| (0..n).map(|i| noise.covariance(row)[(i, i)].re).sum::<f64>();
-            Some((0..free.len()).map(of).sum::<f64>())
+            let variance =
+                |row: usize| (0..n).map(|i| noise.covariance(row)[(i, i)].re).sum::<f64>();
+            Some((0..free.len()).map(variance).sum::<f64>())
         }
     };
     let total = power(&off)?;
@@ -167,19 +174,20 @@ fn level(
     }))
 }
 
-/// Returns the part of the force that a linear model leaves, and the kinds of terms by what they explain of it.
+/// Returns the share of the force that a linear model does not explain, and the kinds of terms by
+/// decreasing explained share.
 fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind>), EstimateError> {
     let (terms, names) = candidates(data.dof())?;
-    // As responses for how much a kind explains; as likely as can be for whether that is chance.
+    // The explained share uses weights as responses; its p-value uses the most likely weights.
     let size = OneByOne::new(data, unknowns, &terms, Weighting::Response)?;
     let chance = OneByOne::new(data, unknowns, &terms, Weighting::Automatic)?;
-    let spare = chance.spare as f64;
-    let fisher = FisherSnedecor::new(1.0, spare).expect("positive degrees of freedom");
+    let residual_freedom = chance.residual_freedom as f64;
+    let fisher = FisherSnedecor::new(1.0, residual_freedom).expect("positive degrees of freedom");
     let mut kinds = Vec::new();
     for (at, (term, name)) in terms.iter().zip(names).enumerate() {
         let (after, _) = chance.with(at)?;
         let fall = (chance.without - after).max(0.0);
-        let ratio = if after > 0.0 { fall / after * spare } else { 0.0 };
+        let ratio = if after > 0.0 { fall / after * residual_freedom } else { 0.0 };
         let p_value = (terms.len() as f64 * fisher.sf(ratio)).min(1.0);
         let (after, coefficient) = size.with(at)?;
         let before = size.without;
@@ -187,19 +195,19 @@ fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind
         kinds.push(Kind { term: term.clone(), name, coefficient, explained, p_value });
     }
     kinds.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    Ok(((size.without / size.all).sqrt(), kinds))
+    Ok(((size.without / size.total).sqrt(), kinds))
 }
 
-/// A linear fit that one term after the other joins.
+/// Linear fit to which one term at a time is added.
 struct OneByOne {
     /// \[A | b\] of the linear columns, the terms and the force.
     rows: LeastSquares,
     linear: Vec<usize>,
-    /// Weighted squares of the force, and what the linear columns leave of them.
-    all: f64,
+    /// Weighted squares of the force, and of the residual of the linear columns.
+    total: f64,
     without: f64,
-    /// Equations less parameters of a fit with one term.
-    spare: usize,
+    /// Number of equations minus parameters of a fit with one term.
+    residual_freedom: usize,
 }
 
 impl OneByOne {
@@ -212,26 +220,27 @@ impl OneByOne {
         let base = Equations::new(data, unknowns, &Terms::none())?;
         let none = Shape::new(&Terms::none(), ShapeConstants::default());
         let fit = weighted(&base, &none, weighting, None)?;
-        let of_rows = match weighting {
-            // Between the equations of motion, too: a term is part of one of them, or of two.
+        let row_weights = match weighting {
+            // The weights also relate different equations of motion: a term acts in one of them, or
+            // in two.
             Weighting::Response => as_response(&base, &fit.coefficients),
             _ => None,
         };
-        let of_rows = of_rows.as_ref().unwrap_or(&fit.weights.of_rows);
+        let row_weights = row_weights.as_ref().unwrap_or(&fit.weights.of_rows);
         let equations = Equations::new(data, unknowns, terms)?;
         let mut rows = LeastSquares::new(equations.count(), 1);
         for columns in equations.columns(terms, &none.channels()) {
-            equations.push(&mut rows, &columns, of_rows, &[])?;
+            equations.push(&mut rows, &columns, row_weights, &[])?;
         }
         let linear: Vec<usize> = (0..equations.free.len()).collect();
-        let all = rows.triangle().column(equations.count()).norm_squared();
-        let spare = equations.equations().saturating_sub(linear.len() + 1).max(1);
-        let mut sizes = Self { rows, linear, all, without: 0.0, spare };
+        let total = rows.triangle().column(equations.count()).norm_squared();
+        let residual_freedom = equations.equations().saturating_sub(linear.len() + 1).max(1);
+        let mut sizes = Self { rows, linear, total, without: 0.0, residual_freedom };
         sizes.without = sizes.solve(&sizes.linear)?.0;
         Ok(sizes)
     }
 
-    /// Returns the part that is left with one of the terms, and its coefficient.
+    /// Returns the sum of squares of the residual with one of the terms, and its coefficient.
     fn with(&self, term: usize) -> Result<(f64, f64), EstimateError> {
         self.solve(&[&self.linear[..], &[self.linear.len() + term]].concat())
     }
@@ -251,14 +260,14 @@ fn candidates(dof: usize) -> Result<(Terms, Vec<String>), EstimateError> {
     let single = (0..dof).map(Coordinate::Dof);
     let pairs = (0..dof).flat_map(|i| (i + 1..dof).map(move |j| Coordinate::Difference(i, j)));
     let (mut terms, mut names) = (Vec::new(), Vec::new());
-    for place in single.chain(pairs.filter(|_| dof <= DISTORTION_PAIRS)) {
+    for coordinate in single.chain(pairs.filter(|_| dof <= DISTORTION_PAIRS)) {
         for (exponents, name) in KINDS {
             let coefficient = format!("t_{}", terms.len() + 1);
             terms.push(match exponents {
-                Some([p, r]) => Term::new(coefficient, place, Power::new(p, r)?)?,
-                None => Term::new(coefficient, place, QuadraticDamping)?,
+                Some([p, r]) => Term::new(coefficient, coordinate, Power::new(p, r)?)?,
+                None => Term::new(coefficient, coordinate, QuadraticDamping)?,
             });
-            names.push(match place {
+            names.push(match coordinate {
                 Coordinate::Dof(i) => format!("{name} of x{}", i + 1),
                 Coordinate::Difference(i, j) => format!("{name} between x{} and x{}", i + 1, j + 1),
             });
@@ -268,8 +277,8 @@ fn candidates(dof: usize) -> Result<(Terms, Vec<String>), EstimateError> {
 }
 
 impl Distortion {
-    /// The kind of term that a linear model lacks most; `None` if what it leaves is consistent with
-    /// noise.
+    /// Returns the kind of term that explains most of the residual of a linear model; `None` if
+    /// this is consistent with noise.
     pub fn kind(&self) -> Option<&Kind> {
         self.kinds.first().filter(|kind| kind.p_value < DISTORTION_SIGNIFICANT)
     }

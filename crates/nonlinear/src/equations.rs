@@ -1,4 +1,4 @@
-//! The equations of motion with nonlinear columns, line by line, ready for least squares.
+//! Equations of motion with nonlinear regressors, line by line, for least squares.
 
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, Parameter, Term, Terms};
@@ -10,11 +10,11 @@ use super::experiments::Columns;
 use super::{ChannelPhase, SteadyExperiments};
 use crate::limits::EQUATIONS_CHUNK;
 
-/// A coefficient of the equations: an entry of M, C or K, or that of a term.
+/// Coefficient of the equations: an entry of M, C or K, or the coefficient of a term.
 #[derive(Clone, Copy)]
 enum Coefficient {
     Entry(Parameter),
-    /// Number of the term and its sign in the equation.
+    /// Index of the term and its sign in the equation.
     Term(usize, f64),
 }
 
@@ -26,10 +26,10 @@ pub(super) struct Equations<'a> {
     terms: usize,
     /// Lines of the rows; line 0 is the first if a term is a constant force.
     pub(super) rows: Vec<usize>,
-    /// Coefficients of each equation and their places among the parameters.
+    /// Coefficients of each equation and their indices among the parameters.
     coefficients: Vec<Vec<(usize, Coefficient)>>,
-    /// Factor of each row and equation that makes all of one variance under white noise, 0 where the
-    /// equation does not hold: rows × degrees of freedom.
+    /// Factor of each row and equation that gives all the same variance under white noise, 0 if the
+    /// row is not used in the equation: rows × degrees of freedom.
     pub(super) unit: DMatrix<f64>,
 }
 
@@ -68,12 +68,12 @@ impl<'a> Equations<'a> {
         Ok(Self { data, unknowns, free, terms: terms.len(), rows, coefficients, unit })
     }
 
-    /// Number of coefficients: free entries, then terms.
+    /// Returns the number of coefficients: free entries, then terms.
     pub(super) fn count(&self) -> usize {
         self.free.len() + self.terms
     }
 
-    /// Real equations of all experiments.
+    /// Returns the number of real equations of all experiments.
     pub(super) fn equations(&self) -> usize {
         let real = |(at, factor): (usize, &f64)| match (self.rows[at % self.rows.len()], *factor) {
             (_, 0.0) => 0,
@@ -91,7 +91,7 @@ impl<'a> Equations<'a> {
         self.data.omega(self.rows[row])
     }
 
-    /// Returns the quantity that a coefficient multiplies in the equation it belongs to.
+    /// Returns the regressor of a coefficient in its equation.
     fn entry(&self, columns: &Columns, row: usize, coefficient: Coefficient) -> Complex<f64> {
         match coefficient {
             Coefficient::Entry(parameter) => {
@@ -102,7 +102,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// Force of an equation less what its known entries account for.
+    /// Returns the force of an equation minus the contribution of its known entries.
     fn target(&self, columns: &Columns, row: usize, dof: usize) -> Complex<f64> {
         let mut target = columns.force[(row, dof)];
         for matrix in Matrix::ALL {
@@ -116,8 +116,8 @@ impl<'a> Equations<'a> {
         target
     }
 
-    /// Force less what the coefficients account for, one matrix an experiment: rows × degrees of
-    /// freedom.
+    /// Returns the residual force for given coefficients, one matrix per experiment: rows × degrees
+    /// of freedom.
     pub(super) fn residuals(
         &self,
         columns: &[Columns],
@@ -134,7 +134,7 @@ impl<'a> Equations<'a> {
         columns.iter().map(residual).collect()
     }
 
-    /// Least squares for the coefficients: the force and then `extra` as right-hand sides (of each
+    /// Solves for the coefficients, with the force and then `extra` as right-hand sides (for each
     /// experiment some matrices of rows × degrees of freedom).
     pub(super) fn solve(
         &self,
@@ -151,7 +151,7 @@ impl<'a> Equations<'a> {
         Ok(rows.solve()?)
     }
 
-    /// Weighted rows of one experiment, each line and equation by its real and imaginary part.
+    /// Adds the weighted rows of one experiment: real and imaginary part of each line and equation.
     pub(super) fn push(
         &self,
         rows: &mut LeastSquares,
@@ -166,21 +166,23 @@ impl<'a> Equations<'a> {
             let mut targets = DMatrix::zeros(2 * len * n, 1 + extra.len());
             for (dof, coefficients) in self.coefficients.iter().enumerate() {
                 for row in 0..len {
-                    let (line, place) = (start + row, 2 * (dof * len + row));
+                    let (line, real_row) = (start + row, 2 * (dof * len + row));
                     let weight = weights[(line, dof)];
                     if weight == 0.0 {
                         continue;
                     }
                     for (at, coefficient) in coefficients {
                         let value = self.entry(columns, line, *coefficient) * weight;
-                        (regressors[(place, *at)], regressors[(place + 1, *at)]) =
+                        (regressors[(real_row, *at)], regressors[(real_row + 1, *at)]) =
                             (value.re, value.im);
                     }
                     let target = self.target(columns, line, dof);
-                    let all = std::iter::once(target).chain(extra.iter().map(|e| e[(line, dof)]));
-                    for (at, value) in all.enumerate() {
+                    let targets_of_row =
+                        std::iter::once(target).chain(extra.iter().map(|e| e[(line, dof)]));
+                    for (at, value) in targets_of_row.enumerate() {
                         let value = value * weight;
-                        (targets[(place, at)], targets[(place + 1, at)]) = (value.re, value.im);
+                        (targets[(real_row, at)], targets[(real_row + 1, at)]) =
+                            (value.re, value.im);
                     }
                 }
             }
@@ -189,7 +191,8 @@ impl<'a> Equations<'a> {
         Ok(())
     }
 
-    /// Weighted columns of one equation of one experiment, each with the place of its coefficient.
+    /// Returns the weighted columns of one equation of one experiment, each with the index of its
+    /// coefficient.
     pub(super) fn weighted<'b>(
         &'b self,
         columns: &'b Columns,
@@ -202,7 +205,7 @@ impl<'a> Equations<'a> {
         })
     }
 
-    /// Regressors of one equation in a row, each with the place of its coefficient.
+    /// Returns the regressors of one equation in a row, each with the index of its coefficient.
     pub(super) fn regressors<'b>(
         &'b self,
         columns: &'b Columns,
@@ -215,18 +218,18 @@ impl<'a> Equations<'a> {
         self.coefficients[dof].iter().map(entry)
     }
 
-    /// Returns whether a coefficient stands in the equation of this degree of freedom.
+    /// Returns whether the equation of this degree of freedom has a coefficient.
     pub(super) fn concerns(&self, dof: usize) -> bool {
         !self.coefficients[dof].is_empty()
     }
 
-    /// An error for an equation with neither force nor known entry, which fixes ratios only.
+    /// Refuses an equation without force and known entry, because it determines only ratios.
     pub(super) fn check_forces(&self, columns: &[Columns]) -> Result<(), EstimateError> {
         for dof in 0..self.data.dof() {
-            let still = |columns: &Columns| {
+            let without_force = |columns: &Columns| {
                 (0..self.rows.len()).all(|row| self.target(columns, row, dof) == Complex::ZERO)
             };
-            if self.concerns(dof) && columns.iter().all(still) {
+            if self.concerns(dof) && columns.iter().all(without_force) {
                 return Err(mechid_estimate::only_ratios(self.unknowns, dof));
             }
         }
@@ -244,7 +247,7 @@ fn coefficients(free: &[Parameter], terms: &Terms, dof: usize) -> Vec<(usize, Co
     entries.chain(forces).collect()
 }
 
-/// (iω)², iω or 1.
+/// Returns (iω)², iω or 1.
 pub(super) fn power(matrix: Matrix, omega: f64) -> Complex<f64> {
     match matrix {
         Matrix::Mass => Complex::from(-omega * omega),

@@ -9,10 +9,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ChannelPhase, Misfit, Weighting};
 
-/// A parameter with its name and unit.
+/// Parameter with its name and unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedParameter {
-    /// `m`, `k12`, the name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or `p5`.
+    /// `m`, `k12`, the name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or
+    /// `p5`.
     pub name: String,
     /// SI unit.
     pub unit: String,
@@ -23,17 +24,17 @@ pub struct NamedParameter {
 /// Origin of the standard errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
-    /// Noise of force and response as this many periods of all records show it: the errors hold for noise of any
-    /// colour, and for a residual that is no more than that noise.
+    /// Noise of force and response from this number of periods of all records: the errors hold for
+    /// noise of any spectrum, if the residual does not exceed that noise.
     Periods(usize),
-    /// Scatter of the scores over this many blocks of time: the errors hold for a residual of any
-    /// colour, and where the model misses part of the response.
+    /// Scatter of the scores over this number of blocks of time: the errors hold for a residual of
+    /// any spectrum, also if the model does not explain part of the response.
     Blocks(usize),
-    /// Size of the weighted residual, taken as white: the record is too short for blocks.
+    /// Size of the weighted residual, assumed white: the record is too short for blocks.
     White,
 }
 
-/// An identified nonlinear system with the covariance of all its parameters.
+/// Identified nonlinear system with the covariance of all its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearEstimate {
     pub(super) linear: Estimate,
@@ -45,7 +46,7 @@ pub struct NonlinearEstimate {
     pub(super) weighting: Weighting,
     pub(super) standard_errors: StandardErrors,
     pub(super) misfit: Option<Misfit>,
-    /// Bias of the parameters by noise in their regressors, as several periods show it.
+    /// Bias of the parameters by noise in their regressors, estimated from several periods.
     pub(super) bias: DVector<f64>,
     pub(super) unexplained: Vec<f64>,
     pub(super) ranges: Vec<[f64; 2]>,
@@ -53,7 +54,8 @@ pub struct NonlinearEstimate {
 }
 
 impl NonlinearEstimate {
-    /// A linear system with terms whose coefficients are zero: the start of a search.
+    /// Creates a linear system with terms whose coefficients are zero: the initial estimate of a
+    /// search.
     pub(super) fn without_force(linear: &Estimate, terms: &Terms) -> Result<Self, EstimateError> {
         terms.check_dof(linear.dof())?;
         linear.unknowns().check_unrelated("a fit with nonlinear terms")?;
@@ -74,13 +76,13 @@ impl NonlinearEstimate {
         })
     }
 
-    /// The linear part: M̂, Ĉ, K̂ with their covariance. Its modes are those of small amplitudes, apart from
-    /// terms with a slope at rest.
+    /// Returns the linear part: M̂, Ĉ, K̂ with their covariance. Its modes are the modes for small
+    /// amplitudes, unless a term has a slope at rest.
     pub fn linear(&self) -> &Estimate {
         &self.linear
     }
 
-    /// The identified system.
+    /// Returns the identified system.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if M̂ is singular.
@@ -89,32 +91,33 @@ impl NonlinearEstimate {
         Ok(NonlinearSystem::new(linear, terms, self.coefficients.clone())?)
     }
 
-    /// The identified system with the covariance of its parameters; delay and phase of the channels
-    /// are none of them.
+    /// Returns the identified system with the covariance of its parameters, without delay and phase
+    /// of the channels.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if M̂ is singular, or the covariance is not finite.
     pub fn uncertain_system(&self) -> Result<UncertainNonlinearSystem, EstimateError> {
         let system = self.system()?;
         let named = self.parameters.iter().enumerate();
-        let (places, parameters): (Vec<usize>, Vec<NonlinearParameter>) = named
+        let (indices, parameters): (Vec<usize>, Vec<NonlinearParameter>) = named
             .filter_map(|(at, p)| Some((at, NonlinearParameter::named(&p.name, &system).ok()?)))
             .unzip();
-        let covariance = self.covariance.select_rows(&places).select_columns(&places);
+        let covariance = self.covariance.select_rows(&indices).select_columns(&indices);
         Ok(UncertainNonlinearSystem::new(system, parameters, covariance)?)
     }
 
-    /// The terms, with the constants found inside them.
+    /// Returns the terms with the estimated constants inside them.
     pub fn terms(&self) -> &Terms {
         &self.terms
     }
 
-    /// Returns every parameter estimated: free entries of M, C and K, coefficients of terms, shape constants.
+    /// Returns every parameter estimated: free entries of M, C and K, coefficients of terms, shape
+    /// constants.
     pub fn parameters(&self) -> &[NamedParameter] {
         &self.parameters
     }
 
-    /// One parameter by its name, in its unit.
+    /// Returns one parameter by its name.
     ///
     /// # Errors
     /// [`EstimateError::NoSuchParameter`].
@@ -125,17 +128,17 @@ impl NonlinearEstimate {
         })
     }
 
-    /// Covariance of the parameters, one row and column for each, in the products of their units.
+    /// Returns the covariance of the parameters, in the products of their units.
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }
 
-    /// Delay and phase of the channels; zero unless they were estimated.
+    /// Returns delay and phase of the channels; zero unless they were estimated.
     pub fn channels(&self) -> ChannelPhase {
         self.channels
     }
 
-    /// The weighting of the rows that was used.
+    /// Returns the weighting of the rows.
     pub fn weighting(&self) -> Weighting {
         self.weighting
     }
@@ -145,35 +148,35 @@ impl NonlinearEstimate {
         self.standard_errors
     }
 
-    /// Returns the residual of the mean periods against the noise that the periods show; `None` of open records and of
-    /// single periods.
+    /// Returns the comparison of the residual of the mean periods with the noise of the periods;
+    /// `None` for open records and single periods.
     pub fn misfit(&self) -> Option<Misfit> {
         self.misfit
     }
 
-    /// Part of each degree of freedom's response (a ratio, one for each) that the model does not
-    /// explain: of a fit of lines what the equation error makes of displacement through the linear
-    /// part, on these lines; of a fit in time what is left of the record.
+    /// Returns the share (RMS) of the response of each degree of freedom that the model does not
+    /// explain. For a fit of lines this is the response of the linear part to the equation error;
+    /// for a fit in time, the residual.
     pub fn unexplained(&self) -> &[f64] {
         &self.unexplained
     }
 
-    /// Returns for each term the largest displacement (m) and velocity (m/s) of its coordinate in the data.
-    /// Beyond them the term is extrapolated.
+    /// Returns for each term the largest displacement (m) and velocity (m/s) of its coordinate in
+    /// the data. Beyond them the term is extrapolated.
     pub fn ranges(&self) -> &[[f64; 2]] {
         &self.ranges
     }
 
-    /// The force (N, one for each degree of freedom) that holds the system at a displacement (m) and
-    /// velocity (m/s), C ẋ + K x + Σ θ f, with the standard error that the covariance of its
-    /// parameters gives (constants inside the laws are taken as known).
+    /// Returns the restoring force C ẋ + K x + Σ θ f (N, one for each degree of freedom) at a
+    /// displacement (m) and velocity (m/s), with the standard error from the covariance of the
+    /// parameters (constants inside the laws count as known).
     ///
-    /// A polynomial is held by the data within [`NonlinearEstimate::ranges`] only: how the standard
-    /// error grows beyond them tells how far it can be extrapolated.
+    /// The data determine a polynomial only within [`NonlinearEstimate::ranges`]: the growth of the
+    /// standard error outside shows how far it can be extrapolated.
     ///
     /// # Errors
-    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one displacement and one velocity for each degree of
-    /// freedom.
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one
+    /// displacement and one velocity for each degree of freedom.
     ///
     /// # Source
     /// Worden & Tomlinson, *Nonlinearity in Structural Dynamics* (2001), chapter 7 (restoring force
@@ -188,7 +191,7 @@ impl NonlinearEstimate {
         check_size("velocities", n, velocity.len())?;
         let free = self.linear.unknowns().free();
         let matrices = [self.linear.damping(), self.linear.stiffness()];
-        let of = |dof: usize| {
+        let force_of = |dof: usize| {
             let linear = |column: usize| {
                 matrices[0][(dof, column)] * velocity[column]
                     + matrices[1][(dof, column)] * displacement[column]
@@ -211,17 +214,17 @@ impl NonlinearEstimate {
             let degrees_of_freedom = self.linear.degrees_of_freedom();
             Uncertain { value, standard_error: variance.max(0.0).sqrt(), degrees_of_freedom }
         };
-        Ok((0..n).map(of).collect())
+        Ok((0..n).map(force_of).collect())
     }
 
-    /// Real equations that were fitted.
+    /// Returns the number of real equations of the fit.
     pub fn equations(&self) -> usize {
         self.equations
     }
 }
 
 impl fmt::Display for NamedParameter {
-    /// `k3 = 3.951e0 ± 1.7e-3 N/m³`, the number after ± being one standard error.
+    /// `k3 = 3.951e0 ± 1.7e-3 N/m³`, with one standard error after ±.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit, Uncertain { value, standard_error, .. }) =
             (&self.name, &self.unit, self.estimate);
@@ -230,7 +233,7 @@ impl fmt::Display for NamedParameter {
 }
 
 impl fmt::Display for NonlinearEstimate {
-    /// One parameter a line.
+    /// Writes one parameter per line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.parameters.iter().try_for_each(|parameter| writeln!(f, "{parameter}"))
     }

@@ -1,4 +1,4 @@
-//! Steady periods of one or several experiments, and the columns that terms make of them.
+//! Steady periods of one or several experiments, and their regressors for nonlinear terms.
 
 use mechid_estimate::EstimateError;
 use mechid_model::{ResponseQuantity, Terms};
@@ -13,13 +13,11 @@ use super::channel_phase::displacement_lines;
 use super::grid::Grid;
 use crate::limits::EXPERIMENT_FINER;
 
-/// Forces and responses in the steady state under periodic excitation, one mean period of each
-/// experiment.
+/// Steady-state forces and responses under periodic excitation, one mean period per experiment.
 ///
-/// Unlike [`FrequencyData`](mechid_spectra::FrequencyData) it keeps all lines of the period:
-/// a power of the response needs all of them, and the response of a nonlinear system to a few lines
-/// of force has all of them. The equation of motion is fitted on the `lines`, those without force
-/// included.
+/// Unlike [`FrequencyData`](mechid_spectra::FrequencyData) it contains all lines of the period: a
+/// nonlinear system responds at all lines even if the force has few, and a power of the response
+/// needs all of them. The equation of motion is fitted on `lines`, including lines without force.
 pub struct SteadyExperiments {
     lines: Vec<usize>,
     period: Sampling,
@@ -31,13 +29,13 @@ pub struct SteadyExperiments {
 
 /// One experiment.
 struct Experiment {
-    /// The mean of its periods.
+    /// Mean of its periods.
     mean: Steady,
-    /// The periods one by one, where there are several.
+    /// Single periods; empty if there is only one.
     periods: Vec<Steady>,
 }
 
-/// Lines 0, 1, … of one period, without that at half the sampling rate: lines × degrees of freedom.
+/// Lines 0, 1, … of one period, below half the sampling rate: lines × degrees of freedom.
 struct Steady {
     force: DMatrix<Complex<f64>>,
     displacement: DMatrix<Complex<f64>>,
@@ -54,8 +52,8 @@ pub(super) struct Columns {
 }
 
 impl SteadyExperiments {
-    /// No experiment yet, of `dof` degrees of freedom, on the lines of a period in which the equation
-    /// of motion is to hold.
+    /// Creates an empty set for `dof` degrees of freedom; the equation of motion will be fitted on
+    /// `lines` of a period.
     pub fn new(lines: &Lines, dof: usize, measured: ResponseQuantity) -> Self {
         let period = lines.sampling();
         let mut rising = lines.as_slice().to_vec();
@@ -65,15 +63,16 @@ impl SteadyExperiments {
         Self { lines: rising, period, dof, measured, grid, steady: Vec::new() }
     }
 
-    /// Adds an experiment: whole periods of force (N) and response (m, m/s or m/s²), of which the
-    /// mean is taken; an incomplete one at the end is left out.
+    /// Adds an experiment: the mean of the whole periods of force (N) and response (m, m/s or
+    /// m/s²); an incomplete period at the end is ignored.
     ///
-    /// Even powers need the displacement's zero: take away the offset of the sensor first, that of
-    /// the whole record ([`Record::without_mean`]) if nothing better is known.
+    /// Even powers depend on the zero of the displacement: subtract the offset of the sensor first,
+    /// or the mean of the whole record ([`Record::without_mean`]) if the offset is unknown.
     ///
     /// # Errors
-    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::Signal`] if the
-    /// records have not the time step of the lines or less than one period.
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of
+    /// channels, [`EstimateError::Signal`] if the time step differs from the time step of the
+    /// lines, or a record is shorter than one period.
     pub fn push(&mut self, force: &Record, response: &Record) -> Result<(), EstimateError> {
         force.check_same_sampling(response)?;
         check_size("channels of the force", self.dof, force.channels())?;
@@ -103,32 +102,32 @@ impl SteadyExperiments {
         })
     }
 
-    /// Experiments so far.
+    /// Returns the number of experiments.
     pub fn count(&self) -> usize {
         self.steady.len()
     }
 
-    /// Quantity of the responses.
+    /// Returns the quantity of the responses.
     pub fn measured(&self) -> ResponseQuantity {
         self.measured
     }
 
-    /// Degrees of freedom n.
+    /// Returns the number of degrees of freedom.
     pub fn dof(&self) -> usize {
         self.dof
     }
 
-    /// The lines on which the equation of motion holds, rising.
+    /// Returns the lines on which the equation of motion is fitted, rising.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
 
-    /// Time axis of one period.
+    /// Returns the time axis of one period.
     pub fn period(&self) -> Sampling {
         self.period
     }
 
-    /// Columns of every experiment at some lines.
+    /// Returns the columns of every experiment at some lines.
     pub(super) fn columns(
         &self,
         rows: &[usize],
@@ -139,7 +138,8 @@ impl SteadyExperiments {
         self.steady.par_iter().map(mean).collect()
     }
 
-    /// Columns of every period of an experiment at some lines; none of a single period.
+    /// Returns the columns of every period of an experiment at some lines; empty for a single
+    /// period.
     pub(super) fn columns_of_periods(
         &self,
         experiment: usize,
@@ -165,9 +165,9 @@ impl SteadyExperiments {
             })
         };
         let signals = self.signals(steady, &corrections, terms);
-        let mut of_terms = DMatrix::zeros(rows.len(), terms.len());
+        let mut term_columns = DMatrix::zeros(rows.len(), terms.len());
         let samples = EXPERIMENT_FINER * self.period.len();
-        for (term, mut column) in terms.iter().zip(of_terms.column_iter_mut()) {
+        for (term, mut column) in terms.iter().zip(term_columns.column_iter_mut()) {
             let mut values = vec![0.0; samples];
             let (mut x, mut v) = (vec![0.0; self.dof], vec![0.0; self.dof]);
             for (k, value) in values.iter_mut().enumerate() {
@@ -184,12 +184,12 @@ impl SteadyExperiments {
         Columns {
             force: corrected(&steady.force, 0),
             displacement: corrected(&steady.displacement, 1),
-            terms: of_terms,
+            terms: term_columns,
         }
     }
 
-    /// Displacement (m) and velocity (m/s) on the finer grid, of the degrees of freedom that terms
-    /// depend on.
+    /// Returns displacement (m) and velocity (m/s) on the finer grid for the degrees of freedom on
+    /// which terms depend.
     fn signals(
         &self,
         steady: &Steady,
@@ -212,7 +212,7 @@ impl SteadyExperiments {
         (0..self.dof).map(signal).collect()
     }
 
-    /// Displacement of every experiment, corrected for what the channels do to it: lines × degrees of
+    /// Returns the displacement of every experiment, corrected for the channels: lines × degrees of
     /// freedom.
     pub(super) fn displacements(&self, channels: &ChannelPhase) -> Vec<DMatrix<Complex<f64>>> {
         let corrections = self.corrections(channels);
@@ -236,7 +236,8 @@ impl SteadyExperiments {
         line as f64 * self.period.omega0()
     }
 
-    /// The largest |q| (m) and |q̇| (m/s) of all experiments, for the coordinate of each term.
+    /// Returns the largest |q| (m) and |q̇| (m/s) of all experiments for the coordinate of each
+    /// term.
     pub(super) fn ranges(&self, terms: &Terms, channels: &ChannelPhase) -> Vec<[f64; 2]> {
         let corrections = self.corrections(channels);
         let mut ranges = vec![[0.0f64; 2]; terms.len()];
@@ -245,8 +246,9 @@ impl SteadyExperiments {
             for (term, range) in terms.iter().zip(&mut ranges) {
                 for k in 0..EXPERIMENT_FINER * self.period.len() {
                     for (kind, largest) in range.iter_mut().enumerate() {
-                        let of = |dof: usize| signals[dof].as_ref().map_or(0.0, |s| s[kind][k]);
-                        let sum = (0..self.dof).map(|dof| term.coordinate().sign(dof) * of(dof));
+                        let signal = |dof: usize| signals[dof].as_ref().map_or(0.0, |s| s[kind][k]);
+                        let sum =
+                            (0..self.dof).map(|dof| term.coordinate().sign(dof) * signal(dof));
                         *largest = largest.max(sum.sum::<f64>().abs());
                     }
                 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mechid_signal::transform::{self, ComplexToReal, RealToComplex};
 use nalgebra::Complex;
 
-/// A period on `samples` instants, of which the lines below `lines` are used; scaled as in
+/// Period of `samples` samples and its lines 0 to `lines` − 1, scaled as in
 /// [`mechid_signal::spectrum`].
 #[derive(Clone)]
 pub(super) struct Grid {
@@ -16,13 +16,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Makes the grid for lines 0 to `lines` − 1, all of them below half of `samples`.
+    /// Creates the grid for lines 0 to `lines` − 1, all below half of `samples`.
     pub(super) fn new(lines: usize, samples: usize) -> Self {
         let (forward, inverse) = (transform::forward(samples), transform::inverse(samples));
         Self { lines, samples, forward, inverse }
     }
 
-    /// Samples of the period whose lines are these, those beyond the last being zero.
+    /// Returns the samples of a period from its lines; higher lines are zero.
     pub(super) fn to_samples(&self, lines: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
         let mut input = self.inverse.make_input_vec();
         for (n, (slot, line)) in input.iter_mut().zip(lines).enumerate() {
@@ -33,7 +33,7 @@ impl Grid {
         output
     }
 
-    /// Lines 0 to `lines` − 1 of a period; the samples are used up.
+    /// Returns lines 0 to `lines` − 1 of a period.
     pub(super) fn to_lines(&self, mut samples: Vec<f64>) -> Vec<Complex<f64>> {
         let mut output = self.forward.make_output_vec();
         self.forward.process(&mut samples, &mut output).expect("buffers come from the plan");

@@ -1,6 +1,6 @@
 //! Systems with nonlinear springs and dampers, from steady periods or any record.
 //!
-//! Nonlinear terms ([`Terms`](mechid_model::Terms)) are more regressors of the same equation of
+//! Nonlinear terms ([`Terms`](mechid_model::Terms)) are further regressors of the equation of
 //! motion:
 //!
 //! ```text

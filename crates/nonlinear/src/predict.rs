@@ -12,24 +12,25 @@ use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::limits::{PREDICTION_CLOSED, PREDICTION_SHOTS};
 
 /// Displacement, velocity and acceleration of a nonlinear system under a sampled force (N), from
-/// `start` for an open record, in a steady state for a whole period (the search for it begins at
+/// `start` for an open record, or in the steady state for a whole period (its search begins at
 /// `start`).
 ///
-/// Between the samples the force is band-limited, which a held or linear one is not: of a hardening
-/// spring that drives its own third harmonic the difference is several times the noise of a good
-/// sensor. The steps follow the classical Runge–Kutta rule, twice as many to a sample until the response
-/// settles to 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A hardening
-/// spring may have several steady states; the one found is near the start.
+/// Between the samples the force is band-limited, not held or linear: for a hardening spring with a
+/// third harmonic near resonance, the difference is several times the noise of a good sensor. The
+/// classical Runge–Kutta method is used with a step that is halved until the response changes by
+/// less than 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A
+/// hardening spring may have several steady states; the returned one is near `start`.
 ///
 /// # Errors
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::TooStiff`] if the fastest
-/// mode is too fast for the sampling, [`EstimateError::Diverged`] if the response overflows,
-/// [`EstimateError::NoSteadyState`] if none was found.
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels,
+/// [`EstimateError::TooStiff`] if the fastest mode is too fast for the sampling,
+/// [`EstimateError::Diverged`] if the response overflows, [`EstimateError::NoSteadyState`] if the
+/// search does not converge.
 ///
 /// # Source
 /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), section
-/// II.1; Seydel, *Practical Bifurcation and Stability Analysis*, 3rd ed. (2010), chapter 7 (shooting
-/// for periodic solutions).
+/// II.1; Seydel, *Practical Bifurcation and Stability Analysis*, 3rd ed. (2010), chapter 7
+/// (shooting for periodic solutions).
 pub fn predict(
     system: &NonlinearSystem,
     force: &Record,
@@ -54,7 +55,7 @@ pub fn predict(
     Ok(Response::new(record(0)?, record(1)?, record(2)?)?)
 }
 
-/// The state that a period of the force leads back to, by Newton's method on the period's end.
+/// Returns the state that recurs after one period of the force, by Newton's method (shooting).
 fn steady_start(
     system: &NonlinearSystem,
     force: &Record,
@@ -79,7 +80,8 @@ fn steady_start(
         }
         let over = DMatrix::from_column_slice(2 * n, 2 * n, &course.end[2 * n..]);
         let closing = DMatrix::identity(2 * n, 2 * n) - over;
-        // Without an inverse, or far away, the period itself leads on.
+        // The state after one period is the next estimate if the matrix is singular or the step too
+        // large.
         state = match closing.lu().solve(&gap) {
             Some(step) if step.iter().all(|s| s.is_finite()) && step.amax() <= size => state + step,
             _ => end,
@@ -93,17 +95,19 @@ pub(super) fn initial(state: &DVector<f64>) -> Result<InitialState, EstimateErro
     Ok(InitialState::new(state.rows(0, n).into_owned(), state.rows(n, n).into_owned())?)
 }
 
-/// The state at the first sample with which [`predict`] comes closest to the responses measured, each
-/// channel relative to its size: what an open record starts from.
+/// Returns the initial state of an open record for which [`predict`] fits the measured responses
+/// best, each channel relative to its size.
 ///
-/// Take the first samples only, some time constants of the system: the start shows no longer later.
+/// Use only the first samples, some time constants of the system: later samples do not depend on
+/// the initial state.
 ///
 /// # Errors
-/// As [`predict`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Signal`] if the responses do not belong
-/// to the force, [`EstimateError::NotConverged`].
+/// As [`predict`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or
+/// [`EstimateError::Signal`] if the responses do not match the force,
+/// [`EstimateError::NotConverged`].
 ///
 /// # Source
-/// That of [`predict`], section I.14 there for the derivatives.
+/// As [`predict`], with section I.14 for the derivatives.
 pub fn fitted_start(
     system: &NonlinearSystem,
     force: &Record,
@@ -123,7 +127,7 @@ pub fn fitted_start(
     initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.parameters)
 }
 
-/// Measured less predicted response as a function of the start.
+/// Measured minus predicted response as a function of the initial state.
 struct Start<'a> {
     system: &'a NonlinearSystem,
     directions: &'a [Direction],
@@ -133,7 +137,8 @@ struct Start<'a> {
 }
 
 impl Start<'_> {
-    /// Channels measured: column of the state and samples, over their size.
+    /// Returns for each measured channel the column of the state, the samples and the reciprocal of
+    /// their norm.
     fn channels(&self) -> impl Iterator<Item = (usize, &[f64], f64)> {
         let n = self.system.dof();
         self.measured.iter().flat_map(move |(kind, record)| {

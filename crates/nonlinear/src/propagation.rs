@@ -1,14 +1,14 @@
-//! Noise on the samples of a force, carried to the response and back.
+//! Propagation of noise on the samples of a force to the response, and its adjoint.
 
 use mechid_model::ResponseQuantity;
 use nalgebra::{DMatrix, DVector};
 
 use super::simulate::Transition;
 
-/// The response to small changes of the samples of a force beside a course, linearised.
+/// Linearised response to small changes of the force about a simulated response.
 ///
-/// Between the samples a force is band-limited; here each sample is a push of its impulse, half of it before
-/// the sample and half after: the same up to half the sampling rate.
+/// Between the samples a force is band-limited. Here each sample acts as an impulse, half of it
+/// before the sample and half after: the two are equivalent below half the sampling rate.
 pub(super) struct Propagation<'a> {
     transitions: &'a [Transition],
     inverse_mass: &'a DMatrix<f64>,
@@ -30,8 +30,9 @@ impl<'a> Propagation<'a> {
         self.inverse_mass.nrows()
     }
 
-    /// Derivatives of the measured response by the state at a sample, n × 2n.
-    fn shown(&self, sample: usize) -> DMatrix<f64> {
+    /// Returns the derivatives of the measured response with respect to the state at a sample, n ×
+    /// 2n.
+    fn output(&self, sample: usize) -> DMatrix<f64> {
         let n = self.dof();
         let part = |first: usize| {
             DMatrix::from_fn(n, 2 * n, |row, column| f64::from(column == first + row))
@@ -47,7 +48,8 @@ impl<'a> Propagation<'a> {
         self.measured == ResponseQuantity::Acceleration
     }
 
-    /// The change of the response (samples × n) by one of the force (N, samples × n), from the same start.
+    /// Returns the change of the response (samples × n) for a change of the force (N, samples × n),
+    /// with the same initial state.
     pub(super) fn response(&self, force: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.dof();
         let mut response = DMatrix::zeros(force.nrows(), n);
@@ -59,11 +61,11 @@ impl<'a> Propagation<'a> {
                     state[n + dof] += 0.5 * self.dt * push[dof];
                 }
                 if half == 0 {
-                    let mut shown = self.shown(sample) * &state;
+                    let mut output = self.output(sample) * &state;
                     if self.is_acceleration() {
-                        shown += &push;
+                        output += &push;
                     }
-                    response.row_mut(sample).copy_from(&shown.transpose());
+                    response.row_mut(sample).copy_from(&output.transpose());
                 }
             }
             state = &transition.state * state;
@@ -71,25 +73,25 @@ impl<'a> Propagation<'a> {
         response
     }
 
-    /// The weights (samples × n) of a force's changes in the sum of the products of the response's changes with
-    /// given weights (samples × n): the adjoint of [`Propagation::response`].
+    /// Returns the adjoint of [`Propagation::response`]: the weights (samples × n) of the force in
+    /// the inner product of the response with given weights (samples × n).
     pub(super) fn adjoint(&self, weights: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.dof();
-        let mut of_force = DMatrix::zeros(weights.nrows(), n);
+        let mut force_weights = DMatrix::zeros(weights.nrows(), n);
         let mut later = DVector::<f64>::zeros(2 * n);
         for (sample, transition) in self.transitions.iter().enumerate().rev() {
             let weight = weights.row(sample).transpose();
-            let here = self.shown(sample).transpose() * &weight;
+            let here = self.output(sample).transpose() * &weight;
             let after = transition.state.transpose() * later;
             let mut push = (here.rows(n, n) * 0.5 + after.rows(n, n)) * self.dt;
             if self.is_acceleration() {
                 push += &weight;
             }
             let load = self.inverse_mass.transpose() * push;
-            of_force.row_mut(sample).copy_from(&load.transpose());
+            force_weights.row_mut(sample).copy_from(&load.transpose());
             later = here + after;
         }
-        of_force
+        force_weights
     }
 }
 

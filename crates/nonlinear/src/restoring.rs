@@ -1,4 +1,4 @@
-//! Restoring forces: measured sample by sample, and beyond the data.
+//! Restoring forces: measured points, and extrapolation beyond the data.
 
 use mechid_estimate::EstimateError;
 use mechid_model::{Coordinate, Matrix, Term};
@@ -11,7 +11,7 @@ use super::estimate::NonlinearEstimate;
 use super::grid::Grid;
 use crate::limits::{HIGHEST_ORDER, RESTORING_NEGLIGIBLE, RESTORING_POOR};
 
-/// Points of the restoring-force surface: the measured force less that of the masses, over
+/// Points of the restoring-force surface: the measured force minus the inertia force, over
 /// displacement and velocity. All records are samples of one period × degrees of freedom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestoringForce {
@@ -21,7 +21,7 @@ pub struct RestoringForce {
     pub velocity: Record,
     /// F − M̂ ẍ on the lines of the fit, in N.
     pub measured: Record,
-    /// Part of it that the identified springs and dampers leave, in N.
+    /// Part of `measured` that the identified springs and dampers do not explain, in N.
     pub residual: Record,
 }
 
@@ -31,28 +31,29 @@ pub struct RestoringForce {
 pub struct Extrapolation {
     /// Name of the term.
     pub term: String,
-    /// Power with which the force of the term grows between the edge of the data and there: a pure number,
-    /// 3 for a cubic spring.
+    /// Exponent with which the force of the term grows between the edge of the data and there; 3
+    /// for a cubic spring.
     pub order: f64,
-    /// Standard error of the restoring force over the restoring force, at the edge of the data and at
-    /// [`REACH`] times as far; ratios.
+    /// Ratio of the standard error of the restoring force to the restoring force, at the edge of
+    /// the data and at [`REACH`] times as far.
     pub relative_error: [f64; 2],
-    /// Force of the term over the restoring force, at the same two places; ratios.
+    /// Ratio of the force of the term to the restoring force, at the same two points.
     pub share: [f64; 2],
 }
 
-/// Multiple of the largest displacement and velocity in the data at which restoring forces are judged
-/// (pure number).
+/// Multiple of the largest displacement and velocity in the data at which the extrapolation is
+/// assessed.
 pub const REACH: f64 = 1.5;
 
 impl Extrapolation {
-    /// Returns true if the restoring force is poorly known beyond the data: its standard error exceeds 10 % there,
-    /// or a term of fourth or higher order makes more than 1 % of it.
+    /// Returns true if the restoring force is poorly known beyond the data: its standard error
+    /// exceeds 10 % there, or a term of fourth or higher order makes more than 1 % of it.
     pub fn is_poor(&self) -> bool {
         self.relative_error[1] > RESTORING_POOR || self.grows_fast()
     }
 
-    /// Returns true if the term is of fourth or higher order and makes more than 1 % of the force there.
+    /// Returns true if the term is of fourth or higher order and makes more than 1 % of the force
+    /// there.
     pub fn grows_fast(&self) -> bool {
         self.order > HIGHEST_ORDER && self.share[1].abs() > RESTORING_NEGLIGIBLE
     }
@@ -61,11 +62,11 @@ impl Extrapolation {
 impl NonlinearEstimate {
     /// Returns the points of the restoring-force surface of each experiment, over one period.
     ///
-    /// Beyond the lines of the fit neither force nor acceleration counts, so that noise there does not
-    /// hide the surface; displacement and velocity have all their lines.
+    /// Force and acceleration contain only the lines of the fit, so that noise on other lines does
+    /// not hide the surface; displacement and velocity contain all lines.
     ///
     /// # Errors
-    /// As [`equation_error`](super::equation_error) if the data are not those of this system.
+    /// As [`equation_error`](super::equation_error) if the data do not belong to this system.
     ///
     /// # Source
     /// Masri & Caughey (1979), Journal of Applied Mechanics 46, 433–447 (restoring force surface).
@@ -86,8 +87,8 @@ impl NonlinearEstimate {
             let channels: Vec<Vec<f64>> = (0..data.dof()).map(channel).collect();
             Ok(Record::from_channels(data.period(), &channels)?)
         };
-        // Lines of the rows alone.
-        let of_rows = |rows: &DMatrix<Complex<f64>>, line: usize, dof: usize| {
+        // Values on the lines of the fit; zero on other lines.
+        let row_value = |rows: &DMatrix<Complex<f64>>, line: usize, dof: usize| {
             equations.rows.binary_search(&line).map_or(Complex::ZERO, |row| rows[(row, dof)])
         };
         let mass = self.linear.mass();
@@ -99,7 +100,7 @@ impl NonlinearEstimate {
                 let omega = |line: usize| data.omega(line);
                 let inertia = |line: usize, dof: usize| {
                     let of = |column: usize| {
-                        of_rows(&columns.displacement, line, column) * mass[(dof, column)]
+                        row_value(&columns.displacement, line, column) * mass[(dof, column)]
                     };
                     let sum: Complex<f64> = (0..data.dof()).map(of).sum();
                     sum * power(Matrix::Mass, omega(line))
@@ -110,22 +111,22 @@ impl NonlinearEstimate {
                         displacement[(line, dof)] * Complex::new(0.0, omega(line))
                     })?,
                     measured: record(&|line, dof| {
-                        of_rows(&columns.force, line, dof) - inertia(line, dof)
+                        row_value(&columns.force, line, dof) - inertia(line, dof)
                     })?,
-                    residual: record(&|line, dof| of_rows(residual, line, dof))?,
+                    residual: record(&|line, dof| row_value(residual, line, dof))?,
                 })
             })
             .collect()
     }
 
-    /// Returns how each term and the restoring force it belongs to grow from the largest displacement
-    /// and velocity in the data ([`NonlinearEstimate::ranges`]) to [`REACH`] times as far.
+    /// Returns the growth of each term and of its restoring force from the largest displacement and
+    /// velocity in the data ([`NonlinearEstimate::ranges`]) to [`REACH`] times as far.
     ///
-    /// A term of the displacement alone is looked at without velocity, one of the velocity alone
-    /// without displacement. Constant forces are left out.
+    /// A term of the displacement only is evaluated at zero velocity, a term of the velocity only
+    /// at zero displacement. Constant forces are ignored.
     ///
     /// # Errors
-    /// None; only those of [`NonlinearEstimate::restoring_force`], which the sizes here cannot have.
+    /// No error occurs; the type is that of [`NonlinearEstimate::restoring_force`].
     pub fn extrapolations(&self) -> Result<Vec<Extrapolation>, EstimateError> {
         let named = self.terms.iter().zip(&self.coefficients).zip(&self.ranges);
         named
@@ -162,8 +163,8 @@ impl NonlinearEstimate {
     }
 }
 
-/// Displacements or velocities with this value of a coordinate, shared between its two degrees of
-/// freedom where it is a difference.
+/// Returns displacements or velocities with this value of a coordinate; a difference is shared
+/// equally between its two degrees of freedom.
 fn spread(coordinate: Coordinate, dof: usize, value: f64) -> Vec<f64> {
     let signs: Vec<f64> = (0..dof).map(|dof| coordinate.sign(dof)).collect();
     let moved: f64 = signs.iter().map(|sign| sign.abs()).sum();

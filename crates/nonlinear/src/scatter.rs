@@ -1,4 +1,4 @@
-//! Standard errors and misfit from how the periods of a record differ.
+//! Standard errors and test of the residual from the scatter of the periods of a record.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -6,17 +6,17 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::estimate::StandardErrors;
 use crate::limits::{SCATTER_ROUNDING, SIGNIFICANT};
 
-/// Power of what a model leaves of the mean periods, against what their scatter accounts for.
+/// Comparison of the residual power of the mean periods with the noise power from their scatter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
-    /// Residual power over that of the noise (pure number): 1 if the model is right.
+    /// Ratio of residual power to noise power: 1 if the model is correct.
     pub ratio: f64,
-    /// Probability that noise alone leaves as much (pure number).
+    /// Probability of a ratio as large by noise alone.
     pub p_value: f64,
 }
 
 impl Misfit {
-    /// Returns whether the model misses more than noise.
+    /// Returns whether the residual exceeds the noise significantly.
     pub(super) fn is_significant(self) -> bool {
         self.p_value < SIGNIFICANT
     }
@@ -26,27 +26,28 @@ impl Misfit {
 pub(super) struct Line<'a> {
     /// Deviations, channels × periods.
     pub(super) deviations: &'a DMatrix<Complex<f64>>,
-    /// Factor of a product of two values, conjugate and plain, in a sum over samples.
+    /// Factor of the product of a value and a conjugate value of this line in the equivalent sum
+    /// over samples.
     pub(super) weight: f64,
-    /// Whether the values are real: those of the mean, and at half the sampling rate.
+    /// `true` if the values are real: on line 0 and at half the sampling rate.
     pub(super) is_real: bool,
 }
 
-/// Covariance of parameters by the noise that the periods show, line by line.
+/// Covariance of parameters from the scatter of the periods, line by line.
 ///
-/// An estimate from mean periods moves with the noise e on them by G Σ Re(ḡ e), the sum being over lines
-/// and channels, g the sensitivities of the residuals and G = (AᵀA)⁻¹. The deviations of the periods from
-/// their mean have that noise, whatever its spectrum and however the channels are correlated; lines of stationary
-/// noise are independent, so that each adds degrees of freedom.
+/// Noise e on the mean periods changes an estimate by G Σ Re(ḡ e), summed over lines and channels,
+/// with the sensitivities g of the residuals and G = (AᵀA)⁻¹. The deviations of the periods from
+/// their mean show this noise for any spectrum and any correlation of the channels; lines of
+/// stationary noise are independent, so that each adds degrees of freedom.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 2
-/// (sample covariances of periods) and 9 (covariance of estimates); Satterthwaite (1946), Biometrics Bulletin
-/// 2, 110–114, for the degrees of freedom.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapters 2 (sample covariances of periods) and 9 (covariance of estimates); Satterthwaite
+/// (1946), Biometrics Bulletin 2, 110–114, for the degrees of freedom.
 pub(super) struct PeriodScatter {
     covariance: DMatrix<f64>,
     sums: DVector<f64>,
-    /// Squares of the contributions over the degrees of freedom of each.
+    /// Squared contributions, each divided by its degrees of freedom.
     squares: DVector<f64>,
     periods: usize,
 }
@@ -61,7 +62,7 @@ impl PeriodScatter {
         }
     }
 
-    /// Counts the periods of an experiment.
+    /// Adds the number of periods of an experiment.
     pub(super) fn count(&mut self, periods: usize) {
         self.periods += periods;
     }
@@ -74,7 +75,8 @@ impl PeriodScatter {
         line: &Line<'_>,
     ) {
         let periods = line.deviations.ncols() as f64;
-        // Sums of real parts: of a complex number each part has half of its variance.
+        // The estimate depends on real parts: each part of a complex value has half of its
+        // variance.
         let part = if line.is_real { 1.0 } else { 0.5 };
         let scale = line.weight.powi(2) * part / (periods * (periods - 1.0));
         let freedom = (periods - 1.0) * if line.is_real { 1.0 } else { 2.0 };
@@ -90,11 +92,12 @@ impl PeriodScatter {
         self.sums += variances;
     }
 
-    /// The covariance with the degrees of freedom of that of the first `wanted` parameters that has least.
+    /// Returns the covariance, its origin, and the least degrees of freedom of the first `wanted`
+    /// parameters.
     pub(super) fn finish(self, wanted: usize) -> (DMatrix<f64>, StandardErrors, usize) {
-        let of = |(sum, square): (&f64, &f64)| sum * sum / square;
-        let each = self.sums.iter().zip(self.squares.iter()).take(wanted).map(of);
-        let least = each.filter(|freedom| freedom.is_finite()).fold(f64::INFINITY, f64::min);
+        let ratio = |(sum, square): (&f64, &f64)| sum * sum / square;
+        let freedoms = self.sums.iter().zip(self.squares.iter()).take(wanted).map(ratio);
+        let least = freedoms.filter(|freedom| freedom.is_finite()).fold(f64::INFINITY, f64::min);
         let freedom = if least.is_finite() { (least as usize).max(1) } else { 1 };
         (self.covariance, StandardErrors::Periods(self.periods), freedom)
     }
@@ -106,13 +109,13 @@ pub(super) struct Powers {
     residual: f64,
     noise: f64,
     signal: f64,
-    /// Squares of the noise over the degrees of freedom of the residual and of the scatter.
+    /// Squares of the noise divided by the degrees of freedom of the residual and of the scatter.
     squares: [f64; 2],
 }
 
 impl Powers {
-    /// Adds a line: the squared absolute value of its mean residual and the mean square deviation of the mean that its
-    /// `periods` show, both weighted, beside the power of the signal.
+    /// Adds a line: the squared magnitude of its mean residual, the variance of the mean from its
+    /// `periods`, and the power of the signal, all weighted.
     pub(super) fn push(
         &mut self,
         [residual, noise, signal]: [f64; 3],
@@ -127,7 +130,8 @@ impl Powers {
         self.squares[1] += noise * noise / (parts * (periods - 1) as f64);
     }
 
-    /// The test whether the residual has more power than the noise; `None` where the periods differ by rounding alone.
+    /// Tests whether the residual has more power than the noise; `None` if the periods differ only
+    /// by rounding.
     ///
     /// # Source
     /// Satterthwaite (1946), as for the standard errors: sums of squares of unequal variance.
@@ -146,8 +150,8 @@ impl Powers {
 mod tests {
     use super::*;
 
-    /// A mean of P values on L lines: its variance is that of the values over P, with 2 L (P − 1) degrees of freedom,
-    /// fewer where the values of the lines are found to differ.
+    /// A mean of P values on L lines: its variance is that of the values over P, with 2 L (P − 1)
+    /// degrees of freedom, fewer where the values of the lines are found to differ.
     #[test]
     fn a_mean_has_the_variance_of_its_values() {
         let (lines, periods) = (50, 4);

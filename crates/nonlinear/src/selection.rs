@@ -1,4 +1,4 @@
-//! Selection of the nonlinear terms that the data ask for.
+//! Selection of nonlinear terms from candidates.
 
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Term, Terms};
@@ -12,7 +12,7 @@ use super::shape::{Shape, ShapeConstants};
 use super::{NonlinearEstimate, SteadyExperiments, Weighting};
 use crate::limits::{SELECTION_LEVEL, SIGNIFICANT};
 
-/// Criterion by which a term is added.
+/// Criterion for the addition of a term.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -20,59 +20,60 @@ use crate::limits::{SELECTION_LEVEL, SIGNIFICANT};
     serde(rename_all = "kebab-case")
 )]
 pub enum Criterion {
-    /// The extended Bayesian information criterion: the misfit must fall by more than its
-    /// logarithmic price for a parameter chosen among so many. Because it takes the residual as
-    /// white, the terms added are looked at again when all are there: one whose coefficient does not
-    /// differ from zero by its standard error, at 1 % for all candidates together, is removed
+    /// The extended Bayesian information criterion: the cost must fall by more than the penalty of
+    /// a parameter chosen among this number of candidates. Because the criterion assumes a white
+    /// residual, the added terms are tested again at the end: a term whose coefficient does not
+    /// differ significantly from zero, at 1 % for all candidates together, is removed
     /// ([`least_certain`]).
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771.
     #[default]
     Information,
-    /// The misfit on each experiment, predicted from the fit to all others, must fall by more than
-    /// chance: Student's t over the experiments, at 5 % for all candidates together.
+    /// The squared residual of each experiment, predicted from the fit to all others, must fall
+    /// significantly: Student's t over the experiments, at 5 % for all candidates together.
     ///
     /// # Source
     /// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147 (cross-validation).
     HeldOut,
 }
 
-/// The terms that were chosen, and how.
+/// Selected terms, and the steps of the selection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
-    /// Terms given, and those added, in their order.
+    /// Given terms and added terms, in their order.
     pub terms: Terms,
-    /// The way there: the first without any candidate, then with each term that was added.
+    /// Steps of the selection: without any candidate, then with each added term.
     pub steps: Vec<SelectionStep>,
-    /// The candidate that would have come next, and was not worth it.
+    /// Next best candidate, which the criterion refused.
     pub refused: Option<SelectionStep>,
-    /// Names of the terms that were added and removed again, the least certain first.
+    /// Names of the terms that were added and removed again, least certain first.
     pub removed: Vec<String>,
 }
 
-/// One step of a selection.
+/// Step of a selection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SelectionStep {
     /// Name of the term added; `None` for the first step.
     pub added: Option<String>,
-    /// The criterion with it, a pure number, the smaller the better: the information criterion, or
-    /// the squared misfit of experiments held out over the number of equations.
+    /// Criterion with the term, smaller is better: the information criterion, or the squared
+    /// residual of held-out experiments divided by the number of equations.
     pub score: f64,
-    /// Part of the weighted force, a ratio, that is left with it.
+    /// Share of the weighted force (RMS) that is unexplained with the term.
     pub unexplained: f64,
 }
 
-/// Adds to the terms given, one after the other, the candidate that lowers the equation error most, as
-/// long as the criterion finds it worth it, and removes those that turn out to be uncertain
+/// Adds to the given terms, one after the other, the candidate that lowers the equation error most,
+/// as long as the criterion accepts it, and finally removes uncertain terms
 /// ([`Criterion::Information`]).
 ///
-/// Rows are weighted by what a fit with all candidates leaves, so that no missing term shapes the
-/// weights. Constants inside the laws are kept as they are.
+/// Rows are weighted by the residual of a fit with all candidates, so that a missing term does not
+/// affect the weights. Constants inside the laws are kept as they are.
 ///
 /// # Errors
 /// As [`equation_error`](super::equation_error) for all terms together, and
-/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) to hold out one of fewer than three experiments.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) for held-out
+/// tests with fewer than three experiments.
 ///
 /// # Source
 /// Billings, *Nonlinear System Identification: NARMAX Methods* (2013), chapter 3 (forward selection
@@ -88,9 +89,10 @@ pub fn select_terms(
     if criterion == Criterion::HeldOut && data.count() < 3 {
         return Err(SpectraError::TooFewAverages { got: data.count(), needed: 3 }.into());
     }
-    let all = candidates.iter().try_fold(given.clone(), |all, term| all.and(term.clone()))?;
-    let equations = Equations::new(data, unknowns, &all)?;
-    let shape = Shape::new(&all, ShapeConstants::default());
+    let all_terms =
+        candidates.iter().try_fold(given.clone(), |terms, term| terms.and(term.clone()))?;
+    let equations = Equations::new(data, unknowns, &all_terms)?;
+    let shape = Shape::new(&all_terms, ShapeConstants::default());
     let fit = weighted(&equations, &shape, weighting, None)?;
     let mut triangles = Vec::new();
     for columns in &fit.columns {
@@ -110,17 +112,10 @@ pub fn select_terms(
     let mut steps = vec![judge.step(None, &before, chosen.len())];
     let mut terms = given.clone();
     let refused = loop {
-        let mut best: Option<(usize, Misfit)> = None;
-        for at in (base..equations.count()).filter(|at| !chosen.contains(at)) {
-            let misfit = judge.misfit(&[&chosen[..], &[at]].concat())?;
-            if best.as_ref().is_none_or(|(_, least)| misfit.fitted < least.fitted) {
-                best = Some((at, misfit));
-            }
-        }
-        let Some((at, after)) = best else {
-            break None;
-        };
-        let term: &Term = all.iter().nth(at - equations.free.len()).expect("one of all terms");
+        let next = judge.best_next(&chosen, base..equations.count())?;
+        let Some((at, after)) = next else { break None };
+        let term: &Term =
+            all_terms.iter().nth(at - equations.free.len()).expect("one of all terms");
         let step = judge.step(Some(term.name().to_owned()), &after, chosen.len() + 1);
         if !judge.better(&before, &after, chosen.len()) {
             break Some(step);
@@ -143,12 +138,13 @@ pub fn select_terms(
     Ok(Selection { terms, steps, refused, removed })
 }
 
-/// Returns the name of the least certain of the candidates among the terms of a fit, if its coefficient is not
-/// distinguishable from zero, at 1 % for all candidates together: Student's t with the degrees of freedom of the fit, of
-/// the coefficient less the bias that noise in the regressors makes, as far as several periods show it.
+/// Returns the name of the least certain candidate among the terms of a fit, if its coefficient
+/// does not differ from zero at 1 % for all candidates together: Student's t with the degrees of
+/// freedom of the fit, after correction of the bias by noise in the regressors if several periods
+/// show it.
 ///
 /// # Errors
-/// [`EstimateError::NoSuchParameter`] if the fit has lost a term of its own.
+/// [`EstimateError::NoSuchParameter`] if the fit lacks the coefficient of one of its terms.
 pub fn least_certain(
     fit: &NonlinearEstimate,
     candidates: &Terms,
@@ -157,8 +153,8 @@ pub fn least_certain(
     let mut least: Option<(f64, String)> = None;
     for term in fit.terms().iter().filter(is_candidate) {
         let mut estimate = fit.parameter(term.name())?.estimate;
-        let place = fit.parameters().iter().position(|parameter| parameter.name == term.name());
-        estimate.value -= place.and_then(|at| fit.bias.get(at)).copied().unwrap_or(0.0);
+        let index = fit.parameters().iter().position(|parameter| parameter.name == term.name());
+        estimate.value -= index.and_then(|at| fit.bias.get(at)).copied().unwrap_or(0.0);
         let [low, high] = estimate.interval(1.0 - SIGNIFICANT / candidates.len() as f64)?;
         let certainty = estimate.value.abs() / estimate.standard_error;
         if low <= 0.0 && high >= 0.0 && least.as_ref().is_none_or(|(least, _)| certainty < *least) {
@@ -168,17 +164,17 @@ pub fn least_certain(
     Ok(least.map(|(_, name)| name))
 }
 
-/// The terms but for one.
+/// Returns the terms without one.
 fn without(terms: &Terms, name: &str) -> Result<Terms, EstimateError> {
-    let mut kept = terms.iter().filter(|term| term.name() != name).cloned();
-    Ok(kept.try_fold(Terms::none(), |kept, term| kept.and(term))?)
+    let mut remaining = terms.iter().filter(|term| term.name() != name).cloned();
+    Ok(remaining.try_fold(Terms::none(), |remaining, term| remaining.and(term))?)
 }
 
 impl Selection {
     /// Removes a term that turned out to be uncertain.
     ///
     /// # Errors
-    /// [`EstimateError::Model`] if the others make no list of terms.
+    /// [`EstimateError::Model`] if the remaining terms are not a valid list.
     pub fn remove(&mut self, name: String) -> Result<(), EstimateError> {
         self.terms = without(&self.terms, &name)?;
         self.removed.push(name);
@@ -186,18 +182,18 @@ impl Selection {
     }
 }
 
-/// Weighted squares that some columns leave.
+/// Weighted squared residuals for some columns.
 struct Misfit {
     /// Sum of all experiments, fitted together.
     fitted: f64,
     /// Sum of all experiments without any model.
     all: f64,
-    /// Sum of each experiment, by the fit to the others; empty where they are not held out.
+    /// Sum of each experiment for the fit to the others; empty if the criterion does not hold out.
     held_out: Vec<f64>,
 }
 
 struct Judge {
-    /// The triangle \[A | b\] of each experiment.
+    /// Triangular factor of \[A | b\] of each experiment.
     triangles: Vec<LeastSquares>,
     equations: usize,
     candidates: usize,
@@ -205,6 +201,23 @@ struct Judge {
 }
 
 impl Judge {
+    /// Returns the column among `columns` that lowers the residual of all experiments most, with
+    /// the residuals.
+    fn best_next(
+        &self,
+        chosen: &[usize],
+        columns: std::ops::Range<usize>,
+    ) -> Result<Option<(usize, Misfit)>, EstimateError> {
+        let mut best: Option<(usize, Misfit)> = None;
+        for at in columns.filter(|at| !chosen.contains(at)) {
+            let misfit = self.misfit(&[chosen, &[at]].concat())?;
+            if best.as_ref().is_none_or(|(_, least)| misfit.fitted < least.fitted) {
+                best = Some((at, misfit));
+            }
+        }
+        Ok(best)
+    }
+
     fn misfit(&self, chosen: &[usize]) -> Result<Misfit, EstimateError> {
         let everything: Vec<usize> = (0..self.triangles.len()).collect();
         let coefficients = self.fit(chosen, &everything)?;
@@ -217,15 +230,16 @@ impl Judge {
             residual.norm_squared()
         };
         let fitted = everything.iter().map(|at| on(*at, &coefficients)).sum();
-        let all = everything.iter().map(|at| on(*at, &vec![0.0; chosen.len()])).sum();
+        let total = everything.iter().map(|at| on(*at, &vec![0.0; chosen.len()])).sum();
         let mut held_out = Vec::new();
         if self.criterion == Criterion::HeldOut {
             for at in &everything {
-                let others: Vec<usize> = everything.iter().filter(|o| *o != at).copied().collect();
-                held_out.push(on(*at, &self.fit(chosen, &others)?));
+                let remaining: Vec<usize> =
+                    everything.iter().filter(|o| *o != at).copied().collect();
+                held_out.push(on(*at, &self.fit(chosen, &remaining)?));
             }
         }
-        Ok(Misfit { fitted, all, held_out })
+        Ok(Misfit { fitted, all: total, held_out })
     }
 
     fn fit(&self, chosen: &[usize], experiments: &[usize]) -> Result<Vec<f64>, EstimateError> {
@@ -238,7 +252,7 @@ impl Judge {
         Ok(rows.solve()?.coefficients.column(0).iter().copied().collect())
     }
 
-    /// n ln(misfit) + p (ln n + 2 ln(candidates)), less what is the same for all.
+    /// Returns n ln(residual²/n) + p (ln n + 2 ln(candidates)).
     fn information(&self, misfit: &Misfit, parameters: usize) -> f64 {
         let n = self.equations as f64;
         let price = n.ln() + 2.0 * (self.candidates.max(1) as f64).ln();

@@ -1,4 +1,4 @@
-//! Constants that do not enter linearly, found by variable projection.
+//! Nonlinear constants of the model, estimated by variable projection.
 
 use mechid_estimate::EstimateError;
 use mechid_model::Terms;
@@ -11,7 +11,7 @@ use super::experiments::Columns;
 use super::limits::SEARCH_STEPS;
 use crate::limits::{SHAPE_RADIAN, SHAPE_STEP};
 
-/// Constants to search for, besides the parameters that enter linearly.
+/// Nonlinear constants to estimate in addition to the linear parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -20,15 +20,15 @@ use crate::limits::{SHAPE_RADIAN, SHAPE_STEP};
 )]
 pub struct ShapeConstants {
     /// Constants inside the laws of terms, such as b of a saturating damper; the search starts from
-    /// those given.
+    /// the given values.
     pub laws: bool,
     /// Delay of the force.
     pub delay: bool,
-    /// Phase that both channels have in common, p₃ and p₅ of [`ChannelPhase`].
+    /// Phase common to both channels, p₃ and p₅ of [`ChannelPhase`].
     pub phase: bool,
 }
 
-/// Terms and channels with their constants, and which of these are free.
+/// Terms and channels with their constants, and the selection of free ones.
 #[derive(Clone)]
 pub(super) struct Shape {
     terms: Terms,
@@ -53,7 +53,7 @@ impl Shape {
         self.values().count()
     }
 
-    /// Values of the free constants: of the laws, then delay, p₃ and p₅.
+    /// Returns the values of the free constants: of the laws, then delay, p₃ and p₅.
     pub(super) fn values(&self) -> impl Iterator<Item = f64> + '_ {
         let laws = self.terms.iter().filter(|_| self.free.laws);
         let laws = laws.flat_map(|term| term.law().constants()).map(|constant| constant.value);
@@ -63,7 +63,7 @@ impl Shape {
         laws.chain(delay).chain(phase)
     }
 
-    /// Their names and units.
+    /// Returns names and units of the free constants.
     pub(super) fn names(&self) -> impl Iterator<Item = (String, String)> + '_ {
         let laws = self.terms.iter().filter(|_| self.free.laws).flat_map(|term| {
             let name = move |constant: mechid_model::Constant| {
@@ -77,12 +77,12 @@ impl Shape {
         laws.chain(delay).chain(phase.into_iter().flatten())
     }
 
-    /// The same with other values of the free constants; `None` where a law refuses one.
+    /// Returns the shape with other values of the free constants; `None` if a law refuses one.
     fn with(&self, values: &[f64]) -> Option<Self> {
-        let mut rest = values;
+        let mut remaining = values;
         let mut next = || {
-            let (first, others) = rest.split_first()?;
-            rest = others;
+            let (first, tail) = remaining.split_first()?;
+            remaining = tail;
             Some(*first)
         };
         let mut terms = Vec::new();
@@ -105,8 +105,8 @@ impl Shape {
         Some(Self { terms: Terms::new(terms).ok()?, channels, free: self.free })
     }
 
-    /// Steps for the derivatives: of a constant a part of it, of a delay of the sampling interval, of
-    /// a phase of a radian.
+    /// Returns the steps of the derivatives, relative to the value of a constant, to the sampling
+    /// interval for a delay, and to one radian for a phase.
     fn steps(&self, dt: f64) -> Vec<f64> {
         let values: Vec<f64> = self.values().collect();
         let channels = usize::from(self.free.delay) + 2 * usize::from(self.free.phase);
@@ -119,9 +119,8 @@ impl Shape {
         values.iter().enumerate().map(step).collect()
     }
 
-    /// Derivatives of the model's force with respect to each free constant, which is those of the
-    /// residuals with the opposite sign; of each experiment one matrix of rows × degrees of freedom for
-    /// each.
+    /// Returns the derivatives of the model's force (minus the residual's) with respect to each
+    /// free constant: for each experiment and constant one matrix of rows × degrees of freedom.
     pub(super) fn slopes(
         &self,
         equations: &Equations<'_>,
@@ -145,11 +144,12 @@ impl Shape {
     }
 }
 
-/// The shape whose residual, the linear parameters fitted to each, is the least under given weights.
+/// Returns the shape with the smallest residual under given weights, with optimal linear
+/// parameters.
 ///
 /// # Errors
-/// [`EstimateError::Undetermined`] if the search wanders because the data do not show a constant,
-/// [`EstimateError::NotConverged`] if it does so for another reason.
+/// [`EstimateError::Undetermined`] if the search fails because the data do not determine a
+/// constant, [`EstimateError::NotConverged`] if it fails for another reason.
 pub(super) fn fit_shape(
     equations: &Equations<'_>,
     shape: Shape,
@@ -163,18 +163,19 @@ pub(super) fn fit_shape(
     if let Some(fitted) = shape.with(minimum.parameters.as_slice()).filter(|_| minimum.converged) {
         return Ok(fitted);
     }
-    let unseen = unseen(&mut projected, &shape);
-    if unseen.is_empty() {
+    let undetermined = undetermined(&mut projected, &shape);
+    if undetermined.is_empty() {
         return Err(EstimateError::NotConverged { searches: 1, steps });
     }
-    let parameters = unseen.join(", ");
+    let parameters = undetermined.join(", ");
     let directions = format!("no value of {parameters} fits better than chance");
     Err(EstimateError::Undetermined { parameters, directions })
 }
 
-/// Names of the constants with a standard error, at the start, beyond the scale on which they change
-/// anything: as of the phase of the channels where no term is there to show it.
-fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
+/// Returns the names of the constants that the data do not determine: their standard error at the
+/// initial values exceeds their scale, for example the phase of the channels in a model without
+/// terms.
+fn undetermined(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     let (rows, theta) = (projected.len(), DVector::from_iterator(start.count(), start.values()));
     let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, theta.len()));
     if !projected.residual(&theta, &mut residual) {
@@ -184,7 +185,7 @@ fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     let deviation = residual.norm() / (rows as f64).sqrt();
     let scales = start.steps(projected.equations.data.period().dt());
     let of = |((name, column), step): ((String, f64), f64)| {
-        // With all other constants known: a lower bound.
+        // A lower bound of the standard error: all other constants count as known.
         (deviation > column * step / SHAPE_STEP).then_some(name)
     };
     let lengths = jacobian.column_iter().map(|column| column.norm());
@@ -192,7 +193,7 @@ fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
     names.zip(lengths).zip(scales).filter_map(of).collect()
 }
 
-/// The weighted residual that the linear parameters leave, as a function of the shape constants.
+/// Weighted residual with optimal linear parameters, as a function of the shape constants.
 struct Projected<'a> {
     equations: &'a Equations<'a>,
     shape: &'a Shape,
@@ -209,10 +210,10 @@ struct Point {
 }
 
 impl Projected<'_> {
-    /// Weighted, real and imaginary parts one after the other.
+    /// Writes weighted real and imaginary parts alternately.
     fn write(&self, parts: &[DMatrix<Complex<f64>>], to: &mut [f64]) {
-        let all = parts.iter().flat_map(|part| part.iter().zip(self.weights.iter()));
-        for ((value, weight), pair) in all.zip(to.chunks_exact_mut(2)) {
+        let values = parts.iter().flat_map(|part| part.iter().zip(self.weights.iter()));
+        for ((value, weight), pair) in values.zip(to.chunks_exact_mut(2)) {
             (pair[0], pair[1]) = (value.re * weight, value.im * weight);
         }
     }
@@ -237,7 +238,8 @@ impl Residuals for Projected<'_> {
         true
     }
 
-    /// Kaufman's: the derivatives at fixed linear parameters, less what these could account for.
+    /// Returns Kaufman's Jacobian: the derivatives at fixed linear parameters, projected onto the
+    /// complement of the linear regressors.
     fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
         jacobian.fill(f64::NAN);
         let Some(Point { shape, columns, coefficients, residuals }) = &self.at else { return };
@@ -247,7 +249,7 @@ impl Residuals for Projected<'_> {
         for (at, mut column) in jacobian.column_iter_mut().enumerate() {
             let share: Vec<f64> = solution.coefficients.column(1 + at).iter().copied().collect();
             let model = self.equations.residuals(columns, &share);
-            // Target less residual is what these coefficients make.
+            // Target minus residual is the model's force for these coefficients.
             let changes: Vec<_> = slopes
                 .iter()
                 .zip(target.iter().zip(&model))

@@ -1,4 +1,4 @@
-//! The response of a nonlinear system to a band-limited force, and its derivatives.
+//! Response of a nonlinear system to a band-limited force, and its derivatives.
 
 use mechid_estimate::EstimateError;
 use mechid_model::{InitialState, Matrix, NonlinearSystem, Parameter, Term};
@@ -10,20 +10,20 @@ use crate::limits::{
     FEWEST_STEPS, MOST_STEPS, SIMULATION_SETTLED, SIMULATION_STEP, SIMULATION_TURN,
 };
 
-/// Quantity that a response is differentiated by.
+/// Parameter with respect to which a response is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Direction {
-    /// An entry of the initial state: displacements, then velocities.
+    /// Entry of the initial state: displacements, then velocities.
     Initial(usize),
-    /// An entry of M, C or K.
+    /// Entry of M, C or K.
     Entry(Parameter),
-    /// The coefficient of a term.
+    /// Coefficient of a term.
     Term(usize),
-    /// A constant inside the law of a term.
+    /// Constant inside the law of a term.
     Constant(usize, usize),
 }
 
-/// A force on the instants that the stages of the steps ask for.
+/// Force at the instants of all stages of the steps.
 pub(super) struct FineForce {
     /// Degrees of freedom × instants, 2 · steps in a sampling interval.
     values: DMatrix<f64>,
@@ -33,8 +33,8 @@ pub(super) struct FineForce {
 }
 
 impl FineForce {
-    /// The band-limited force through the samples, of a period its Fourier series, of an open record
-    /// that of the record and its mirror image, which has no jump; with as many steps as the response
+    /// Interpolates a force band-limited, by the Fourier series of a period or, for an open record,
+    /// of the record and its mirror image, which has no jump; with as many steps as the response
     /// from `start` needs.
     pub(super) fn sufficient(
         force: &Record,
@@ -61,8 +61,10 @@ impl FineForce {
             let after = tangent.run(&grid, start);
             if let (Some(before), Some(after)) = (&before, &after) {
                 let n = system.dof();
-                let of = |course: &Course| course.state.columns(0, n).into_owned();
-                if (of(before) - of(after)).amax() <= SIMULATION_SETTLED * of(after).amax() {
+                let displacement = |course: &Course| course.state.columns(0, n).into_owned();
+                if (displacement(before) - displacement(after)).amax()
+                    <= SIMULATION_SETTLED * displacement(after).amax()
+                {
                     break;
                 }
             }
@@ -73,7 +75,7 @@ impl FineForce {
 
     fn new(samples: usize, period: &Record, steps: usize) -> Result<Self, EstimateError> {
         let fine = refine(period, 2 * steps, Interpolation::BandLimited)?;
-        // One instant more than a period has: the first again.
+        // The last instant is the first of the next period.
         let instants = 2 * steps * samples + 1;
         let data = fine.data();
         let values =
@@ -82,7 +84,7 @@ impl FineForce {
     }
 }
 
-/// The record and then the same backwards.
+/// Returns the record followed by its mirror image.
 fn mirrored(record: &Record) -> Result<Record, EstimateError> {
     let len = record.len();
     let sampling = record.sampling().with_len(2 * len)?;
@@ -92,15 +94,15 @@ fn mirrored(record: &Record) -> Result<Record, EstimateError> {
     Ok(Record::new(sampling, data)?)
 }
 
-/// Small motions beside a response, between a sample and the next.
+/// Linearised motion about a response, from one sample to the next.
 pub(super) struct Transition {
-    /// Derivatives of the state at the next sample by the state at this one, 2n × 2n.
+    /// Derivatives of the state at the next sample with respect to the state at this one, 2n × 2n.
     pub(super) state: DMatrix<f64>,
-    /// Derivatives of the acceleration by the state at this sample, n × 2n.
+    /// Derivatives of the acceleration with respect to the state at this sample, n × 2n.
     pub(super) acceleration: DMatrix<f64>,
 }
 
-/// Rates at the stages of a step, and the first of a sampling interval.
+/// Rates at the stages of a step, and the first rate of a sampling interval.
 struct Stages {
     first: Vec<f64>,
     rates: [Vec<f64>; 4],
@@ -114,8 +116,8 @@ impl Stages {
     }
 }
 
-/// A nonlinear system stepped by the classical Runge–Kutta rule together with the tangent of the same
-/// rule, so that the derivatives are those of the computed response.
+/// Integration of a nonlinear system by the classical Runge–Kutta method, together with the
+/// derivatives of the computed response by the tangent of the same method.
 ///
 /// # Source
 /// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections
@@ -125,9 +127,10 @@ pub(super) struct Tangent<'a> {
     directions: &'a [Direction],
     /// M⁻¹, n×n: solved once, applied at every stage.
     inverse_mass: DMatrix<f64>,
-    /// Constants of each law, and the laws with one of them moved, for the derivatives.
+    /// Step and term with one changed constant, for the derivatives with respect to the constants
+    /// of each law.
     moved: Vec<Vec<(f64, Term)>>,
-    /// Coordinates of the state and of the derivatives at a stage, and the forces on them.
+    /// Work arrays of a stage.
     acceleration: Vec<f64>,
     force: Vec<f64>,
     slopes: Vec<[f64; 2]>,
@@ -137,7 +140,7 @@ pub(super) struct Tangent<'a> {
 pub(super) struct Course {
     /// Samples × 3n: displacement, velocity, acceleration.
     pub(super) state: DMatrix<f64>,
-    /// Derivatives by each direction, samples × 3n.
+    /// Derivatives with respect to each direction, samples × 3n.
     pub(super) derivatives: Vec<DMatrix<f64>>,
     /// State and derivatives one sampling interval after the last sample.
     pub(super) end: Vec<f64>,
@@ -154,9 +157,9 @@ impl<'a> Tangent<'a> {
             (0..constants.len())
                 .filter_map(|at| {
                     let step = SIMULATION_STEP * constants[at].abs();
-                    let mut other = constants.clone();
-                    other[at] += step;
-                    Some((step, term.with_constants(&other)?))
+                    let mut changed = constants.clone();
+                    changed[at] += step;
+                    Some((step, term.with_constants(&changed)?))
                 })
                 .collect()
         });
@@ -171,7 +174,7 @@ impl<'a> Tangent<'a> {
         }
     }
 
-    /// The response from a start; `None` if it overflows.
+    /// Returns the response from an initial state; `None` if it overflows.
     pub(super) fn run(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
         let (n, width) = (self.system.dof(), 1 + self.directions.len());
         let mut z = self.initial(start, width);
@@ -183,8 +186,8 @@ impl<'a> Tangent<'a> {
             if !self.interval(force, sample, &mut z, &mut stages) {
                 return None;
             }
-            let all = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
-            for (column, course) in all {
+            let outputs = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
+            for (column, course) in outputs {
                 let start = 2 * n * column;
                 for entry in 0..2 * n {
                     course[(sample, entry)] = before[start + entry];
@@ -197,7 +200,7 @@ impl<'a> Tangent<'a> {
         Some(Course { state, derivatives, end: z })
     }
 
-    /// State and derivatives at the start.
+    /// Returns state and derivatives at the first sample.
     fn initial(&self, start: &InitialState, width: usize) -> Vec<f64> {
         let n = self.system.dof();
         let mut z = vec![0.0; 2 * n * width];
@@ -211,8 +214,8 @@ impl<'a> Tangent<'a> {
         z
     }
 
-    /// The motions beside the response from a start, from sample to sample, linearised: the directions are those of
-    /// the initial state. `None` if the response overflows.
+    /// Returns the linearised motion about the response, from sample to sample; the directions must
+    /// be the initial state. `None` if the response overflows.
     pub(super) fn transitions(
         &mut self,
         force: &FineForce,
@@ -237,7 +240,7 @@ impl<'a> Tangent<'a> {
         Some(transitions)
     }
 
-    /// Leads state and derivatives over a sampling interval; false if they overflow.
+    /// Integrates state and derivatives over a sampling interval; false if they overflow.
     fn interval(
         &mut self,
         force: &FineForce,
@@ -248,18 +251,18 @@ impl<'a> Tangent<'a> {
         let h = force.dt / force.steps as f64;
         let Stages { first, rates: [k1, k2, k3, k4], at } = stages;
         for step in 0..force.steps {
-            let place = 2 * (sample * force.steps + step);
-            self.rate(z, force.values.column(place).as_slice(), k1);
+            let instant = 2 * (sample * force.steps + step);
+            self.rate(z, force.values.column(instant).as_slice(), k1);
             if step == 0 {
                 first.copy_from_slice(k1);
             }
-            let middle = force.values.column(place + 1);
+            let middle = force.values.column(instant + 1);
             towards(z, 0.5 * h, k1, at);
             self.rate(at, middle.as_slice(), k2);
             towards(z, 0.5 * h, k2, at);
             self.rate(at, middle.as_slice(), k3);
             towards(z, h, k3, at);
-            self.rate(at, force.values.column(place + 2).as_slice(), k4);
+            self.rate(at, force.values.column(instant + 2).as_slice(), k4);
             for (i, z) in z.iter_mut().enumerate() {
                 *z += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
             }
@@ -267,12 +270,12 @@ impl<'a> Tangent<'a> {
         z.iter().all(|value| value.is_finite())
     }
 
-    /// ż of state and derivatives (columns of 2n entries) under a force.
+    /// Computes ż of state and derivatives (columns of 2n entries) under a force.
     fn rate(&mut self, z: &[f64], force: &[f64], rate: &mut [f64]) {
         let n = self.system.dof();
         let (x, v) = z[..2 * n].split_at(n);
         self.system.restoring_force(x, v, &mut self.force);
-        self.force.iter_mut().zip(force).for_each(|(own, force)| *own = force - *own);
+        self.force.iter_mut().zip(force).for_each(|(sum, force)| *sum = force - *sum);
         rate[..n].copy_from_slice(v);
         apply(&self.inverse_mass, &self.force, &mut rate[n..2 * n]);
         if self.directions.is_empty() {
@@ -330,7 +333,7 @@ impl<'a> Tangent<'a> {
     }
 }
 
-/// Takes a term's force from those on the degrees of freedom it acts on.
+/// Subtracts the force of a term from the forces on its degrees of freedom.
 fn spread(term: &Term, value: f64, force: &mut [f64]) {
     for (dof, force) in force.iter_mut().enumerate() {
         *force -= term.coordinate().sign(dof) * value;

@@ -13,38 +13,39 @@ use crate::limits::{HALF_WIDTH, WEIGHTING_FLOOR, WEIGHTING_GROUPS};
     serde(rename_all = "kebab-case")
 )]
 pub enum Weighting {
-    /// The one of the others that makes the residual likeliest.
+    /// The alternative with the highest likelihood of the residual (Akaike's criterion).
     #[default]
     Automatic,
-    /// Equally large on all lines of an equation of motion: noise that is white as a force.
+    /// Equally large on all lines of an equation of motion: white noise of the force.
     WhiteForce,
-    /// Equally large on all lines as a response of the linear part: what the model misses is where the
-    /// response is.
+    /// Equally large on all lines as a response of the linear part: the model error is largest at
+    /// the resonances.
     Response,
-    /// Smooth over the lines: the residual's own spectrum, averaged over neighbouring lines and all
-    /// experiments.
+    /// Smooth over the lines: the spectrum of the residual, averaged over neighbouring lines and
+    /// all experiments.
     SmoothSpectrum,
 }
 
-/// Weights of rows (lines × degrees of freedom) and what they rest on.
+/// Weights of rows (lines × degrees of freedom) and their kind.
 pub(super) struct Weights {
     pub(super) of_rows: DMatrix<f64>,
     pub(super) kind: Weighting,
 }
 
-/// Lines to either side of a smooth spectrum over so many; `None` if they are too few for one.
+/// Returns the number of lines on either side in the averages of a smooth spectrum; `None` if the
+/// lines are too few.
 fn half_width(lines: usize) -> Option<usize> {
     let half = HALF_WIDTH.max(lines / (2 * WEIGHTING_GROUPS));
     (lines >= 2 * (2 * half + 1)).then_some(half)
 }
 
 impl Weights {
-    /// White noise, the same in all equations.
+    /// Returns the weights for white noise, the same in all equations.
     pub(super) fn equal(equations: &Equations<'_>) -> Self {
         Self { of_rows: equations.unit.clone(), kind: Weighting::WhiteForce }
     }
 
-    /// Weights from what a fit with these coefficients leaves (of each experiment rows × degrees of
+    /// Returns the weights from the residuals of a fit (for each experiment rows × degrees of
     /// freedom).
     pub(super) fn from_residuals(
         equations: &Equations<'_>,
@@ -91,7 +92,7 @@ impl Weights {
     }
 }
 
-/// Variances in proportion to given ones that have the mean power of each equation.
+/// Returns the variances scaled to the mean power of each equation.
 fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMatrix<f64> {
     let lines = power.nrows() - first;
     let mut scaled = variance.clone();
@@ -102,15 +103,15 @@ fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMat
     scaled
 }
 
-/// Weights of rows by which a residual counts as the response of the linear part to it; `None` if the coefficients make
-/// no system with a response.
+/// Returns the weights of rows that turn a residual force into the size of the linear part's
+/// response to it; `None` if the coefficients define no system.
 pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let variance = variance_of_response(equations, coefficients)?;
     Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))
 }
 
-/// Variance of a force in each equation whose response is equally large on all rows; `None` if the
-/// coefficients make no system with a response.
+/// Returns the variance of a force in each equation whose response is equally large on all rows;
+/// `None` if the coefficients define no system.
 fn variance_of_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let [m, c, k] = equations.unknowns.assemble(&coefficients[..equations.free.len()]);
     let system = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
@@ -124,7 +125,7 @@ fn variance_of_response(equations: &Equations<'_>, coefficients: &[f64]) -> Opti
     Some(variance)
 }
 
-/// Moving averages over the lines; the mean, where it counts, takes that of the first lines.
+/// Returns moving averages over the lines; line 0, if used, takes the average of the first lines.
 fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
     let rows = power.nrows();
     let mut smooth = power.clone();
@@ -144,8 +145,8 @@ fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
     smooth
 }
 
-/// Minus the logarithm of the likelihood that the residuals of `experiments` have under these
-/// variances; each variance that is free counts as a parameter (Akaike's criterion, halved).
+/// Returns minus the log-likelihood of the residuals of `experiments` for these variances. The
+/// caller adds one for each free variance (half of Akaike's criterion).
 ///
 /// # Source
 /// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723, for circular Gaussian lines.

@@ -1,4 +1,4 @@
-//! Least squares on the equation of motion with nonlinear columns.
+//! Least squares on the equation of motion with nonlinear regressors.
 
 mod uncertainty;
 
@@ -25,39 +25,41 @@ use crate::limits::{WEIGHTING_ROUNDS, WEIGHTING_SETTLED};
 pub struct EquationErrorOptions {
     /// Weighting of the rows.
     pub weighting: Weighting,
-    /// Constants that do not enter linearly, none by default.
+    /// Nonlinear constants, none by default.
     pub shape: ShapeConstants,
 }
 
-/// Least squares on −ω²M X + iωC X + K X + Σ θ F{f(q, q̇)} = F over the lines of steady periods.
+/// Estimates a nonlinear system by least squares on −ω²M X + iωC X + K X + Σ θ F{f(q, q̇)} = F over
+/// the lines of steady periods.
 ///
-/// The terms are evaluated on a grid four times finer than the samples, so that none of their
-/// products folds back, and transformed: they are columns like any other. All lines of the fit count,
-/// those without force too: on them stands what the nonlinear forces and the response have to cancel.
-/// The rows are weighted by what is found of the equation error's spectrum ([`Weighting`]); the
-/// standard errors rest on the scatter of the periods or of the scores
+/// The terms are evaluated on a grid four times finer than the samples, to avoid aliasing, and
+/// transformed to regressors. Lines without force are used, too: there the nonlinear forces and the
+/// linear response cancel. The rows are weighted by the estimated spectrum of the equation error
+/// ([`Weighting`]); the standard errors follow from the scatter of the periods or of the scores
 /// ([`StandardErrors`](super::StandardErrors)).
 ///
-/// Shape constants are found by Gauss–Newton steps on the residual that the linear parameters leave
-/// (variable projection); the covariance is of all parameters together.
+/// Shape constants are estimated by Gauss–Newton steps on the residual with optimal linear
+/// parameters (variable projection); the covariance is the joint one of all parameters.
 ///
-/// A line with a mean force is used if a term is a constant force (`x1^0`).
+/// Line 0 is used if a term is a constant force (`x1^0`).
 ///
-/// Noise on the response biases the parameters, as it does that of the linear
-/// [`equation_error`](mechid_estimate::frequency_domain::equation_error): use it on the mean of several periods,
-/// or as the start of [`output_error`](super::output_error).
+/// Noise on the response biases the parameters, as in the linear
+/// [`equation_error`](mechid_estimate::frequency_domain::equation_error): use it on the mean of
+/// several periods, or as the initial estimate of [`output_error`](super::output_error).
 ///
 /// # Errors
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Model`] if unknowns or terms do not belong to the
-/// data, [`NumericsError::NothingUnknown`](mechid_numerics::NumericsError::NothingUnknown), [`NumericsError::TooFewRows`](mechid_numerics::NumericsError::TooFewRows),
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Model`] if
+/// unknowns or terms do not match the data,
+/// [`NumericsError::NothingUnknown`](mechid_numerics::NumericsError::NothingUnknown),
+/// [`NumericsError::TooFewRows`](mechid_numerics::NumericsError::TooFewRows),
 /// [`EstimateError::OnlyRatios`] for an equation with neither force nor known entry,
-/// [`EstimateError::Undetermined`] if the data leave a parameter open, and
+/// [`EstimateError::Undetermined`] if the data do not determine a parameter, and
 /// [`EstimateError::NotConverged`] if the search for the constants fails.
 ///
 /// # Source
 /// Schoukens & Ljung (2019), IEEE Control Systems 39(6), 28–99 (nonlinear regressors of periodic
-/// data); Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, and Kaufman (1975),
-/// BIT 15, 49–57 (variable projection).
+/// data); Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, and Kaufman
+/// (1975), BIT 15, 49–57 (variable projection).
 pub fn equation_error(
     data: &SteadyExperiments,
     unknowns: &Unknowns,
@@ -80,7 +82,7 @@ pub fn equation_error(
     fit.finish(&equations, &shape)
 }
 
-/// Coefficients under weights that follow from what they leave.
+/// Coefficients with weights that follow from their residuals.
 pub(super) struct Fit {
     pub(super) columns: Vec<Columns>,
     pub(super) coefficients: Vec<f64>,
@@ -115,7 +117,8 @@ pub(super) fn weighted(
     unreachable!("the last round returns")
 }
 
-/// Returns whether two sets of weights differ by a common factor of each equation and little else.
+/// Returns whether two sets of weights are nearly equal, apart from a common factor of each
+/// equation.
 fn settled(before: &DMatrix<f64>, after: &DMatrix<f64>, tolerance: f64) -> bool {
     before.column_iter().zip(after.column_iter()).all(|(before, after)| {
         let scale = after.norm() / before.norm();
@@ -124,39 +127,39 @@ fn settled(before: &DMatrix<f64>, after: &DMatrix<f64>, tolerance: f64) -> bool 
     })
 }
 
-/// An error that names the parameters the data leave open, if they do.
+/// Refuses undetermined parameters with an error that names them.
 fn check_determined(names: &[String], open: &[Direction]) -> Result<(), EstimateError> {
     if open.is_empty() {
         return Ok(());
     }
-    let of = |involved: &dyn Fn(usize) -> bool| {
+    let names_of = |involved: &dyn Fn(usize) -> bool| {
         let names = names.iter().enumerate().filter(|(at, _)| involved(*at));
         message::list(names.map(|(_, name)| name), ", ", NAMED_PARAMETERS)
     };
     let direction =
-        |d: &Direction| format!("only a combination of {} shows", of(&|at| d.involved[at]));
+        |d: &Direction| format!("only a combination of {} shows", names_of(&|at| d.involved[at]));
     Err(EstimateError::Undetermined {
-        parameters: of(&|at| open.iter().any(|direction| direction.involved[at])),
+        parameters: names_of(&|at| open.iter().any(|direction| direction.involved[at])),
         directions: message::list(open.iter().map(direction), "; ", NAMED_DIRECTIONS),
     })
 }
 
-/// √(Σ|e|² / Σ|b|²) of each equation.
+/// Returns √(Σ|e|² / Σ|b|²) of each equation.
 fn nrmse(
     equations: &Equations<'_>,
     columns: &[Columns],
     residuals: &[DMatrix<Complex<f64>>],
 ) -> Vec<f64> {
     let of = |dof: usize| {
-        let (mut unexplained, mut all) = (0.0, 0.0);
+        let (mut unexplained, mut total) = (0.0, 0.0);
         for (columns, residual) in columns.iter().zip(residuals) {
             for row in 0..equations.rows.len() {
                 let unit = equations.unit[(row, dof)];
                 unexplained += (residual[(row, dof)] * unit).norm_sqr();
-                all += (columns.force[(row, dof)] * unit).norm_sqr();
+                total += (columns.force[(row, dof)] * unit).norm_sqr();
             }
         }
-        if all > 0.0 { (unexplained / all).sqrt() } else { 0.0 }
+        if total > 0.0 { (unexplained / total).sqrt() } else { 0.0 }
     };
     (0..equations.data.dof()).map(of).collect()
 }
@@ -211,7 +214,7 @@ impl Fit {
         })
     }
 
-    /// (AᵀA)⁻¹ of the weighted regressors of all parameters, and their condition number.
+    /// Returns (AᵀA)⁻¹ of the weighted regressors of all parameters, and their condition number.
     fn inverse(
         &self,
         equations: &Equations<'_>,
@@ -223,25 +226,26 @@ impl Fit {
         for (columns, slopes) in self.columns.iter().zip(slopes) {
             equations.push(&mut rows, columns, &self.weights.of_rows, slopes)?;
         }
-        // The triangle of [A | b | D] holds that of [A | D].
+        // The triangular factor of [A | b | D] contains that of [A | D].
         let r = rows.triangle();
-        let kept: Vec<usize> = (0..linear).chain(linear + 1..linear + 1 + more).collect();
-        let mut both = LeastSquares::new(kept.len(), 1);
+        let columns: Vec<usize> = (0..linear).chain(linear + 1..linear + 1 + more).collect();
+        let mut both = LeastSquares::new(columns.len(), 1);
         let none = DMatrix::zeros(r.nrows(), 1);
-        both.push_rows(r.select_columns(&kept).as_view(), none.as_view())?;
+        both.push_rows(r.select_columns(&columns).as_view(), none.as_view())?;
         let solution = both.solve()?;
         check_determined(&names(equations, shape), &solution.undetermined)?;
         Ok((solution.unscaled_covariance, solution.condition))
     }
 
-    /// Rate (1/s) at which the slowest mode of the linear part decays; 0 if there is no such part.
+    /// Returns the decay rate (1/s) of the slowest mode of the linear part; 0 if there is no linear
+    /// part.
     fn slowest_decay(&self, equations: &Equations<'_>) -> f64 {
         slowest_decay(equations.unknowns, &self.coefficients[..equations.free.len()])
     }
 }
 
-/// Rate (1/s) at which the slowest mode of these matrices decays; 0 where one does not, or they are
-/// no system.
+/// Returns the decay rate (1/s) of the slowest mode of these matrices; 0 if a mode does not decay
+/// or the matrices define no system.
 pub(super) fn slowest_decay(unknowns: &Unknowns, free: &[f64]) -> f64 {
     let [m, c, k] = unknowns.assemble(free);
     let modes = mechid_model::SecondOrderSystem::new(m, c, k).and_then(|system| system.modes());
@@ -254,7 +258,7 @@ fn names(equations: &Equations<'_>, shape: &Shape) -> Vec<String> {
     named(equations, shape).map(|(name, _)| name).collect()
 }
 
-/// Names and units of all parameters.
+/// Returns names and units of all parameters.
 fn named<'a>(
     equations: &'a Equations<'a>,
     shape: &'a Shape,
@@ -264,7 +268,7 @@ fn named<'a>(
     entries.chain(terms).chain(shape.names())
 }
 
-/// Returns the displacement that the residual force causes through the linear part, as a part of the
+/// Returns the displacement of the linear part under the residual force, relative to the measured
 /// displacement, on the lines of the fit.
 fn unexplained(
     equations: &Equations<'_>,
@@ -273,7 +277,7 @@ fn unexplained(
     residuals: &[DMatrix<Complex<f64>>],
 ) -> Vec<f64> {
     let n = equations.data.dof();
-    let (mut unexplained, mut all) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
+    let (mut unexplained, mut total) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
     let system = linear.system();
     for row in (0..equations.rows.len()).filter(|row| equations.rows[*row] > 0) {
         let receptance = system.as_ref().ok().and_then(|s| s.receptance(equations.omega(row)).ok());
@@ -281,12 +285,12 @@ fn unexplained(
         for (columns, residual) in columns.iter().zip(residuals) {
             let made = &receptance * residual.row(row).transpose();
             unexplained += made.map(|z| z.norm_sqr());
-            all += columns.displacement.row(row).transpose().map(|z| z.norm_sqr());
+            total += columns.displacement.row(row).transpose().map(|z| z.norm_sqr());
         }
     }
     unexplained
         .iter()
-        .zip(all.iter())
+        .zip(total.iter())
         .map(|(e, x)| if *x > 0.0 { (e / x).sqrt() } else { 0.0 })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! Standard errors of least squares on the equation of motion, and whether its residual is noise.
+//! Standard errors of least squares on the equation of motion, and the test of its residual.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -13,8 +13,9 @@ use crate::scatter::{Line, PeriodScatter, Powers};
 use crate::shape::Shape;
 
 impl Fit {
-    /// The covariance of all parameters: by the scatter of the periods if the residual is no more than that, otherwise
-    /// by blocks of time or, of a short record, as if the residual were white.
+    /// Returns the covariance of all parameters: from the scatter of the periods if the residual
+    /// does not exceed it, otherwise from blocks of time or, for a short record, as for a white
+    /// residual.
     pub(super) fn uncertainty(
         &self,
         equations: &Equations<'_>,
@@ -28,11 +29,11 @@ impl Fit {
         Uncertainty::new(by_periods, inverse.nrows(), by_residual)
     }
 
-    /// Scatter of the parameters from period to period, their bias, and the test of the residual against the scatter of
-    /// the periods; `None` unless all experiments have several.
+    /// Returns the scatter of the parameters from period to period, their bias, and the test of the
+    /// residual against the scatter; `None` unless all experiments have several periods.
     ///
-    /// The bias is that of the products of noise in regressors and residual: an estimate by instrumental variables, one
-    /// period against the others, is less by it.
+    /// The bias comes from the product of the noise in regressors and residual: an estimate by
+    /// instrumental variables, with one period as instrument of the others, does not have it.
     ///
     /// # Source
     /// Söderström (2018), *Errors-in-Variables Methods in System Identification*, chapters 6 and 7.
@@ -65,21 +66,22 @@ impl Fit {
                 });
                 let mean = deviations.column_mean();
                 deviations.column_iter_mut().for_each(|mut column| column -= &mean);
-                let of = |columns| self.sensitivities(equations, columns, slopes, row, parameters);
-                let sensitivities = of(&self.columns[at]);
+                let sensitivities_of =
+                    |columns| self.sensitivities(equations, columns, slopes, row, parameters);
+                let sensitivities = sensitivities_of(&self.columns[at]);
                 let count = periods.len();
-                for (columns, left) in columns.iter().zip(deviations.column_iter()) {
-                    let product = (of(columns) - &sensitivities).ad_mul(&left);
+                for (columns, deviation) in columns.iter().zip(deviations.column_iter()) {
+                    let product = (sensitivities_of(columns) - &sensitivities).ad_mul(&deviation);
                     products += product.map(|z| z.re / (count * (count - 1)) as f64);
                 }
-                let power = |all: &DMatrix<Complex<f64>>| -> f64 {
-                    (0..dof).map(|dof| (all[(row, dof)] * weight(row, dof)).norm_sqr()).sum()
+                let power = |values: &DMatrix<Complex<f64>>| -> f64 {
+                    (0..dof).map(|dof| (values[(row, dof)] * weight(row, dof)).norm_sqr()).sum()
                 };
                 let noise = deviations.norm_squared() / (count * (count - 1)) as f64;
                 let signal = power(&self.columns[at].force);
                 powers.push([power(residual), noise, signal], count, is_real);
-                for (period, all) in deviations.column_iter().zip(&mut weighted) {
-                    all.row_mut(row).copy_from(&period.transpose());
+                for (period, values) in deviations.column_iter().zip(&mut weighted) {
+                    values.row_mut(row).copy_from(&period.transpose());
                 }
             }
             self.push_blocks(equations, at, slopes, &weighted, inverse, &mut scatter);
@@ -87,8 +89,9 @@ impl Fit {
         Some(ByPeriods { scatter, misfit: powers.misfit()?, bias: inverse * products })
     }
 
-    /// Adds the blocks of time of an experiment to the scatter, from the weighted deviations of its periods (rows ×
-    /// degrees of freedom). Noise that terms multiply with the response ties lines together, and blocks hardly.
+    /// Adds the blocks of time of an experiment to the scatter, from the weighted deviations of its
+    /// periods (rows × degrees of freedom). Terms multiply noise and response, which correlates
+    /// lines, but hardly blocks of time.
     fn push_blocks(
         &self,
         equations: &Equations<'_>,
@@ -108,12 +111,12 @@ impl Fit {
             let regressors = self.regressors_in_time(equations, at, slopes, dof, &time);
             for (period, deviation) in deviations.iter().enumerate() {
                 let noise = time(deviation.column(dof).as_slice());
-                for (place, regressor) in &regressors {
+                for (index, regressor) in &regressors {
                     for (block, sums) in sums.iter_mut().enumerate() {
                         let len = noise.len();
                         let range = block * len / blocks..(block + 1) * len / blocks;
                         let pairs = regressor[range.clone()].iter().zip(&noise[range]);
-                        sums[(*place, period)] += pairs.map(|(a, b)| a * b).sum::<f64>();
+                        sums[(*index, period)] += pairs.map(|(a, b)| a * b).sum::<f64>();
                     }
                 }
             }
@@ -124,7 +127,8 @@ impl Fit {
         }
     }
 
-    /// Weighted regressors of one equation of an experiment as signals, each with its place.
+    /// Returns the weighted regressors of one equation of an experiment as time signals, each with
+    /// the index of its parameter.
     fn regressors_in_time(
         &self,
         equations: &Equations<'_>,
@@ -135,7 +139,7 @@ impl Fit {
     ) -> Vec<(usize, Vec<f64>)> {
         let weights = &self.weights.of_rows;
         let linear = equations.weighted(&self.columns[at], weights, dof);
-        let mut regressors: Vec<_> = linear.map(|(place, values)| (place, time(&values))).collect();
+        let mut regressors: Vec<_> = linear.map(|(index, values)| (index, time(&values))).collect();
         for (number, slope) in slopes.iter().enumerate() {
             let value = |row: usize| slope[(row, dof)] * weights[(row, dof)];
             let values: Vec<_> = (0..equations.rows.len()).map(value).collect();
@@ -144,7 +148,7 @@ impl Fit {
         regressors
     }
 
-    /// Weighted regressors of all parameters in a row: degrees of freedom × parameters.
+    /// Returns the weighted regressors of all parameters in a row: degrees of freedom × parameters.
     fn sensitivities(
         &self,
         equations: &Equations<'_>,

@@ -1,4 +1,4 @@
-//! The simulated response fitted to the measured one.
+//! Output error: the simulated response fitted to the measured one.
 
 mod open;
 mod record;
@@ -25,43 +25,47 @@ use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::limits::OUTPUT_FORGOTTEN;
 
-/// A [`NonlinearEstimate`] by output error, with what its search tells.
+/// [`NonlinearEstimate`] by output error, with the initial states and the residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearFit {
-    /// The system with the covariance of its parameters.
+    /// System with the covariance of its parameters.
     pub estimate: NonlinearEstimate,
-    /// The state of each record at its first sample.
+    /// State of each record at its first sample.
     pub starts: Vec<InitialState>,
-    /// RMS of what is left of each channel, over all records, in the unit of the response.
+    /// RMS of the residual of each channel over all records, in the unit of the response.
     pub rmse: Vec<f64>,
-    /// Gauss–Newton steps taken.
+    /// Number of Gauss–Newton steps.
     pub steps: usize,
 }
 
-/// Least squares on the measured less the simulated response: free entries of M, C and K, the
-/// coefficients of the terms, the constants inside their laws, and the state each record starts from.
+/// Estimates free entries of M, C and K, the coefficients of the terms, the constants inside their
+/// laws and the initial state of each record by least squares on the measured minus the simulated
+/// response.
 ///
-/// Noise on the response does not bias it, whatever its colour. The force is taken as it is measured;
-/// noise on it, carried through the system, is noise on the response to first order, and its share in
-/// the derivatives of second order. Gauss–Newton steps (damped where needed) begin at `start`, as the
-/// [`equation_error`](super::equation_error) gives it, whose delay and phase of the channels are kept.
-/// Channels are weighted by the size of what is left of each.
+/// Noise of any spectrum on the response does not bias the estimate. Noise on the force acts, to
+/// first order, as noise on the response; its effect on the derivatives is of second order.
+/// Gauss–Newton steps (damped if needed) begin at `start`, usually from
+/// [`equation_error`](super::equation_error); its delay and phase of the channels are kept.
+/// Channels are weighted by the size of their residuals.
 ///
-/// The standard errors follow from the noise of force and response as several periods show it
-/// ([`Periods`](super::StandardErrors::Periods)), carried through the system, as long as the residual is no more than
-/// that noise ([`NonlinearEstimate::misfit`]). Otherwise they count the colour of the residual
-/// ([`Blocks`](super::StandardErrors::Blocks)): where the model misses a resonance's damping by a little, the white
-/// formula is several times too small.
+/// The standard errors follow from the noise of force and response in several periods
+/// ([`Periods`](super::StandardErrors::Periods)), propagated through the system, if the residual
+/// does not exceed that noise ([`NonlinearEstimate::misfit`]). Otherwise they allow for the
+/// spectrum of the residual ([`Blocks`](super::StandardErrors::Blocks)): if the damping of a
+/// resonance is slightly wrong, the formula for a white residual gives errors several times too
+/// small.
 ///
 /// # Errors
-/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not match the system,
 /// [`NumericsError::TooFewRows`] without a record, [`EstimateError::TooStiff`],
-/// [`EstimateError::Diverged`] if the start's response does, [`EstimateError::NotConverged`], and
-/// [`EstimateError::Undetermined`] if the records leave a parameter open.
+/// [`EstimateError::Diverged`] if the response of `start` diverges,
+/// [`EstimateError::NotConverged`], and [`EstimateError::Undetermined`] if the records do not
+/// determine a parameter.
 ///
 /// # Source
 /// Schoukens & Ljung (2019), IEEE Control Systems 39(6), 28–99 (simulation error and its
-/// derivatives); Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, section I.14.
+/// derivatives); Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, section
+/// I.14.
 pub fn output_error(
     records: &[SteppedRecord],
     measured: ResponseQuantity,
@@ -82,7 +86,7 @@ pub fn output_error(
     }
     let mut steps = 0;
     let mut theta = theta;
-    // The size of what is left of several channels is known after the first search.
+    // The weights of several channels need the residuals of a first search.
     for round in 0..2 {
         let lost = |steps| EstimateError::NotConverged { searches: 1, steps };
         let minimum = minimise_residuals(&mut problem, theta, SEARCH_STEPS).ok_or(lost(steps))?;
@@ -100,13 +104,14 @@ pub fn output_error(
     problem.finish(&theta, start, steps)
 }
 
-/// One record with what is computed of it.
+/// Record with its interpolated force and the deviations of its periods.
 struct Prepared {
     response: Record,
     force: FineForce,
-    /// The force at the samples.
+    /// Force at the samples.
     plain: Record,
-    /// Deviations of the periods from their mean: samples × channels of the response, then of the force.
+    /// Deviations of the periods from their mean: samples × channels of the response, then of the
+    /// force.
     deviations: Vec<DMatrix<f64>>,
 }
 
@@ -116,9 +121,9 @@ struct Problem<'a> {
     unknowns: &'a Unknowns,
     terms: &'a Terms,
     free: Vec<Parameter>,
-    /// Free entries, terms and constants, without the starts.
+    /// Free entries, terms and constants, without initial states.
     shared: Vec<Direction>,
-    /// Size of what is left of each channel.
+    /// RMS of the residual of each channel.
     levels: Vec<f64>,
     courses: Vec<Course>,
 }
@@ -167,7 +172,7 @@ impl<'a> Problem<'a> {
         self.unknowns.dof()
     }
 
-    /// Root mean square over all records; 1 where that is zero.
+    /// Returns the root mean square over all records; 1 if it is zero.
     fn rms(&self, column: impl Fn(usize, &Prepared) -> DVector<f64>) -> f64 {
         let (mut square, mut samples) = (0.0, 0);
         for (at, record) in self.records.iter().enumerate() {
@@ -179,10 +184,10 @@ impl<'a> Problem<'a> {
         if rms > 0.0 { rms } else { 1.0 }
     }
 
-    /// Size of what is left of each channel where the residual was last evaluated.
+    /// Returns the RMS of each channel's residual at the last evaluation.
     fn residual_rms(&self) -> Vec<f64> {
-        let residual_rms = |dof: usize| self.rms(|at, record| self.gap(at, record, dof));
-        (0..self.dof()).map(residual_rms).collect()
+        let rms = |dof: usize| self.rms(|at, record| self.gap(at, record, dof));
+        (0..self.dof()).map(rms).collect()
     }
 
     fn gap(&self, at: usize, record: &Prepared, dof: usize) -> DVector<f64> {
@@ -190,7 +195,7 @@ impl<'a> Problem<'a> {
         record.response.column(dof) - self.courses[at].state.column(column)
     }
 
-    /// Values of the parameters, and the starts that fit the records best.
+    /// Returns the initial parameters, with the initial states that fit the records best.
     fn start(&self, system: &NonlinearSystem) -> Result<DVector<f64>, EstimateError> {
         let linear = system.linear();
         let mut theta: Vec<f64> =
@@ -217,56 +222,80 @@ impl<'a> Problem<'a> {
         Ok(theta.into())
     }
 
-    /// The system with these parameters; `None` if they make none.
+    /// Returns the system with these parameters; `None` if they are not valid.
     fn system(&self, theta: &DVector<f64>) -> Option<NonlinearSystem> {
-        let (entries, rest) = theta.as_slice().split_at(self.free.len());
-        let (coefficients, mut rest) = rest.split_at(self.terms.len());
+        let (entries, remaining) = theta.as_slice().split_at(self.free.len());
+        let (coefficients, mut remaining) = remaining.split_at(self.terms.len());
         let [m, c, k] = self.unknowns.assemble(entries);
         let linear = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
         let mut terms = Vec::new();
         for term in self.terms {
-            let (constants, others) = rest.split_at(term.law().constants().len());
+            let (constants, tail) = remaining.split_at(term.law().constants().len());
             terms.push(if constants.is_empty() {
                 term.clone()
             } else {
                 term.with_constants(constants)?
             });
-            rest = others;
+            remaining = tail;
         }
         NonlinearSystem::new(linear, Terms::new(terms).ok()?, coefficients.to_vec()).ok()
     }
 
-    /// Parameters of a record: those shared by all, then its start's.
+    /// Returns the parameters of a record: shared parameters, then its initial state.
     fn directions(&self) -> Vec<Direction> {
         let starts = (0..2 * self.dof()).map(Direction::Initial);
         self.shared.iter().copied().chain(starts).collect()
     }
 
-    /// Place of a record's direction among all parameters.
-    fn place(&self, record: usize, direction: usize) -> usize {
-        match direction < self.shared.len() {
-            true => direction,
-            false => direction + record * 2 * self.dof(),
-        }
+    /// Returns the index of a record's direction among all parameters.
+    fn parameter_index(&self, record: usize, direction: usize) -> usize {
+        if direction < self.shared.len() { direction } else { direction + record * 2 * self.dof() }
     }
 
     fn initial(&self, theta: &DVector<f64>, record: usize) -> Option<InitialState> {
-        let (first, len) = (self.place(record, self.shared.len()), 2 * self.dof());
+        let (first, len) = (self.parameter_index(record, self.shared.len()), 2 * self.dof());
         initial(&theta.rows(first, len).into_owned()).ok()
     }
 
-    /// The largest |q| (m) and |q̇| (m/s) of the coordinate of each term in the simulated responses.
+    /// Returns the largest |q| (m) and |q̇| (m/s) of the coordinate of each term in the simulated
+    /// responses.
     fn ranges(&self, system: &NonlinearSystem) -> Vec<[f64; 2]> {
         let n = self.dof();
         let largest = |term: &Term, part: usize| {
-            let of = |course: &Course| {
+            let amplitude = |course: &Course| {
                 let columns = course.state.columns(part * n, n);
                 let signs = DVector::from_fn(n, |dof, _| term.coordinate().sign(dof));
                 (columns * signs).amax()
             };
-            self.courses.iter().map(of).fold(0.0, f64::max)
+            self.courses.iter().map(amplitude).fold(0.0, f64::max)
         };
         system.terms().iter().map(|term| [0, 1].map(|part| largest(term, part))).collect()
+    }
+
+    /// Returns the shared parameters with their names, units and standard errors.
+    fn named_parameters(
+        &self,
+        theta: &DVector<f64>,
+        system: &NonlinearSystem,
+        covariance: &DMatrix<f64>,
+        freedom: usize,
+    ) -> Vec<NamedParameter> {
+        let entries = self.free.iter().map(|p| (p.to_string(), p.matrix().unit().to_owned()));
+        let terms = system.terms().iter().map(|term| (term.name().to_owned(), term.unit()));
+        let constants = system.terms().iter().flat_map(|term| {
+            let named = |c: mechid_model::Constant| {
+                (format!("{}.{}", term.name(), c.name), c.unit.to_owned())
+            };
+            term.law().constants().into_iter().map(named)
+        });
+        let names = entries.chain(terms).chain(constants).enumerate();
+        let parameters = names.map(|(at, named)| {
+            let (name, unit) = named;
+            let (value, standard_error) = (theta[at], covariance[(at, at)].sqrt());
+            let estimate = Uncertain { value, standard_error, degrees_of_freedom: freedom };
+            NamedParameter { name, unit, estimate }
+        });
+        parameters.collect()
     }
 
     fn finish(
@@ -299,20 +328,7 @@ impl<'a> Problem<'a> {
             condition: start.linear().condition(),
             undetermined: Vec::new(),
         })?;
-        let entries = self.free.iter().map(|p| (p.to_string(), p.matrix().unit().to_owned()));
-        let terms = system.terms().iter().map(|term| (term.name().to_owned(), term.unit()));
-        let constants = system.terms().iter().flat_map(|term| {
-            let named = |c: mechid_model::Constant| {
-                (format!("{}.{}", term.name(), c.name), c.unit.to_owned())
-            };
-            term.law().constants().into_iter().map(named)
-        });
-        let parameters = entries.chain(terms).chain(constants).enumerate().map(|(at, named)| {
-            let (name, unit) = named;
-            let (value, standard_error) = (theta[at], covariance[(at, at)].sqrt());
-            let estimate = Uncertain { value, standard_error, degrees_of_freedom: freedom };
-            NamedParameter { name, unit, estimate }
-        });
+        let parameters = self.named_parameters(theta, &system, &covariance, freedom);
         let starts = (0..self.records.len()).map(|at| self.initial(theta, at).ok_or(wrong.clone()));
         Ok(NonlinearFit {
             starts: starts.collect::<Result<_, _>>()?,
@@ -321,7 +337,7 @@ impl<'a> Problem<'a> {
             estimate: NonlinearEstimate {
                 linear,
                 coefficients: system.coefficients().to_vec(),
-                parameters: parameters.collect(),
+                parameters,
                 covariance,
                 channels: start.channels(),
                 weighting: start.weighting(),
@@ -376,7 +392,7 @@ impl Residuals for Problem<'_> {
                 for (d, derivative) in course.derivatives.iter().enumerate() {
                     let sensitivity = derivative.column(order * n + dof) / -self.levels[dof];
                     jacobian
-                        .view_mut((at, self.place(number, d)), (len, 1))
+                        .view_mut((at, self.parameter_index(number, d)), (len, 1))
                         .copy_from(&sensitivity);
                 }
                 at += len;

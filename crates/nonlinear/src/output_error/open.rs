@@ -1,4 +1,4 @@
-//! Fits of open records, such as sweeps, from a linear fit on.
+//! Fits of open records, such as sweeps, that begin with a linear fit.
 
 use mechid_estimate::{Estimate, EstimateError};
 use mechid_model::{ResponseQuantity, Terms};
@@ -8,19 +8,22 @@ use super::{NonlinearFit, SteppedRecord, best_output_error, output_error};
 use crate::estimate::NonlinearEstimate;
 use crate::limits::{OPEN_WINDOWS, OUTPUT_FORGOTTEN};
 
-/// [`output_error`] on open records from a linear fit of them on, the terms having no force at first.
+/// Estimates by [`output_error`] on open records, beginning with a linear fit and terms without
+/// force.
 ///
-/// A response runs out of step with the measured one where the spring is wrong by little, and a long record has many
-/// minima. So the records are cut into windows first, each with a start of its own, in which it runs out of step little;
-/// what they give is the start of the fit to the whole records. Terms with a constant inside, such as a clearance, are
-/// searched for from that constant, from half of it and from twice as much, the best of which leads on.
+/// If a stiffness is slightly wrong, the simulated response loses its phase relation to the
+/// measured one, and the cost of a long record has many minima. Therefore the records are first cut
+/// into windows, each with its own initial state; their estimate is the initial estimate of the fit
+/// to the whole records. If a term has a constant, such as a clearance, the search starts at the
+/// given constant, at half and at twice its value, and the best result is used.
 ///
 /// # Errors
-/// Those of [`output_error`], and of relations between the parameters, which it has not.
+/// As [`output_error`]; relations between parameters are refused.
 ///
 /// # Source
-/// Bock (1987), *Randwertproblemmethoden zur Parameteridentifizierung*, Bonner Mathematische Schriften 183 (multiple
-/// shooting: windows with starts of their own); Schoukens & Ljung (2019), IEEE Control Systems 39(6), 28–99.
+/// Bock (1987), *Randwertproblemmethoden zur Parameteridentifizierung*, Bonner Mathematische
+/// Schriften 183 (multiple shooting: windows with independent initial states); Schoukens & Ljung
+/// (2019), IEEE Control Systems 39(6), 28–99.
 pub fn output_error_of_open_records(
     records: &[SteppedRecord],
     measured: ResponseQuantity,
@@ -34,31 +37,31 @@ pub fn output_error_of_open_records(
     output_error(records, measured, &start)
 }
 
-/// Factors of the constants inside the laws that a search begins with.
+/// Returns the factors of the constants inside the laws at which a search begins.
 fn factors(terms: &Terms) -> &'static [f64] {
     let has_constants = terms.iter().any(|term| !term.law().constants().is_empty());
     if has_constants { &[1.0, 0.5, 2.0] } else { &[1.0] }
 }
 
-/// The terms with their constants multiplied; `None` where a law refuses it.
+/// Returns the terms with their constants multiplied; `None` if a law refuses it.
 fn scaled(terms: &Terms, factor: f64) -> Option<Terms> {
-    let of = |term: &mechid_model::Term| {
+    let scaled_term = |term: &mechid_model::Term| {
         let constants = term.law().constants();
         let values: Vec<f64> = constants.iter().map(|c| c.value * factor).collect();
         if values.is_empty() { Some(term.clone()) } else { term.with_constants(&values) }
     };
-    Terms::new(terms.iter().map(of).collect::<Option<_>>()?).ok()
+    Terms::new(terms.iter().map(scaled_term).collect::<Option<_>>()?).ok()
 }
 
-/// The records in windows of equal length, as far as they are long enough for that.
+/// Returns the records cut into windows of equal length, if they are long enough.
 fn windows(records: &[SteppedRecord]) -> Result<Vec<SteppedRecord>, EstimateError> {
-    let each = OPEN_WINDOWS.div_ceil(records.len().max(1));
+    let windows_per_record = OPEN_WINDOWS.div_ceil(records.len().max(1));
     let mut windows = Vec::new();
     for record in records {
         let samples = record.force.len();
-        // A start takes 2n numbers: as many samples again for each of them tell little.
+        // An initial state has 2n unknowns: shorter windows contain little further information.
         let fewest = (OUTPUT_FORGOTTEN as usize) * 16 * record.force.channels();
-        let count = (samples / fewest).clamp(1, each);
+        let count = (samples / fewest).clamp(1, windows_per_record);
         let len = samples / count;
         for window in 0..count {
             let cut = |all: &mechid_signal::Record| all.window(window * len, len);

@@ -1,4 +1,4 @@
-//! Records that a simulated response is fitted to.
+//! Records for the fit of a simulated response.
 
 use mechid_estimate::EstimateError;
 use mechid_signal::{Extent, Record};
@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::ChannelPhase;
 
-/// A record for [`output_error`](super::output_error()).
+/// Record for [`output_error`](super::output_error()).
 #[derive(Debug, Clone)]
 pub struct SteppedRecord {
     /// Force, samples × degrees of freedom, in N.
@@ -15,13 +15,14 @@ pub struct SteppedRecord {
     pub response: Record,
     /// Extent of the record: whole periods of a force that repeats, or open.
     pub extent: Extent,
-    /// Number of these periods, of which the mean is fitted; 1 of an open record.
+    /// Number of periods, whose mean is fitted; 1 for an open record.
     pub periods: usize,
 }
 
 impl SteppedRecord {
-    /// Returns the mean period, corrected for what the channels do, and how each period deviates from it: samples ×
-    /// channels of the response, then of the force. No deviation of one period.
+    /// Returns the mean period of force and response, corrected for the channels, and the deviation
+    /// of each period from it: samples × channels of the response, then of the force. No deviations
+    /// for a single period.
     pub(super) fn prepared(
         &self,
         channels: ChannelPhase,

@@ -1,4 +1,4 @@
-//! Several starts of a search.
+//! Search from several initial estimates.
 
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
@@ -6,15 +6,15 @@ use mechid_model::ResponseQuantity;
 use super::{NonlinearFit, SteppedRecord, output_error};
 use crate::estimate::NonlinearEstimate;
 
-/// [`output_error`] from several starts, of which the one that leaves least of the response leads on: constants inside
-/// the laws, such as a clearance, make minima of their own.
+/// Returns the [`output_error`] with the smallest residual from several initial estimates:
+/// constants inside the laws, such as a clearance, cause several minima.
 ///
 /// # Errors
-/// Those of [`output_error`] from the first start if none leads to a minimum, and
-/// [`EstimateError::NotConverged`] without a start.
+/// As [`output_error`] from the first initial estimate if none leads to a minimum, and
+/// [`EstimateError::NotConverged`] without an initial estimate.
 ///
 /// # Source
-/// The source of [`output_error`].
+/// As [`output_error`].
 pub fn best_output_error(
     records: &[SteppedRecord],
     measured: ResponseQuantity,
@@ -22,11 +22,11 @@ pub fn best_output_error(
 ) -> Result<NonlinearFit, EstimateError> {
     let mut best = Err(EstimateError::NotConverged { searches: starts.len(), steps: 0 });
     for (at, start) in starts.iter().enumerate() {
-        let left = |fit: &NonlinearFit| -> f64 {
+        let residual_power = |fit: &NonlinearFit| -> f64 {
             fit.estimate.unexplained().iter().map(|part| part * part).sum()
         };
         match (output_error(records, measured, start), &best) {
-            (Ok(fit), Ok(other)) if left(&fit) >= left(other) => {}
+            (Ok(fit), Ok(other)) if residual_power(&fit) >= residual_power(other) => {}
             (Err(_), _) if at > 0 => {}
             (fit, _) => best = fit,
         }

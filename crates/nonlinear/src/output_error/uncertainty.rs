@@ -1,4 +1,4 @@
-//! Standard errors of an output-error fit, and whether its residual is noise.
+//! Standard errors of an output-error fit, and the test of its residual.
 
 use mechid_estimate::{EstimateError, NAMED_PARAMETERS};
 use mechid_model::NonlinearSystem;
@@ -19,7 +19,7 @@ use crate::scatter::{Line, PeriodScatter, Powers};
 use crate::simulate::{Direction, Tangent};
 
 impl Problem<'_> {
-    /// (JᵀJ)⁻¹ of all parameters, where the residual was last evaluated.
+    /// Returns (JᵀJ)⁻¹ of all parameters at the last evaluation of the residual.
     pub(super) fn inverse(&self, parameters: usize) -> Result<DMatrix<f64>, EstimateError> {
         let mut jacobian = DMatrix::zeros(self.len(), parameters);
         self.jacobian(&mut jacobian);
@@ -41,8 +41,9 @@ impl Problem<'_> {
         Ok(solution.unscaled_covariance)
     }
 
-    /// The covariance of all parameters: by the noise that the periods show if the residual is no more than that,
-    /// otherwise by blocks of time or, of a short record, as if the residual were white.
+    /// Returns the covariance of all parameters: from the noise of the periods if the residual does
+    /// not exceed it, otherwise from blocks of time or, for a short record, as for a white
+    /// residual.
     pub(super) fn uncertainty(
         &self,
         theta: &DVector<f64>,
@@ -53,8 +54,8 @@ impl Problem<'_> {
         Uncertainty::new(by_periods, self.shared.len(), || self.by_residual(theta, inverse))
     }
 
-    /// Scatter of the parameters by the noise on force and response, and the test of the residual against it; `None`
-    /// unless all records have several periods.
+    /// Returns the scatter of the parameters by the noise on force and response, and the test of
+    /// the residual against it; `None` unless all records have several periods.
     fn by_periods(
         &self,
         theta: &DVector<f64>,
@@ -78,7 +79,7 @@ impl Problem<'_> {
             self.scatter_of(at, &carried, theta.len(), inverse, &mut scatter)?;
             self.compare(at, &carried, &mut powers)?;
         }
-        // Noise on the response is in no regressor.
+        // The regressors are simulated and contain no noise of the response.
         let bias = DVector::zeros(theta.len());
         Some(ByPeriods { scatter, misfit: powers.misfit()?, bias })
     }
@@ -96,15 +97,15 @@ impl Problem<'_> {
         let (n, first) = (self.dof(), self.measured.derivative_order() * self.dof());
         let spectra = |samples: DMatrix<f64>| lines_of(record, samples);
         let weights = course.derivatives.iter().map(|derivative| {
-            let mut of_response = derivative.columns(first, n).into_owned();
-            for (mut column, level) in of_response.column_iter_mut().zip(&self.levels) {
+            let mut response_weights = derivative.columns(first, n).into_owned();
+            for (mut column, level) in response_weights.column_iter_mut().zip(&self.levels) {
                 column /= level * level;
             }
-            let of_force = -carried.adjoint(&of_response);
-            let mut all = DMatrix::zeros(of_response.nrows(), 2 * n);
-            all.columns_mut(0, n).copy_from(&of_response);
-            all.columns_mut(n, n).copy_from(&of_force);
-            spectra(all)
+            let force_weights = -carried.adjoint(&response_weights);
+            let mut channels = DMatrix::zeros(response_weights.nrows(), 2 * n);
+            channels.columns_mut(0, n).copy_from(&response_weights);
+            channels.columns_mut(n, n).copy_from(&force_weights);
+            spectra(channels)
         });
         let weights: Vec<_> = weights.collect::<Option<_>>()?;
         let deviations: Vec<_> =
@@ -113,24 +114,24 @@ impl Problem<'_> {
         for line in 0..deviations[0].nrows() {
             let mut sensitivities = DMatrix::zeros(2 * n, parameters);
             for (direction, weights) in weights.iter().enumerate() {
-                let place = self.place(at, direction);
-                sensitivities.column_mut(place).copy_from(&weights.row(line).transpose());
+                let parameter_index = self.parameter_index(at, direction);
+                sensitivities.column_mut(parameter_index).copy_from(&weights.row(line).transpose());
             }
-            let of_period = |channel, period: usize| deviations[period][(line, channel)];
+            let deviation = |channel, period: usize| deviations[period][(line, channel)];
             let (weight, is_real) = product_weight(line, len);
-            let deviations = DMatrix::from_fn(2 * n, deviations.len(), of_period);
+            let deviations = DMatrix::from_fn(2 * n, deviations.len(), deviation);
             let line = Line { deviations: &deviations, weight, is_real };
             scatter.push(inverse, &sensitivities, &line);
         }
         Some(())
     }
 
-    /// Compares the residual of a record with the noise that its periods show of it.
+    /// Compares the residual of a record with the noise from its periods.
     fn compare(&self, at: usize, carried: &Propagation<'_>, powers: &mut Powers) -> Option<()> {
         let (record, n) = (&self.records[at], self.dof());
         let noise = record.deviations.iter().map(|deviations| {
-            let of_force = carried.response(&deviations.columns(n, n).into_owned());
-            lines_of(record, deviations.columns(0, n) - of_force)
+            let force_response = carried.response(&deviations.columns(n, n).into_owned());
+            lines_of(record, deviations.columns(0, n) - force_response)
         });
         let noise: Vec<_> = noise.collect::<Option<_>>()?;
         let gaps: Vec<DVector<f64>> = (0..n).map(|dof| self.gap(at, record, dof)).collect();
@@ -139,7 +140,7 @@ impl Problem<'_> {
         let (len, periods) = (record.response.len(), noise.len());
         for line in 0..residual.nrows() {
             let (weight, is_real) = product_weight(line, len);
-            // Noise on a force is in all channels alike: together they count as one.
+            // Noise on a force reaches all channels: they are added and count as one observation.
             let power = |lines: &DMatrix<Complex<f64>>| {
                 let of = |(dof, level): (usize, &f64)| (lines[(line, dof)] / *level).norm_sqr();
                 weight * self.levels.iter().enumerate().map(of).sum::<f64>()
@@ -167,7 +168,7 @@ impl Problem<'_> {
                     let derivatives = course.derivatives.iter().enumerate();
                     let regressors = derivatives.map(|(d, derivative)| {
                         let column = derivative.column(order * n + dof) * weight;
-                        (self.place(at, d), column.as_slice().to_vec())
+                        (self.parameter_index(at, d), column.as_slice().to_vec())
                     });
                     let gap = self.gap(at, record, dof) * weight;
                     InTime { regressors: regressors.collect(), residual: gap.as_slice().to_vec() }
@@ -189,13 +190,15 @@ impl Problem<'_> {
     }
 }
 
-/// Spectrum of samples on the time axis of a record, lines × channels; `None` if they are not finite.
+/// Returns the spectrum of samples on the time axis of a record, lines × channels; `None` if they
+/// are not finite.
 fn lines_of(record: &Prepared, samples: DMatrix<f64>) -> Option<DMatrix<Complex<f64>>> {
     let record = Record::new(record.response.sampling(), samples).ok()?;
     Some(Spectrum::of(&record).lines().clone())
 }
 
-/// Factor of a line's products in a sum of products over so many samples, and whether the line is real.
+/// Returns the factor of a line's products in the equivalent sum over `samples` samples, and
+/// whether the line is real.
 fn product_weight(line: usize, samples: usize) -> (f64, bool) {
     let is_real = line == 0 || 2 * line == samples;
     (samples as f64 * if is_real { 1.0 } else { 0.5 }, is_real)
