@@ -1,4 +1,4 @@
-//! Forces that are held or linear between samples, and AC coupled channels, as explanations of a residual.
+//! Forces held or linear between samples, and AC coupled channels, as explanations of a residual.
 
 use mechid_estimate::frequency_domain::equivalent_force;
 use mechid_estimate::{Estimate, EstimateError};
@@ -16,7 +16,7 @@ use super::spectral_residual::SpectralResidual;
 use super::weighted_fit::{Weighing, after_spectral_fit};
 use super::{Subject, Verdict};
 
-/// Difference of the data from those of a band-limited force and channels that pass every frequency.
+/// Deviation of the acquisition from a band-limited force and channels that pass all frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Between(Discretisation),
@@ -27,7 +27,8 @@ enum Fault {
 }
 
 impl Fault {
-    /// Returns the faults that can be told apart in data of `n` degrees of freedom, `driven` by some of them.
+    /// Returns the faults that can be distinguished in data of `n` degrees of freedom with forces
+    /// on `driven`.
     fn all(n: usize, driven: &[usize]) -> Vec<Self> {
         let between = [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold];
         let mut faults: Vec<Self> = between.into_iter().map(Self::Between).collect();
@@ -41,8 +42,8 @@ impl Fault {
         faults
     }
 
-    /// Returns the data without the fault, or with that of all channels alike; `amount` is the corner frequency (rad/s) of a
-    /// high-pass.
+    /// Returns the data without the fault, or with the same fault in all channels; `amount` is the
+    /// corner frequency (rad/s) of a high-pass.
     fn removed(
         self,
         data: &FrequencyData,
@@ -61,7 +62,7 @@ impl Fault {
         })
     }
 
-    /// Returns whether the amount that fits best is that of the fault.
+    /// Returns whether the best-fitting amount is plausible for the fault.
     fn is_plausible(self, amount: f64) -> bool {
         match self {
             Self::Between(_) => (amount - 1.0).abs() < 0.5,
@@ -89,14 +90,14 @@ impl Fault {
     }
 }
 
-/// Amount of a fault that fits the residual best, to first order, and how it is known.
+/// Amount of a fault that fits the residual best, to first order, with its standard error.
 struct Score {
     amount: f64,
-    /// Standard error of the amount, by the size that the residuals around each line show.
+    /// Standard error of the amount, from the residuals around each line.
     error: f64,
 }
 
-/// Records of a fit, with what is left of them.
+/// Records of a fit with their residuals.
 struct Residuals<'a> {
     records: &'a [FrequencyData],
     after: &'a [SpectralResidual],
@@ -108,7 +109,7 @@ struct Residuals<'a> {
 }
 
 impl Residuals<'_> {
-    /// Returns the faults whose amounts are plausible and larger than noise makes them.
+    /// Returns the faults with plausible and significant amounts.
     fn significant(&self, faults: Vec<Fault>) -> Vec<(Fault, Score)> {
         let is_significant = |score: &Score| score.amount.abs() > STANDARD_ERRORS * score.error;
         let scored = faults.into_iter().filter_map(|fault| {
@@ -119,7 +120,7 @@ impl Residuals<'_> {
         scored.collect()
     }
 
-    /// Scores a fault whose `amount` has been removed already.
+    /// Scores a fault after `amount` of it has been removed.
     ///
     /// # Source
     /// Rao's score test.
@@ -154,8 +155,8 @@ impl Residuals<'_> {
     }
 }
 
-/// Returns the variance of each residual as the mean square of those of its channel on the lines around it: a fault that
-/// shows on a few lines of a resonance would hide behind their own size.
+/// Returns the variance of each residual as the mean square of its channel on the lines around it:
+/// a fault that affects only a few lines of a resonance would otherwise increase its own variance.
 fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     let lines = deviations.len() / (2 * dof);
     let power = |line: usize, channel: usize| deviations[2 * (dof * line + channel)].powi(2);
@@ -173,7 +174,7 @@ fn local_variance(deviations: &DVector<f64>, dof: usize) -> DVector<f64> {
     variance
 }
 
-/// Subtracts from the directions of all records what the parameters, and what is known of each record, explain.
+/// Subtracts the part of the directions that the parameters and the columns of each record explain.
 fn without_explained(
     mut directions: Vec<DVector<f64>>,
     after: &[SpectralResidual],
@@ -183,20 +184,20 @@ fn without_explained(
     let products = products.map(|(c, after)| after.explained().columns(0, parameters).tr_mul(c));
     let sum = products.fold(DVector::zeros(parameters), |sum, product| sum + product);
     for (direction, after) in directions.iter_mut().zip(after) {
-        // Columns of one record alone come behind those of the parameters.
-        let (all, own) = (after.explained(), after.explained().ncols() - parameters);
-        *direction -= all.columns(0, parameters) * &sum;
-        let product = all.columns(parameters, own).tr_mul(&*direction);
-        *direction -= all.columns(parameters, own) * product;
+        // The columns of one record follow the columns of the parameters.
+        let (explained, own_columns) = (after.explained(), after.explained().ncols() - parameters);
+        *direction -= explained.columns(0, parameters) * &sum;
+        let product = explained.columns(parameters, own_columns).tr_mul(&*direction);
+        *direction -= explained.columns(parameters, own_columns) * product;
     }
     directions
 }
 
-/// Finds what the acquisition of some records did to them where that explains the residual of an `estimate`
-/// ([`Finding::Alternative`]): a force that is held or linear between samples `dt` (s) apart, or channels that a
-/// first-order high-pass couples. `after` is what the fit left of the records. `None` unless one of them is
-/// significant, and no force explains anything of what a fit without it leaves, or that is less than a quarter of the
-/// residual power.
+/// Finds a fault of the acquisition that explains the residual of an `estimate`
+/// ([`Finding::Alternative`]): a force held or linear between samples `dt` (s) apart, or channels
+/// with a first-order high-pass. `after` has the residuals of the fit. `None` unless the fault is
+/// significant and, after its removal, the residual of a fit is uncorrelated with the forces or has
+/// less than a quarter of the power.
 ///
 /// # Errors
 /// As [`after_spectral_fit`].
@@ -242,8 +243,8 @@ pub fn fault_of_acquisition(
         if !is_best || remaining >= 1.0 {
             continue;
         }
-        let left = after_spectral_fit(&without, estimate, extent)?.records;
-        if remaining <= DELAY_REMAINING || is_noise(after) || is_unexplained(&left) {
+        let residuals_without = after_spectral_fit(&without, estimate, extent)?.records;
+        if remaining <= DELAY_REMAINING || is_noise(after) || is_unexplained(&residuals_without) {
             let cause = fault.cause(first, &driven, corner);
             best = Some((remaining, Finding::Alternative(Alternative { cause, remaining })));
         }
@@ -257,15 +258,15 @@ fn is_noise(after: &[SpectralResidual]) -> bool {
     findings.all(|finding| finding.verdict() == Verdict::Good)
 }
 
-/// Returns whether no force explains anything of the residuals. Lines at the ends of a resonance may go together: their
-/// loads were found with the fault.
+/// Returns whether no residual is correlated with a force. Correlation from line to line is
+/// allowed: the transients were estimated with the fault.
 fn is_unexplained(after: &[SpectralResidual]) -> bool {
     let findings = after.iter().flat_map(SpectralResidual::findings);
     let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
     correlations.all(|finding| finding.verdict() == Verdict::Good)
 }
 
-/// Returns the records without a fault, and its amount after some rounds.
+/// Returns the amount of a fault after some refinements, and the records without it.
 fn removed(
     fault: Fault,
     score: Score,
@@ -274,15 +275,15 @@ fn removed(
     extent: Extent,
 ) -> Result<Option<(f64, Vec<FrequencyData>)>, EstimateError> {
     let Residuals { records, system, dt, parameters, .. } = *residuals;
-    let all = |amount: f64| -> Option<Vec<FrequencyData>> {
+    let without_fault = |amount: f64| -> Option<Vec<FrequencyData>> {
         records.iter().map(|data| fault.removed(data, system, dt, amount)).collect()
     };
     if matches!(fault, Fault::Between(_)) {
-        return Ok(all(1.0).map(|records| (1.0, records)));
+        return Ok(without_fault(1.0).map(|records| (1.0, records)));
     }
     let mut amount = score.amount;
     for _ in 0..ACQUISITION_ROUNDS {
-        let Some(without) = all(amount) else { return Ok(None) };
+        let Some(without) = without_fault(amount) else { return Ok(None) };
         let after = after_spectral_fit(&without, estimate, extent)?.records;
         let Some(weighing) = Weighing::new(&without, estimate, extent) else { return Ok(None) };
         if after.len() != records.len() {
@@ -296,5 +297,7 @@ fn removed(
             break;
         }
     }
-    Ok(all(amount).filter(|_| fault.is_plausible(amount)).map(|records| (amount, records)))
+    Ok(without_fault(amount)
+        .filter(|_| fault.is_plausible(amount))
+        .map(|records| (amount, records)))
 }

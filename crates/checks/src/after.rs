@@ -1,4 +1,4 @@
-//! Residuals against noise: whiteness, and correlation with the forces.
+//! Tests of residuals in time: whiteness, and correlation with the forces.
 
 use mechid_estimate::EstimateError;
 use mechid_numerics::check_size;
@@ -14,21 +14,22 @@ use super::limits::{ROUNDING, SIGNIFICANCE};
 use super::p_value::CorrelationTest;
 use super::whiteness::{NoiseSpan, Residual, Whiteness};
 
-/// Tests every channel of a residual for whiteness and for correlation with the forces that act (N).
+/// Tests every channel of a residual for whiteness and for correlation with the forces that act
+/// (N).
 ///
-/// `fitted` is the signal that the residual was left of, on the same time axis; a residual of rounding
-/// passes whatever its colour. `noise_span` is the number of lags over which noise on the response
-/// correlates the residual: 0 where each sample of it holds the noise of one sample, 1 where it holds
-/// that of two consecutive ones ([`missing_force`](mechid_estimate::missing_force())), the window less one after
-/// a sliding polynomial. A residual correlated over that span and no further is reported as such. The
-/// correlation with a force is judged with the colour that the residual has.
+/// `fitted` is the fitted signal on the same time axis; a residual of rounding always passes.
+/// `noise_span` is the number of lags over which noise on the response correlates the residual: 0
+/// if each sample contains the noise of one sample, 1 if it contains the noise of two consecutive
+/// samples ([`missing_force`](mechid_estimate::missing_force())), the window length minus one after
+/// a sliding polynomial. A residual correlated over that span and no further is reported as such.
+/// The test of the correlation with a force allows for the autocorrelation of the residual.
 ///
 /// # Errors
-/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records
-/// do not belong together.
+/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not match.
 ///
 /// # Source
-/// Those of [`whiteness_beyond`] and the cross-correlation.
+/// As [`whiteness_beyond`] and the cross-correlation.
 pub fn after_fit(
     residual: &Record,
     fitted: &Record,
@@ -73,7 +74,7 @@ fn is_noise(correlation: &Correlation) -> bool {
     correlation.p_value >= SIGNIFICANCE
 }
 
-/// Autocorrelation of a residual from lag 0 as far as it counts.
+/// Returns the autocorrelation of a residual from lag 0 to its largest relevant lag.
 fn colour(
     residual: &[f64],
     lags: usize,
@@ -87,13 +88,13 @@ fn colour(
     let mut coefficients = if spanned {
         autocorrelation(&e, span)
     } else {
-        // Coefficients at long lags are the least certain.
+        // The taper reduces coefficients at long lags, which are the least certain.
         let taper = |lag: usize| 1.0 - lag as f64 / (lags + span + 1) as f64;
-        let all = autocorrelation(&e, lags + span);
-        all.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
+        let estimate = autocorrelation(&e, lags + span);
+        estimate.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
     };
-    // Where colours of residual and force hardly meet, the variance must not be smaller than the error
-    // of these coefficients.
+    // The added term covers the error of these coefficients, which would exceed the variance if the
+    // spectra of residual and force hardly overlap.
     coefficients[0] += 2.0 / (e.len() as f64).sqrt();
     Ok(coefficients)
 }

@@ -1,4 +1,4 @@
-//! Another model that explains what a fit leaves.
+//! Alternative model that explains the residual of a fit.
 
 use std::fmt::{self, Formatter};
 
@@ -11,18 +11,18 @@ use super::limits::{DELAY_REMAINING, SIGNIFICANCE, WINDOW_REACH};
 use super::line_correlation::correlation_of_lines;
 use super::{Subject, Verdict};
 
-/// Another model explains what the fit leaves.
+/// Alternative model that explains the residual of the fit.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Alternative {
-    /// Difference from the model that was fitted.
+    /// Difference from the fitted model.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub cause: Cause,
-    /// Fraction of the residual's power that is left with the other model.
+    /// Fraction of the residual power that remains with the other model.
     pub remaining: f64,
 }
 
-/// Difference of another model from the one that was fitted.
+/// Difference of an alternative model from the fitted one.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -31,7 +31,7 @@ pub struct Alternative {
 )]
 #[non_exhaustive]
 pub enum Cause {
-    /// The response is late.
+    /// Delay between force and response.
     Delay {
         /// Delay, in s; negative if the response is early.
         seconds: f64,
@@ -41,23 +41,23 @@ pub enum Cause {
         /// Loss factor, a ratio.
         loss_factor: f64,
     },
-    /// The responses are those of another quantity than stated.
+    /// Responses of another quantity than stated.
     Quantity {
         /// Quantity of the responses that fits.
         quantity: ResponseQuantity,
         /// Quantity that was stated.
         stated: ResponseQuantity,
     },
-    /// The magnitudes are levels in dB.
+    /// Magnitudes that are levels in dB.
     Decibels,
-    /// The force is held or linear between its samples.
+    /// Force that is held or linear between its samples.
     BetweenSamples {
         /// Course of the force.
         between_samples: Discretisation,
     },
-    /// Channels pass a first-order high-pass.
+    /// Channels with a first-order high-pass.
     AcCoupling {
-        /// The channels.
+        /// Affected channels.
         channels: Vec<Channel>,
         /// Corner frequency, in Hz.
         corner_hz: f64,
@@ -133,15 +133,15 @@ impl Check for Alternative {
     }
 }
 
-/// Responses that were measured and those of a model, rows × channels in the unit of the former.
+/// Measured and modelled responses, rows × channels in the unit of the channel.
 #[derive(Debug, Clone)]
 pub struct ModelledResponses {
     /// Measured responses, rows × channels (unit of the channel).
     pub measured: DMatrix<Complex<f64>>,
     /// Modelled responses, rows × channels (unit of the channel).
     pub modelled: DMatrix<Complex<f64>>,
-    /// Logarithm of the area of the measured responses per area of the original ones (pure number); 0 unless the numbers
-    /// were converted.
+    /// Logarithm of the area of the measured responses per area of the original ones (pure number);
+    /// 0 unless the numbers were converted.
     pub log_area: f64,
 }
 
@@ -151,12 +151,13 @@ impl ModelledResponses {
         weighted(&(&self.measured - &self.modelled), deviation).norm_squared()
     }
 
-    /// Returns the residual power over that of the measured responses.
+    /// Returns the ratio of the residual power to the power of the measured responses.
     fn unexplained(&self, deviation: Option<&DMatrix<f64>>) -> f64 {
         self.power(deviation) / weighted(&self.measured, deviation).norm_squared()
     }
 
-    /// Returns whether the residual of no channel is correlated from line to line within rising `omega` (rad/s).
+    /// Returns whether the residual of no channel is correlated from line to line within rising
+    /// `omega` (rad/s).
     fn is_white(&self, omega: &[f64], deviation: Option<&DMatrix<f64>>) -> bool {
         let residual = weighted(&(&self.measured - &self.modelled), deviation);
         let first = |row: &usize| *row == 0 || omega[*row] < omega[row - 1];
@@ -181,10 +182,11 @@ fn weighted(z: &DMatrix<Complex<f64>>, deviation: Option<&DMatrix<f64>>) -> DMat
     }
 }
 
-/// Returns which of `others` explains the responses best, and the fraction of the residual power of `fitted` that it
-/// leaves. `None` unless it is more likely than the model fitted, and leaves noise or less than a quarter of
-/// the residual power. `omega` (rad/s) belongs to the rows, `deviation` is that of the noise where it is known, in
-/// the unit of the original responses.
+/// Returns which of `others` explains the responses best, and the fraction of the residual power of
+/// `fitted` that remains with it. `None` unless it is more likely than the fitted model, and its
+/// residual is noise or has less than a quarter of the power. `omega` (rad/s) are the frequencies
+/// of the rows, `deviation` is the standard deviation of the noise if known, in the unit of the
+/// original responses.
 ///
 /// # Source
 /// The likelihood of complex normal noise of unknown level; the limits are ours.
@@ -194,18 +196,19 @@ pub fn better_model(
     fitted: &ModelledResponses,
     others: &[ModelledResponses],
 ) -> Option<(usize, f64)> {
-    // A converted response has another noise than that of its original.
+    // A converted response has another noise level than the original.
     let deviation_of =
         |model: &ModelledResponses| deviation.filter(|_| model.measured == fitted.measured);
     let evidence = |model: &ModelledResponses| {
         let power = |responses: &ModelledResponses| responses.power(deviation_of(model));
         model.log_area + model.measured.len() as f64 * (power(fitted) / power(model)).ln()
     };
-    let each = others.iter().enumerate().map(|(at, model)| (at, model, evidence(model)));
-    let (at, model, evidence) =
-        each.filter(|each| !each.2.is_nan()).max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let own = deviation_of(model);
-    let remaining = model.unexplained(own) / fitted.unexplained(own);
-    let explains = remaining <= DELAY_REMAINING || model.is_white(omega, own);
+    let candidates = others.iter().enumerate().map(|(at, model)| (at, model, evidence(model)));
+    let (at, model, evidence) = candidates
+        .filter(|candidates| !candidates.2.is_nan())
+        .max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let noise = deviation_of(model);
+    let remaining = model.unexplained(noise) / fitted.unexplained(noise);
+    let explains = remaining <= DELAY_REMAINING || model.is_white(omega, noise);
     (evidence > -SIGNIFICANCE.ln() && remaining < 1.0 && explains).then_some((at, remaining))
 }

@@ -9,14 +9,14 @@ use super::finding::{Check, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Difference of an estimate from another that noise on the response does not bias.
+/// Difference of an estimate from an estimate without bias by noise on the response.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Bias {
-    /// Probability that noise alone makes them differ as much if neither is biased.
+    /// Probability of a difference as large by noise alone if neither is biased.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// The parameter that changes most, in standard errors.
+    /// Parameter with the largest change, in standard errors.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub parameter: Parameter,
     /// Value, in the unit of the parameter.
@@ -25,7 +25,7 @@ pub struct Bias {
     pub unbiased: f64,
     /// Standard error of `estimate` (unit of the parameter).
     pub standard_error: f64,
-    /// The other estimator.
+    /// Estimator of `unbiased`.
     pub reference: Reference,
 }
 

@@ -1,4 +1,4 @@
-//! Channels that an amplifier or a converter cut off.
+//! Clipped channels.
 
 use std::fmt::{self, Formatter};
 
@@ -10,24 +10,23 @@ use super::digits::six_digits;
 use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::{Subject, Verdict};
 
-/// A channel was cut off by an amplifier or a converter.
+/// Channel that an amplifier or a converter has clipped.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Clipping {
-    /// The channel.
+    /// Clipped channel.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub channel: Channel,
-    /// Level at which it is cut off, in the unit of the channel.
+    /// Level of the clipping, in the unit of the channel.
     pub level: f64,
     /// Number of samples at that level.
     pub samples: usize,
 }
 
-/// Finds the channels of a record (any unit) that were cut off by an amplifier or a converter, by
-/// [`clipping`] ([`Finding::Clipping`]).
+/// Finds clipped channels of a record (any unit) by [`clipping`] ([`Finding::Clipping`]).
 ///
 /// # Source
-/// That of [`clipping`].
+/// As [`clipping`].
 pub fn clipped_channels(quantity: Quantity, record: &Record) -> Vec<Finding> {
     let one = |index: usize| {
         let clipped = clipping(record.channel(index))?;

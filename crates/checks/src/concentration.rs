@@ -1,4 +1,4 @@
-//! Lines that hold the misfit of a fit of spectra.
+//! Lines with most of the misfit of a fit of spectra.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ pub(super) struct Part<'a> {
     pub omega: &'a [f64],
     /// Number of channels.
     pub dof: usize,
-    /// Residuals: of each line the channels, of each channel real and imaginary part.
+    /// Residuals: for each line and channel real and imaginary part.
     pub values: &'a DVector<f64>,
     /// Q of their covariance I − QQᵀ, over all records together.
     pub explained: &'a DMatrix<f64>,
@@ -22,18 +22,19 @@ pub(super) struct Part<'a> {
     pub unit: f64,
 }
 
-/// The residuals of one frequency: record and first row of each.
+/// Residuals at one frequency: record and first row of each.
 struct Line {
     omega: f64,
     rows: Vec<(usize, usize)>,
 }
 
-/// Finds the few lines without which the misfit is gone; `None` unless [`MOST_DISTURBED`] lines at most,
-/// and an eighth of all, hold [`CONCENTRATED`] of the residual power beyond the noise, and leave no more than
-/// [`DISTURBED_ALONE`] times that of the noise: near its resonance a model that is wrong errs most, too.
+/// Finds few lines that cause the misfit. `None` unless at most [`MOST_DISTURBED`] lines, and at
+/// most an eighth of all, have the share [`CONCENTRATED`] of the residual power beyond the noise,
+/// and the other lines at most [`DISTURBED_ALONE`] times the noise power: a wrong model, too, has
+/// its largest errors on few lines, near a resonance.
 ///
-/// The line that stands out most is left out of the linearised fit, and so on: what one of them does to
-/// the residual of all others goes with it.
+/// The line with the largest residual is removed from the linearised fit, then the next one: this
+/// also removes its effect on the residuals of the other lines.
 ///
 /// # Source
 /// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases.
@@ -43,34 +44,34 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
     let power = |values: &[DVector<f64>]| -> f64 { values.iter().map(DVector::norm_squared).sum() };
     let count: f64 = parts.iter().map(|part| part.values.len() as f64).sum();
     let noise: f64 = parts.iter().map(|part| part.unit * part.values.len() as f64).sum();
-    let expected = |left: f64| noise / count * (left - parameters as f64);
+    let expected = |remaining: f64| noise / count * (remaining - parameters as f64);
     let start: Vec<DVector<f64>> = parts.iter().map(|part| part.values.clone()).collect();
     let excess = power(&start) - expected(count);
     if excess <= 0.0 {
         return None;
     }
     let (mut values, mut chosen): (_, Vec<usize>) = (start.clone(), Vec::new());
-    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S of the lines left out.
+    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S of the removed lines S.
     let mut information = DMatrix::identity(parameters, parameters);
     let mut moved = DVector::zeros(parameters);
-    let (mut left, mut share, mut ratio) = (count, 0.0, f64::INFINITY);
+    let (mut remaining, mut share, mut ratio) = (count, 0.0, f64::INFINITY);
     for _ in 0..MOST_DISTURBED.min(lines.len() / LINES_PER_DISTURBED) {
         let of_line = |line: &Line| -> f64 {
-            let each = line.rows.iter().map(|(record, row)| {
+            let powers = line.rows.iter().map(|(record, row)| {
                 values[*record].rows(*row, 2 * parts[*record].dof).norm_squared()
             });
-            each.sum()
+            powers.sum()
         };
-        let others = (0..lines.len()).filter(|at| !chosen.contains(at));
+        let candidates = (0..lines.len()).filter(|at| !chosen.contains(at));
         let (next, _) =
-            others.map(|at| (at, of_line(&lines[at]))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+            candidates.map(|at| (at, of_line(&lines[at]))).max_by(|a, b| a.1.total_cmp(&b.1))?;
         chosen.push(next);
         for (record, row) in &lines[next].rows {
             let rows = 2 * parts[*record].dof;
             let q = parts[*record].explained.rows(*row, rows);
             information -= q.tr_mul(&q);
             moved += q.tr_mul(&start[*record].rows(*row, rows));
-            left -= rows as f64;
+            remaining -= rows as f64;
         }
         values.clone_from(&start);
         if parameters > 0 {
@@ -82,9 +83,9 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
         for (record, row) in chosen.iter().flat_map(|at| &lines[*at].rows) {
             values[*record].rows_mut(*row, 2 * parts[*record].dof).fill(0.0);
         }
-        let others = power(&values);
-        share = 1.0 - ((others - expected(left)) / excess).max(0.0);
-        ratio = others / expected(left);
+        let candidates = power(&values);
+        share = 1.0 - ((candidates - expected(remaining)) / excess).max(0.0);
+        ratio = candidates / expected(remaining);
         if share >= 0.99 {
             break;
         }
@@ -97,36 +98,38 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
     alone.then_some(Concentration { frequencies_hz, share, multiples_of_hz })
 }
 
-/// Returns the frequency of which all `chosen` lines of `all` are multiples, each within the distance of the lines;
-/// `None` where so many lines chosen at random are likely to be, or no other line shows how far they are apart.
+/// Returns the frequency that has all `chosen` lines of `all` near its multiples, within the line
+/// spacing; `None` if random lines would satisfy this as well, or if a single line leaves the
+/// spacing unknown.
 ///
-/// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a random choice are
-/// multiples of one of them is that of a hypergeometric distribution, times the number of candidates.
+/// Candidates are the fractions of the lowest chosen frequency. The probability that all lines of a
+/// random choice are multiples of one of them follows from the hypergeometric distribution, times
+/// the number of candidates.
 fn common_divisor(chosen: &[f64], all: &[f64]) -> Option<f64> {
     let spacing = all.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
     let lowest = *chosen.first().filter(|_| chosen.len() > 1)?;
-    let near = |hz: f64, of: f64| (hz - (hz / of).round().max(1.0) * of).abs() < spacing;
+    let near = |hz: f64, base: f64| (hz - (hz / base).round().max(1.0) * base).abs() < spacing;
     let candidates: Vec<f64> = (1_u32..)
         .map(|part| lowest / f64::from(part))
-        .take_while(|of| *of > 2.0 * spacing)
+        .take_while(|base| *base > 2.0 * spacing)
         .collect();
     let (probability, divisor) = candidates
         .iter()
-        .map(|of| refined(chosen, *of))
-        .filter(|of| chosen.iter().all(|hz| near(*hz, *of)))
-        .map(|of| {
-            let multiples = all.iter().filter(|hz| near(**hz, of)).count();
+        .map(|base| refined(chosen, *base))
+        .filter(|base| chosen.iter().all(|hz| near(*hz, *base)))
+        .map(|base| {
+            let multiples = all.iter().filter(|hz| near(**hz, base)).count();
             // Choices without replacement: c/n · (c − 1)/(n − 1) …
             let draws = (0..chosen.len())
                 .map(|drawn| (multiples - drawn) as f64 / (all.len() - drawn) as f64);
-            (draws.product::<f64>(), of)
+            (draws.product::<f64>(), base)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     (probability * candidates.len() as f64 <= SIGNIFICANCE).then_some(divisor)
 }
 
-/// Returns the frequency whose multiples are nearest to the `chosen` lines, by least squares with the orders that the
-/// first estimate gives.
+/// Returns the frequency with multiples nearest to the `chosen` lines, by least squares with the
+/// orders of the first estimate.
 fn refined(chosen: &[f64], first: f64) -> f64 {
     let orders = chosen.iter().map(|hz| (hz / first).round().max(1.0));
     let (products, squares) = chosen
@@ -136,16 +139,16 @@ fn refined(chosen: &[f64], first: f64) -> f64 {
     products / squares
 }
 
-/// The lines of all records by rising frequency.
+/// Returns the lines of all records by rising frequency.
 fn lines(parts: &[Part<'_>]) -> Vec<Line> {
-    let all = parts.iter().enumerate().flat_map(|(record, part)| {
+    let rows = parts.iter().enumerate().flat_map(|(record, part)| {
         let line = move |(at, omega): (usize, &f64)| (*omega, record, 2 * part.dof * at);
         part.omega.iter().enumerate().map(line)
     });
-    let mut all: Vec<(f64, usize, usize)> = all.collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut rows: Vec<(f64, usize, usize)> = rows.collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut lines: Vec<Line> = Vec::new();
-    for (omega, record, row) in all {
+    for (omega, record, row) in rows {
         match lines.last_mut() {
             Some(last) if omega - last.omega <= SAME_LINE * omega => last.rows.push((record, row)),
             _ => lines.push(Line { omega, rows: vec![(record, row)] }),

@@ -19,7 +19,7 @@ pub struct Conditioning {
     pub undetermined: usize,
 }
 
-/// Conditioning of the regressors that an estimate was found from.
+/// Returns the conditioning of the regressors of an estimate.
 pub(super) fn conditioning(estimate: &Estimate) -> Finding {
     let (condition_number, undetermined) = (estimate.condition(), estimate.undetermined().len());
     Finding::Conditioning(Conditioning { condition_number, undetermined })

@@ -8,21 +8,22 @@ use mechid_signal::message;
 use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::{Subject, Verdict};
 
-/// A channel has the same value in all samples.
+/// Channel with the same value in all samples.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ConstantChannel {
-    /// The channel.
+    /// Constant channel.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub channel: Channel,
-    /// The value, in the unit of the channel.
+    /// Value of the samples, in the unit of the channel.
     pub level: f64,
     /// Number of samples.
     pub samples: usize,
 }
 
 /// Finds the channels of a response (any unit) that have the same value in all samples
-/// ([`Finding::ConstantChannel`]): what depends on them is not determined, or by rounding only.
+/// ([`Finding::ConstantChannel`]): parameters that depend on them are undetermined, or determined
+/// only by rounding.
 ///
 /// # Source
 /// Ours.

@@ -7,7 +7,7 @@ use nalgebra::Complex;
 use super::finding::{Check, Finding, Names};
 use super::{Subject, Verdict};
 
-/// Every value of a frequency response is real and positive: a magnitude without its phase.
+/// Frequency response whose values are all real and positive: a magnitude without its phase.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ConstantPhase {
@@ -20,7 +20,7 @@ pub struct ConstantPhase {
 }
 
 /// Finds a frequency response, at several frequencies, whose values are all real and positive
-/// ([`Finding::ConstantPhase`]): no damped machine has that.
+/// ([`Finding::ConstantPhase`]): impossible for a damped system.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (the phase of a receptance).

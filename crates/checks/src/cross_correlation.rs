@@ -16,7 +16,7 @@ pub struct CrossCorrelation {
     /// Channel of the force.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub force: usize,
-    /// Numbers of the test.
+    /// Result of the test.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub test: CorrelationTest,
 }

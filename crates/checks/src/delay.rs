@@ -27,20 +27,22 @@ use super::{MAX_SAMPLES, Subject, Verdict};
 /// Maximum delay, in samples, to either side.
 const MAX_DELAY: isize = 16;
 
-/// The same where a response hardly follows the force: then a longer delay is likely.
+/// Maximum delay, in samples, if a response hardly follows the force: then a longer delay is
+/// likely.
 const MAX_LONG_DELAY: isize = 64;
 
-/// Steps of the search per sample, of spectra.
+/// Number of steps of the search per sample, for spectra.
 const STEPS_PER_SAMPLE: isize = 2;
 
-/// Finds a delay with which the equation of motion fits the lines far better ([`Finding::Delay`]), by
-/// filters, a scanning converter or a trigger. `dt` is the sampling interval of the record in s; lines
-/// are weighted by the noise where `data` state it. `None` if no delay of up to 16 samples (64 where the
-/// response hardly follows the force) leaves less than a quarter of the residual power, of least squares and, where the noise is stated, of maximum
-/// likelihood: noise on a resonance spoils least squares alone.
+/// Finds a delay, caused by filters, a scanning converter or a trigger, with which the equation of
+/// motion fits the lines far better ([`Finding::Delay`]). `dt` is the sampling interval of the
+/// record in s; lines are weighted by the noise if `data` states it. `None` if no delay of up to 16
+/// samples (64 if the response hardly follows the force) reduces the residual power to less than a
+/// quarter, in least squares and, if the noise is stated, in maximum likelihood: noise on a
+/// resonance disturbs least squares.
 ///
 /// # Source
-/// Ours: least squares on the equation of motion with the force turned by e^(−iωτ).
+/// Ours: least squares on the equation of motion with the force times e^(−iωτ).
 pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Option<Finding> {
     let driven = driven(&data.force().map(|f| f.norm()));
     let equations = DelayedForce::new(data, unknowns, &driven)?;
@@ -51,7 +53,7 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
         .filter(|_| is_delayed(data, delay * dt, unknowns))
 }
 
-/// The delay, in samples, with which the equations of motion fit best.
+/// Returns the delay, in samples, with which the equations of motion fit best.
 fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
     let power = |samples: f64| equations.residual_power(samples * dt);
     let undelayed = power(0.0)?;
@@ -66,16 +68,18 @@ fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -
     Some(0.5 * (low + high))
 }
 
-/// Finds a delay of the responses of open records ([`Finding::Delay`]) that accounts for the residual of a `fit` by
-/// maximum likelihood: with it no force explains anything of what is left, and that is less than noise makes it. Where
-/// no force explains anything of the residual without the delay either (`is_explained` is false), no more than a
-/// quarter of its power may be left. `dt` is the sampling interval in s; sinusoids beside the response are taken off
-/// the `records`. `None` where no delay of up to 16 samples (64 where the response hardly follows the force) does so.
+/// Finds a delay of the responses of open records ([`Finding::Delay`]) that explains the residual
+/// of a maximum-likelihood `fit`: with the delay the residual is significantly smaller and
+/// uncorrelated with the forces. If it is uncorrelated without the delay, too (`is_explained` is
+/// false), at most a quarter of its power may remain. `dt` is the sampling interval in s;
+/// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
+/// samples (64 if the response hardly follows the force) satisfies this.
 ///
-/// The loads of the ends are found with each delay; without that they take up a part of it.
+/// The transients are estimated again for each delay; otherwise they would absorb a part of it.
 ///
 /// # Source
-/// Ours: equations of motion under Hann's window with the force turned by e^(−iωτ), then maximum likelihood.
+/// Ours: equations of motion under Hann's window with the force times e^(−iωτ), then maximum
+/// likelihood.
 pub fn delay_of_open_records(
     records: &[FrequencyData],
     dt: f64,
@@ -83,32 +87,36 @@ pub fn delay_of_open_records(
     fit: &OutputErrorFit,
     is_explained: bool,
 ) -> Option<Finding> {
-    let (first, others) = records.split_first()?;
-    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
-    let mut likelihood = DelayedOpenRecord::from_fit(&all, unknowns, fit)?;
+    let (first, remaining_records) = records.split_first()?;
+    let joined = remaining_records
+        .iter()
+        .try_fold(first.clone(), |joined, record| joined.and(record))
+        .ok()?;
+    let mut likelihood = DelayedOpenRecord::from_fit(&joined, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
-    let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    let near = delay_under_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {
         likelihood.search(near * dt)?;
     }
     let (mut samples, mut delayed) = (near, likelihood.cost(near * dt)?);
-    let mut reach = DELAY_REACH;
+    let mut width = DELAY_REACH;
     for _ in 0..DELAY_PARABOLAS {
-        let [before, after] = [samples - reach, samples + reach];
+        let [before, after] = [samples - width, samples + width];
         let [before, after] = [likelihood.cost(before * dt)?, likelihood.cost(after * dt)?];
         let (slope, curvature) = (after - before, after - 2.0 * delayed + before);
-        // Outside of a valley no further than there was a look.
-        let step = match curvature > 0.0 {
-            true => (-0.5 * slope / curvature).clamp(-2.0, 2.0),
-            false => -2.0 * slope.signum(),
+        // The step is limited if the three points do not enclose a minimum.
+        let step = if curvature > 0.0 {
+            (-0.5 * slope / curvature).clamp(-2.0, 2.0)
+        } else {
+            -2.0 * slope.signum()
         };
-        samples += step * reach;
+        samples += step * width;
         delayed = likelihood.cost(samples * dt)?;
         if !is_explained && delayed > DELAY_PROMISING * undelayed {
             return None;
         }
-        reach *= f64::clamp(step.abs(), LEAST_PART, 1.0);
-        if reach < DELAY_RESOLVED {
+        width *= f64::clamp(step.abs(), LEAST_PART, 1.0);
+        if width < DELAY_RESOLVED {
             break;
         }
     }
@@ -117,17 +125,18 @@ pub fn delay_of_open_records(
     let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let remaining = delayed / undelayed;
     let is_most = is_explained || remaining <= DELAY_REMAINING;
-    let told = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
-    (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(told)
+    let delay_finding = || Finding::Delay(Delay { samples, seconds: samples * dt, remaining });
+    (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(delay_finding)
 }
 
-/// Returns whether no force explains anything of the residual of a fit with the delay (s).
+/// Returns whether the residual of a fit with the delay (s) is uncorrelated with the forces.
 fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Option<bool> {
     let late: Vec<FrequencyData> =
         records.iter().map(|record| record.with_later_force(delay)).collect();
-    let (first, others) = late.split_first()?;
-    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
-    let fit = output_error(&all, unknowns).ok()?;
+    let (first, remaining) = late.split_first()?;
+    let joined =
+        remaining.iter().try_fold(first.clone(), |joined, record| joined.and(record)).ok()?;
+    let fit = output_error(&joined, unknowns).ok()?;
     let closed = fit.ends.as_ref()?.without_transients(&late).ok()?;
     let after = after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?;
     let findings = after.records.iter().flat_map(SpectralResidual::findings);
@@ -135,8 +144,8 @@ fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Optio
     Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
 }
 
-/// The delay, in samples, of the equations of motion under Hann's window, each line weighted by the dynamic
-/// stiffness of the machine without a delay.
+/// Returns the delay, in samples, that fits the equations of motion under Hann's window best, each
+/// line weighted by the dynamic stiffness of the estimate without a delay.
 fn delay_under_window(
     data: &FrequencyData,
     dt: f64,
@@ -146,8 +155,8 @@ fn delay_under_window(
     delay_weighted(&data.under_hann_window(), dt, unknowns, estimate)
 }
 
-/// The delay, in samples, of the equations of motion, each line weighted by the dynamic stiffness of the machine
-/// without a delay.
+/// Returns the delay, in samples, that fits the equations of motion best, each line weighted by the
+/// dynamic stiffness of the estimate without a delay.
 fn delay_weighted(
     data: &FrequencyData,
     dt: f64,
@@ -165,8 +174,9 @@ fn delay_weighted(
     delay_of_equations(&equations, dt, &driven)
 }
 
-/// Returns the delay, in s, with which the equations of motion of frequency responses fit best, each line weighted by the
-/// dynamic stiffness of an estimate; `None` where the data leave a parameter open.
+/// Returns the delay, in s, with which the equations of motion of frequency responses fit best,
+/// each line weighted by the dynamic stiffness of an estimate; `None` if the data do not determine
+/// a parameter.
 ///
 /// # Source
 /// As [`delay_of_lines`].
@@ -175,12 +185,12 @@ pub fn delay_of_responses(
     unknowns: &Unknowns,
     estimate: &Estimate,
 ) -> Option<f64> {
-    // Half a period of the highest line: the sampling interval that has just these lines.
+    // The sampling interval with the highest line as Nyquist frequency.
     let dt = PI / data.omega().iter().copied().fold(0.0, f64::max);
     Some(dt * delay_weighted(data, dt, unknowns, estimate)?)
 }
 
-/// Returns whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.
+/// Returns whether maximum likelihood, too, fits far better with the delay (s); true if it fails.
 fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
     let misfit = |data: &FrequencyData| Some(output_error(data, unknowns).ok()?.misfit_ratio);
     let both = || Some([misfit(data)?, misfit(&data.with_later_force(delay))?]);
@@ -191,8 +201,8 @@ fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
     delayed <= DELAY_REMAINING * undelayed
 }
 
-/// Finds a delay as [`delay_of_lines`] does, of a response fitted sample by sample to the equation of
-/// motion and a force (N); to whole samples, in the first 32,768 of a long record.
+/// Finds a delay like [`delay_of_lines`] for a fit of the equation of motion, sample by sample, to
+/// a response and a force (N); in whole samples, from the first 32,768 samples of a long record.
 ///
 /// # Source
 /// Ours.
@@ -208,8 +218,8 @@ pub fn delay_at_samples(
     })
 }
 
-/// Finds a delay as [`delay_at_samples`] does, of displacement (m), velocity (m/s) and force (N) fitted
-/// from sample to sample.
+/// Finds a delay like [`delay_at_samples`] for a fit of displacement (m), velocity (m/s) and force
+/// (N) from sample to sample.
 ///
 /// # Source
 /// Ours.
@@ -227,7 +237,7 @@ pub fn delay_between_samples(
     })
 }
 
-/// A window of a response record, shifted against that of the force.
+/// Window of a response record, shifted relative to the window of the force.
 type Shifted<'a> = dyn Fn(&Record) -> Result<Record, EstimateError> + 'a;
 
 fn delay_of_samples(
@@ -244,7 +254,7 @@ fn delay_of_samples(
         residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
     };
     let longest = longest(power(0, MAX_DELAY)?, &driven);
-    // A record too short for a long delay may show a shorter one.
+    // A record too short for a long delay is searched for a shorter one.
     let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
     let undelayed = power(0, longest)?;
     let delay = best_step(undelayed, longest, |samples| power(samples, longest));
@@ -258,24 +268,25 @@ fn delay_of_samples(
     )
 }
 
-/// Maximum delay in samples, from the residual power without any.
+/// Returns the maximum delay in samples, from the residual power without a delay.
 fn longest(undelayed: f64, driven: &[usize]) -> isize {
     let hardly_follows = undelayed > HARDLY_FOLLOWS * driven.len() as f64;
     if hardly_follows { MAX_LONG_DELAY } else { MAX_DELAY }
 }
 
-/// Degrees of freedom on which a force acts.
+/// Returns the degrees of freedom on which a force acts.
 fn driven(force: &DMatrix<f64>) -> Vec<usize> {
     (0..force.ncols()).filter(|dof| force.column(*dof).amax() > 0.0).collect()
 }
 
-/// Residual power of the equations with a force, each over the power of its right-hand side.
+/// Returns the residual power of the equations with a force, each relative to the power of its
+/// right-hand side.
 fn residual_power(estimate: &Estimate, driven: &[usize]) -> Option<f64> {
     let power = driven.iter().map(|dof| estimate.residual_nrmse()[*dof].powi(2)).sum::<f64>();
     (estimate.undetermined().is_empty() && power.is_finite()).then_some(power)
 }
 
-/// The step of least power, the shorter of two that are equally good.
+/// Returns the step of least power; of two nearly equal ones the shorter.
 fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -> isize {
     let mut best = (0, undelayed);
     for step in (1..=max).flat_map(|size| [size, -size]) {
@@ -287,7 +298,7 @@ fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -
     best.0
 }
 
-/// The delay, if it explains the residual of `rows` equations.
+/// Returns the delay if it explains the residual of `rows` equations.
 fn finding(
     samples: f64,
     dt: f64,
@@ -308,7 +319,7 @@ fn finding(
     Some(Finding::Delay(Delay { samples, seconds: samples * dt, remaining: delayed / undelayed }))
 }
 
-/// Force and response are shifted in time.
+/// Delay between force and response.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Delay {
@@ -316,7 +327,7 @@ pub struct Delay {
     pub samples: f64,
     /// Delay of the response, in s.
     pub seconds: f64,
-    /// Fraction of the residual's power that is left when the delay is removed.
+    /// Fraction of the residual power that remains after removal of the delay.
     pub remaining: f64,
 }
 

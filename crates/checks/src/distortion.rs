@@ -13,9 +13,9 @@ use super::limits::DISTORTION_EXPLAINED;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Looks for the nonlinear term that explains most of what a linear model leaves of whole periods of force (N) and
-/// response of one or several experiments on the lines of a band ([`Finding::Distortion`]); `None` unless it explains
-/// half of that, and noise does not.
+/// Finds the nonlinear term that explains most of the residual of a linear model, in whole periods
+/// of force (N) and response of one or several experiments on the lines of a band
+/// ([`Finding::Distortion`]); `None` unless it explains half of the residual power significantly.
 ///
 /// # Errors
 /// The errors of [`distortion`].
@@ -28,10 +28,10 @@ pub fn distortion_of_periods(
     measured: ResponseQuantity,
     unknowns: &Unknowns,
 ) -> Result<Option<Finding>, EstimateError> {
-    let found = distortion(band, experiments, measured, unknowns)?;
-    let [even_db, odd_db] = [found.even, found.odd]
+    let detected = distortion(band, experiments, measured, unknowns)?;
+    let [even_db, odd_db] = [detected.even, detected.odd]
         .map(|level: Option<Level>| level.map(|level| level.db).filter(|db| db.is_finite()));
-    let kind = found.kind().filter(|kind| kind.explained >= DISTORTION_EXPLAINED);
+    let kind = detected.kind().filter(|kind| kind.explained >= DISTORTION_EXPLAINED);
     Ok(kind.map(|kind| {
         Finding::Distortion(Distortion {
             term: kind.to_string(),
@@ -43,20 +43,20 @@ pub fn distortion_of_periods(
     }))
 }
 
-/// Nonlinear term that explains most of what a linear model leaves of whole periods.
+/// Nonlinear term that explains most of the residual of a linear model in whole periods.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Distortion {
-    /// The term, in words.
+    /// Name of the term.
     pub term: String,
-    /// Part of the power that a linear model leaves, a ratio.
+    /// Share of the residual power of a linear model that the term explains.
     pub explained: f64,
-    /// Level of the response on even lines without force, where odd ones alone are driven, against that on the
-    /// driven ones, in dB; `None` where others are driven or there is no more than noise.
+    /// Level of the response on even lines relative to the driven lines, in dB, if only odd lines
+    /// are driven; `None` otherwise, or if there is only noise.
     pub even_db: Option<f64>,
-    /// The same of odd lines without force, in dB.
+    /// Level on odd lines without force, in dB, under the same condition.
     pub odd_db: Option<f64>,
-    /// Probability that noise alone makes one of the terms explain as much.
+    /// Probability that one of the terms explains as much by noise alone.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

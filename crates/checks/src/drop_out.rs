@@ -1,4 +1,4 @@
-//! Channels that stand still for some samples while the structure moves.
+//! Channels that are constant for some samples while the structure moves.
 
 use std::fmt::{self, Formatter};
 
@@ -8,11 +8,11 @@ use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::limits::{DROP_OUT_LEVEL, DROP_OUT_MOTION, DROP_OUT_NEIGHBOURS};
 use super::{Subject, Verdict};
 
-/// A channel keeps one value for some samples within its motion: the transmission dropped out.
+/// Channel that keeps one value for some samples within its motion: a drop-out of the transmission.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DropOut {
-    /// The channel.
+    /// Affected channel.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub channel: Channel,
     /// First sample of the run, counted from 0 in the window.
@@ -20,17 +20,17 @@ pub struct DropOut {
     pub sample: usize,
     /// Number of samples in the run.
     pub samples: usize,
-    /// Value that they have, in the unit of the channel.
+    /// Value of these samples, in the unit of the channel.
     pub level: f64,
 }
 
-/// Finds the channels of a response (any unit) whose longest run of equal samples is one that chance does not make
-/// ([`Finding::DropOut`]).
+/// Finds the channels of a response (any unit) whose longest run of equal samples is too long for
+/// chance ([`Finding::DropOut`]).
 ///
-/// The p-value is the probability that a run as long as the second longest one continues so far, by the share of equal
-/// neighbours that are followed by another one in the rest of the record: a coarse converter and a slow motion have many
-/// runs. A structure that comes to rest goes through a few steps of the converter: the channel has to move by many on both
-/// sides of the run.
+/// The p-value is the probability that the second longest run would continue to the length of the
+/// longest, with the continuation rate of runs in the rest of the record: a coarse converter and a
+/// slow motion have many runs. A structure that comes to rest moves by only a few steps of the
+/// converter; therefore the channel must move by many steps on both sides of the run.
 ///
 /// # Source
 /// Ours: runs of a Markov chain are distributed geometrically.
@@ -45,7 +45,7 @@ pub fn dropped_channels(quantity: Quantity, response: &Record) -> Vec<Finding> {
     (0..response.channels()).filter_map(one).collect()
 }
 
-/// First sample and length of the longest run of equal samples.
+/// Returns first sample and length of the longest run of equal samples.
 fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
     let mut start = 0;
     let runs = x.chunk_by(|a, b| a == b).map(|run| {
@@ -56,7 +56,8 @@ fn longest_run(x: &[f64]) -> Option<(usize, usize)> {
     runs.max_by_key(|(first, len)| (*len, std::cmp::Reverse(*first)))
 }
 
-/// Probability that such a run is one of those of the channel; `None` unless the channel moves on both sides.
+/// Returns the probability that the channel has such a run by chance; `None` unless the channel
+/// moves on both sides.
 fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     let (before, after) = (&x[..sample], &x[sample + samples..]);
     let changes = x.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
@@ -73,13 +74,13 @@ fn p_value(x: &[f64], sample: usize, samples: usize) -> Option<f64> {
     Some(continuation([before, after]).powf((samples - second) as f64))
 }
 
-/// Standard deviation of samples.
+/// Returns the standard deviation of samples.
 fn deviation(x: &[f64]) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-/// Probability that a sample equals the one before, where that did so, too.
+/// Returns the probability that a run of two equal samples continues.
 fn continuation(parts: [&[f64]; 2]) -> f64 {
     let (mut pairs, mut equal, mut twice) = (0_usize, 0_usize, 0_usize);
     for x in parts {
@@ -87,7 +88,7 @@ fn continuation(parts: [&[f64]; 2]) -> f64 {
         equal += x.windows(2).filter(|x| x[0] == x[1]).count();
         twice += x.windows(3).filter(|x| x[0] == x[1] && x[1] == x[2]).count();
     }
-    // One pair more than was seen, with the frequency of equal neighbours at all.
+    // One additional pair, with the overall rate of equal neighbours, avoids a rate of zero.
     let rate = (equal as f64 + 1.0) / (pairs as f64 + 1.0);
     (twice as f64 + rate) / (equal as f64 + 1.0)
 }

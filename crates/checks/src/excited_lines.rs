@@ -1,4 +1,4 @@
-//! Number of lines that carry force, against the unknowns.
+//! Number of lines with force, compared with the number of unknowns.
 
 use std::cmp::Ordering;
 use std::fmt::{self, Formatter};
@@ -11,24 +11,24 @@ use super::finding::{Check, Finding, Names};
 use super::limits::EXCITED_LINE;
 use super::{Subject, Verdict};
 
-/// Number of lines that carry force, against the unknowns of an equation of motion.
+/// Number of lines with force, compared with the unknowns of an equation of motion.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ExcitedLines {
-    /// Number of lines with force; each makes two real equations.
+    /// Number of lines with force; each gives two real equations.
     pub lines: usize,
-    /// Number of unknowns in the equation of motion that has most.
+    /// Largest number of unknowns in an equation of motion.
     pub unknowns: usize,
 }
 
-/// Number of unknowns in the equation of motion that has most.
+/// Largest number of unknowns in an equation of motion.
 pub(super) fn unknowns_of_an_equation(unknowns: &Unknowns) -> usize {
     let free = unknowns.free();
-    let of = |equation| free.iter().filter(|p| p.row() == equation).count();
-    (0..unknowns.dof()).map(of).max().unwrap_or(0)
+    let count_of = |equation| free.iter().filter(|p| p.row() == equation).count();
+    (0..unknowns.dof()).map(count_of).max().unwrap_or(0)
 }
 
-/// Number of lines that carry force, against the unknowns.
+/// Number of lines with force, compared with the number of unknowns.
 pub(super) fn excitation(data: &FrequencyData, unknowns: &Unknowns) -> Finding {
     let force = data.force();
     let floor: Vec<f64> =

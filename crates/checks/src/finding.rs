@@ -1,8 +1,8 @@
 //! Results of the checks as values: one struct per check, in the file of that check.
 //!
-//! Ratios, fractions, coherences, correlations, probabilities and numbers of samples are dimensionless;
-//! an eigenvalue of a transition is, too. What has the unit of a channel or of a parameter (N, m, m/s,
-//! m/s², kg, N·s/m, N/m) says so.
+//! Ratios, fractions, coherences, correlations, probabilities and numbers of samples are
+//! dimensionless; so are eigenvalues of a transition. Fields with the unit of a channel or of a
+//! parameter (N, m, m/s, m/s², kg, N·s/m, N/m) state it.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -11,12 +11,12 @@ use mechid_model::ResponseQuantity;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// What every check says of its finding.
+/// Common interface of the findings of all checks.
 pub(crate) trait Check {
     /// Returns the subject of the check.
     fn subject(&self) -> Subject;
 
-    /// Returns the degree to which the finding speaks against the data or the fit.
+    /// Returns the verdict on the data or the fit.
     fn verdict(&self) -> Verdict;
 
     /// Returns the number that decides the verdict, in the unit of its field.
@@ -31,12 +31,15 @@ pub(crate) trait Check {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result;
 }
 
-/// Declares the findings: a variant for each check, of the struct of the same name in the file of the check.
+/// Declares the findings: a variant for each check, of the struct of the same name in the file of
+/// the check.
 macro_rules! findings {
     ($($(#[$doc:meta])* $name:ident in $file:ident,)*) => {
-        /// Result of one check, with its numbers; [`Display`](std::fmt::Display) gives one sentence.
+        /// Result of one check, with its numbers; [`Display`](std::fmt::Display) gives one
+        /// sentence.
         ///
-        /// Channels, forces and degrees of freedom are counted from 0; in sentences and serialised from 1.
+        /// Channels, forces and degrees of freedom are counted from 0; in sentences and serialised
+        /// from 1.
         #[derive(Debug, Clone, PartialEq)]
         #[cfg_attr(
             feature = "serde",
@@ -65,9 +68,9 @@ macro_rules! findings {
 }
 
 findings! {
-    /// Order of persistent excitation of a force, against the order that the unknowns need.
+    /// Order of persistent excitation of a force, compared with the order that the unknowns need.
     PersistentExcitation in persistent_excitation,
-    /// Number of lines that carry force, against the unknowns of an equation of motion.
+    /// Number of lines with force, compared with the unknowns of an equation of motion.
     ExcitedLines in excited_lines,
     /// Condition number of the regressors.
     Conditioning in conditioning,
@@ -89,7 +92,7 @@ findings! {
     Leakage in leakage,
     /// Text in the header of a column that may be a unit.
     Unit in unit,
-    /// Time column without a unit whose numbers are hardly seconds.
+    /// Time column without a unit, whose numbers are hardly seconds.
     TimeUnit in unit,
     /// A channel was cut off by an amplifier or a converter.
     Clipping in clipping,
@@ -99,45 +102,46 @@ findings! {
     ConstantPhase in constant_phase,
     /// A channel has a few equally spaced values only.
     Quantisation in quantisation,
-    /// One sample of a channel stands far outside its neighbours.
+    /// One sample of a channel is far outside its neighbours.
     Spike in spike,
     /// A channel keeps one value for some samples within its motion.
     DropOut in drop_out,
     /// Two measured response quantities of one degree of freedom are not derivatives of each other.
     Kinematics in kinematics,
-    /// The forces take power out of the machine.
+    /// The forces extract power from the system.
     PowerFlow in power,
     /// Force and response are shifted in time.
     Delay in delay,
-    /// Another model that explains what the fit leaves.
+    /// Alternative model that explains the residual of the fit.
     Alternative in alternative,
-    /// Difference of an estimate from another that noise on the response does not bias.
+    /// Difference of an estimate from an estimate without bias by noise on the response.
     Bias in bias,
     /// A free response of the identified system grows.
     Instability in instability,
-    /// Difference of two masses that the kinetic energy makes equal.
+    /// Difference of two mirrored entries of M, which are equal in the kinetic energy.
     MassSymmetry in symmetry,
-    /// Inertia of the fluid in a bearing whose reported coefficients have none.
+    /// Inertia of the fluid in a bearing whose reported coefficients do not include it.
     FluidInertia in fluid_inertia,
-    /// Mass that is negative.
+    /// Negative mass.
     NegativeMass in mass,
-    /// Damping and stiffness that are symmetric but for one factor between two degrees of freedom, as gains make them.
+    /// Damping and stiffness that are symmetric except for one factor between two degrees of
+    /// freedom, the effect of a wrong gain.
     Gain in gain,
-    /// Residual power against the power of the noise.
+    /// Residual power compared with the noise power.
     Misfit in misfit,
-    /// Parts of the data against one another.
+    /// Agreement between parts of the data.
     PartsAgreement in parts,
-    /// Prior of a parameter against what the data say of it.
+    /// Agreement of the prior of a parameter with its estimate from the data.
     PriorAgreement in prior,
     /// Number of searches that ended at the highest likelihood.
     SearchAgreement in search,
-    /// Motion that a fit leaves and takes for the response to forces that were not measured.
+    /// Residual of a fit that is attributed to unmeasured forces.
     UnmeasuredForce in unmeasured_force,
     /// The response does not follow the force.
     Unrelated in unrelated,
-    /// Correlation of a residual with the square or the cube of a displacement as a force.
+    /// Correlation of a residual with a power of displacement or velocity, applied as a force.
     Linearity in linearity,
-    /// Nonlinear term that explains most of what a linear model leaves of whole periods.
+    /// Nonlinear term that explains most of the residual of a linear model in whole periods.
     Distortion in distortion,
     /// Autocorrelation of a residual.
     Whiteness in whiteness,
@@ -151,7 +155,7 @@ impl Finding {
         self.check().subject()
     }
 
-    /// Returns the degree to which the finding speaks against the data or the fit.
+    /// Returns the verdict on the data or the fit.
     pub fn verdict(&self) -> Verdict {
         self.check().verdict()
     }
@@ -161,7 +165,8 @@ impl Finding {
         self.check().value()
     }
 
-    /// Returns the p-value of a statistical test; `None` for other checks, and where only rounding is left.
+    /// Returns the p-value of a statistical test; `None` for other checks, and if the residual is
+    /// only rounding.
     pub fn p_value(&self) -> Option<PValue> {
         self.clone().p_value_mut().copied()
     }
@@ -171,14 +176,15 @@ impl Finding {
         self.check_mut().p_value_mut()
     }
 
-    /// Removes the lines that hold a misfit (`concentration`), where something else explains them.
+    /// Removes the lines with most of a misfit (`concentration`), for a misfit with another
+    /// explanation.
     pub fn forget_lines(&mut self) {
         if let Self::Misfit(misfit) = self {
             misfit.concentration = None;
         }
     }
 
-    /// Returns the finding as a sentence in which `name` gives the names of the channels.
+    /// Returns the finding as a sentence with channel names from `name`.
     pub fn sentence<'a>(&'a self, name: &'a dyn Fn(Channel) -> String) -> impl Display + 'a {
         Sentence { finding: self, names: Names { name } }
     }
@@ -190,7 +196,7 @@ impl Display for Finding {
     }
 }
 
-/// Finding whose channels have names.
+/// Finding with names of its channels.
 struct Sentence<'a> {
     finding: &'a Finding,
     names: Names<'a>,
@@ -224,14 +230,14 @@ impl Names<'_> {
     }
 }
 
-/// A measured channel.
+/// Measured channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Channel {
     /// Quantity measured.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub quantity: Quantity,
-    /// Number among the channels of that quantity.
+    /// Index among the channels of that quantity.
     #[cfg_attr(
         feature = "serde",
         serde(rename = "channel", serialize_with = "crate::serialised::from_one")

@@ -1,4 +1,4 @@
-//! Inertia of the fluid in a bearing of which stiffness and damping alone are reported.
+//! Inertia of the fluid in a bearing whose reported coefficients are stiffness and damping only.
 
 use std::fmt::{self, Formatter};
 
@@ -7,19 +7,19 @@ use super::finding::{Check, Finding, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Inertia of the fluid that eight coefficients of a bearing leave out.
+/// Inertia of the fluid, which eight coefficients of a bearing do not describe.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FluidInertia {
     /// Twice the logarithm of the likelihood ratio of twelve coefficients and eight (pure number).
     pub statistic: f64,
-    /// Probability that noise alone makes it as large of a fluid without inertia.
+    /// Probability of a statistic as large for a fluid without inertia.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }
 
-/// Tells whether a test of twelve coefficients of a bearing against eight ([`Finding::FluidInertia`]) speaks against
-/// eight; `p_value` is the probability that noise alone makes its `statistic` (a pure number) as large.
+/// Reports a test of twelve coefficients of a bearing against eight ([`Finding::FluidInertia`]);
+/// `p_value` is the probability of a `statistic` as large by noise alone.
 ///
 /// # Source
 /// Wilks (1938), Annals of Mathematical Statistics 9, 60–62.

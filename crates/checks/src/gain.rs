@@ -1,4 +1,4 @@
-//! Gain between two degrees of freedom that damping and stiffness show.
+//! Wrong gain between two degrees of freedom, detected in damping and stiffness.
 
 use std::fmt::{self, Formatter};
 
@@ -11,67 +11,69 @@ use super::finding::{Check, Finding, Names};
 use super::limits::{GAIN_AGREES, GAIN_NEAR, GAIN_SHOWS};
 use super::{Subject, Verdict};
 
-/// Damping and stiffness that are symmetric but for one factor between two degrees of freedom, as gains make them.
+/// Damping and stiffness that are symmetric except for one factor between two degrees of freedom,
+/// the effect of a wrong gain.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Gain {
-    /// Degree of freedom whose responses (or forces) are so much larger.
+    /// Degree of freedom whose responses (or forces) are too large by the factor.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub row: usize,
-    /// The other degree of freedom.
+    /// Other degree of freedom.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub column: usize,
-    /// The factor (pure number).
+    /// Factor (pure number).
     pub ratio: f64,
-    /// Standard error of its logarithm (pure number).
+    /// Standard error of the logarithm of the factor (pure number).
     pub standard_error: f64,
 }
 
-/// Tells of a pair of degrees of freedom between which damping and stiffness are symmetric but for one factor, the same
-/// in both; `None` where there is none. Of several it is the one that is known best.
+/// Finds a pair of degrees of freedom between which damping and stiffness are symmetric except for
+/// the same factor; `None` if there is none. If there are several pairs, the most significant one
+/// is returned.
 ///
-/// A response or a force that is read g times too large multiplies a column or a row of C and K alike, and makes
-/// c_ij/c_ji = k_ij/k_ji = g of symmetric matrices, while a diagonal M stays symmetric. Bearings and gyroscopic forces,
-/// which make C and K not symmetric, have another ratio in each. The factor has to show in both by itself.
+/// A response or a force that is measured g times too large multiplies a column or a row of both C
+/// and K: symmetric matrices then have c_ij/c_ji = k_ij/k_ji = g, while a diagonal M stays
+/// symmetric. Bearings and gyroscopic forces also make C and K non-symmetric, but with different
+/// ratios. The factor must be significant in each of the two matrices.
 ///
 /// # Source
 /// Ours: each ratio has its error by the delta method.
 pub fn gain_symmetry(estimate: &Estimate) -> Option<Finding> {
     let n = estimate.dof();
     let free = estimate.unknowns().free();
-    let place = |matrix: Matrix, row: usize, column: usize| {
+    let index = |matrix: Matrix, row: usize, column: usize| {
         let is_it = |p: &Parameter| (p.matrix(), p.row(), p.column()) == (matrix, row, column);
         free.iter().position(is_it)
     };
     let spread = estimate.spread();
     // Logarithm of the ratio of two entries, and its variance.
     let ratio = |matrix: Matrix, i: usize, j: usize| -> Option<[f64; 2]> {
-        let all = match matrix {
+        let entries = match matrix {
             Matrix::Mass => estimate.mass(),
             Matrix::Damping => estimate.damping(),
             Matrix::Stiffness => estimate.stiffness(),
         };
-        let (above, below) = (all[(i, j)], all[(j, i)]);
-        let (p, q) = (place(matrix, i, j)?, place(matrix, j, i)?);
-        let variance = spread.variance_of(p) / above.powi(2)
-            + spread.variance_of(q) / below.powi(2)
+        let (above, below) = (entries[(i, j)], entries[(j, i)]);
+        let (p, q) = (index(matrix, i, j)?, index(matrix, j, i)?);
+        let variance = spread.variance_of(p) / above.powi(2) + spread.variance_of(q) / below.powi(2)
             - 2.0 * spread.between(p, q) / (above * below);
         let log = (above / below).ln();
         (log.is_finite() && variance > 0.0 && log * log > GAIN_SHOWS.powi(2) * variance)
             .then_some([log, variance])
     };
     let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
-    let found = pairs.filter_map(|(i, j)| {
-        let [of_c, variance_c] = ratio(Matrix::Damping, i, j)?;
-        let [of_k, variance_k] = ratio(Matrix::Stiffness, i, j)?;
-        let apart = (of_c - of_k).powi(2);
+    let gains = pairs.filter_map(|(i, j)| {
+        let [log_c, variance_c] = ratio(Matrix::Damping, i, j)?;
+        let [log_k, variance_k] = ratio(Matrix::Stiffness, i, j)?;
+        let difference = (log_c - log_k).powi(2);
         let noise = GAIN_AGREES.powi(2) * (variance_c + variance_k);
         let weight = [variance_c.recip(), variance_k.recip()];
-        let log = (weight[0] * of_c + weight[1] * of_k) / (weight[0] + weight[1]);
+        let log = (weight[0] * log_c + weight[1] * log_k) / (weight[0] + weight[1]);
         let standard_error = (weight[0] + weight[1]).sqrt().recip();
-        (apart < noise.max((GAIN_NEAR * of_k).powi(2))).then_some((i, j, log, standard_error))
+        (difference < noise.max((GAIN_NEAR * log_k).powi(2))).then_some((i, j, log, standard_error))
     });
-    let (i, j, log, standard_error) = found.max_by(|a, b| {
+    let (i, j, log, standard_error) = gains.max_by(|a, b| {
         let shows = |(.., log, error): &(usize, usize, f64, f64)| (log / error).abs();
         shows(a).total_cmp(&shows(b))
     })?;

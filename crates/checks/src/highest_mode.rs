@@ -1,4 +1,4 @@
-//! Highest mode against the step from sample to sample, or the band.
+//! Highest mode compared with the sampling interval or the band.
 
 use std::f64::consts::TAU;
 use std::fmt::{self, Formatter};
@@ -28,12 +28,13 @@ pub struct HighestMode {
     pub frequency_hz: f64,
     /// Samples per period of that mode (pure number).
     pub samples_per_period: f64,
-    /// Motion that the step or the band must suit.
+    /// Requirement on the step or the band.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub limit: ModeLimit,
 }
 
-/// Motion in the highest mode that the sampling step or the band fitted must suit.
+/// Requirement of a method on the sampling interval or on the band, with respect to the highest
+/// mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -57,8 +58,8 @@ pub enum ModeLimit {
     },
 }
 
-/// Natural frequency (Hz) of the highest mode that oscillates, and samples per period of it; where none does, the
-/// geometric mean of all: a fast decay needs no samples of its own.
+/// Returns the natural frequency (Hz) of the highest oscillating mode and its samples per period;
+/// the geometric mean of all if no mode oscillates: fast decays need not be resolved.
 pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 2], EstimateError> {
     let modes = system.modes()?;
     let oscillating = modes.iter().filter(|mode| mode.oscillates());
@@ -72,7 +73,7 @@ pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 
     Ok([highest / TAU, TAU / (highest * dt)])
 }
 
-/// Highest mode that the data suggest (force held between samples), against the step.
+/// Compares the highest mode of the data (force held between samples) with the step.
 pub(super) fn step(
     rows: &Transitions,
     discretisation: Discretisation,
@@ -98,8 +99,8 @@ pub(super) fn step(
     Ok(Finding::HighestMode(HighestMode { frequency_hz, samples_per_period, limit }))
 }
 
-/// Checks the highest mode of an estimate against the step from sample to sample
-/// ([`Finding::HighestMode`]), in s.
+/// Compares the highest mode of an estimate with the sampling interval `dt`, in s
+/// ([`Finding::HighestMode`]).
 ///
 /// # Errors
 /// [`EstimateError::Undetermined`] or [`EstimateError::Model`] if there are no modes.
@@ -115,11 +116,11 @@ pub fn fitted_step(estimate: &Estimate, dt: f64) -> Result<Finding, EstimateErro
     }))
 }
 
-/// Checks the highest mode of an estimate against the lines that were fitted and the Nyquist frequency
-/// ([`Finding::HighestMode`]); `None` where the data do not determine a machine.
+/// Compares the highest mode of an estimate with the fitted lines and the Nyquist frequency
+/// ([`Finding::HighestMode`]); `None` if the data do not determine a system.
 ///
 /// # Errors
-/// [`EstimateError::Model`] if the modes cannot be found.
+/// [`EstimateError::Model`] if the modes cannot be computed.
 ///
 /// # Source
 /// Ours.

@@ -4,12 +4,13 @@ use super::bias::{Bias, Reference};
 use super::finding::Finding;
 use super::p_value::PValue;
 
-/// Adjusts the p-values of all tests made on one fit for their number; the comparison of the parameters with
-/// those of maximum likelihood, and the test for growth, apart from the tests of data and residual.
+/// Adjusts the p-values of all tests of one fit for their number. The comparison of the parameters
+/// with maximum likelihood, and the test for growth, form groups separate from the tests of data
+/// and residual.
 ///
-/// If nothing but noise speaks against the fit, the probability that any finding of a group becomes a
-/// warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE), three times that for all together,
-/// however the tests depend on one another.
+/// If the model is right and only noise disturbs the fit, the probability that any finding of a
+/// group becomes a warning is at most [`SIGNIFICANCE`](super::limits::SIGNIFICANCE), three times
+/// that for all together, for any dependence between the tests.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
@@ -17,12 +18,12 @@ pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) 
     let of_parameters = |finding: &&mut Finding| {
         matches!(finding, Finding::Bias(Bias { reference: Reference::MaximumLikelihood, .. }))
     };
-    let (bias, others): (Vec<&mut Finding>, Vec<&mut Finding>) =
+    let (bias, remaining): (Vec<&mut Finding>, Vec<&mut Finding>) =
         findings.into_iter().partition(of_parameters);
-    // It is made of an estimate that grows only, and for all its modes at once.
-    let others =
-        others.into_iter().filter(|f| !matches!(f, Finding::Instability(_))).collect::<Vec<_>>();
-    for group in [bias, others] {
+    // The test for growth is made only if the estimate grows, and already for all modes together.
+    let remaining =
+        remaining.into_iter().filter(|f| !matches!(f, Finding::Instability(_))).collect::<Vec<_>>();
+    for group in [bias, remaining] {
         adjust_together(group.into_iter().filter_map(Finding::p_value_mut).collect());
     }
 }

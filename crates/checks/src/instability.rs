@@ -11,12 +11,12 @@ use super::finding::{Check, Finding, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Tells whether a mode of the estimate grows; `None` if all decay, but for rounding and the modes of a
-/// rigid body.
+/// Tests whether a mode of the estimate grows; `None` if all modes decay, apart from rounding and
+/// rigid-body modes.
 ///
-/// The p-value is the probability that an estimate grows as many standard errors in any of its modes
-/// though the true modes persist without growing: one-sided, Student's t times the number of modes. Of a pair of real
-/// eigenvalues of which one grows their product decides, which is the stiffness over the mass.
+/// The p-value is the probability that the estimate of a neutrally stable system grows by as many
+/// standard errors in any mode: one-sided, Student's t times the number of modes. For a pair of
+/// real eigenvalues, one of them positive, their product is tested, the ratio of stiffness to mass.
 pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
     let grows = |mode: &&IdentifiedMode| {
@@ -25,7 +25,8 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     let p_value = |mode: &IdentifiedMode| {
         let mut rate = mode.growth_rate;
         if mode.partner.is_some() && mode.squared_frequency.value < 0.0 {
-            // The product of the two is smooth where they meet in zero.
+            // The product is a smooth function of the parameters, even where both eigenvalues are
+            // zero.
             rate = mode.squared_frequency;
             rate.value = -rate.value;
         }
@@ -51,11 +52,11 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
     }))
 }
 
-/// A free response of the identified system grows.
+/// Mode of the identified system whose free response grows.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Instability {
-    /// The mode, by rising natural frequency.
+    /// Index of the mode, by rising natural frequency.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub mode: usize,
     /// Damped frequency of the mode, in Hz; 0 for a growth without oscillation.
@@ -64,7 +65,7 @@ pub struct Instability {
     pub growth_rate: f64,
     /// Standard error of the growth rate, in 1/s.
     pub standard_error: f64,
-    /// Probability that noise alone makes the estimate of a system that does not grow do so as much.
+    /// Probability of a growth as large by noise alone.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

@@ -13,16 +13,18 @@ use super::limits::KINEMATIC_GAIN;
 use super::limits::STANDARD_ERRORS;
 use super::{Subject, Verdict};
 
-/// Finds the channels of which one response quantity does not change as another predicts
-/// ([`Finding::Kinematics`]): units (mm/s for m/s), interchanged columns or a sign. Checks each pair of
-/// displacement (m), velocity (m/s) and acceleration (m/s²) that is measured, in that order.
+/// Finds the channels with one response quantity that does not change as another predicts
+/// ([`Finding::Kinematics`]): units (mm/s for m/s), interchanged columns or a sign. Checks each
+/// pair of displacement (m), velocity (m/s) and acceleration (m/s²) that is measured, in that
+/// order.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
+/// the records do not match.
 ///
 /// # Source
-/// Ours: regression of x(k+1) − x(k) on the trapezoidal rule for ẋ, and of x(k+1) − 2x(k) + x(k−1) on
-/// ẍ(k)Δt².
+/// Ours: regression of x(k+1) − x(k) on the trapezoidal rule for ẋ, and of x(k+1) − 2x(k) + x(k−1)
+/// on ẍ(k)Δt².
 pub fn kinematics(
     responses: &[(ResponseQuantity, &Record)],
 ) -> Result<Vec<Finding>, EstimateError> {
@@ -61,23 +63,20 @@ pub fn kinematics(
     Ok(findings)
 }
 
-/// Change of a quantity over the change that another predicts.
+/// Ratio of the change of a quantity to the change that another predicts.
 struct Gain {
     value: f64,
     standard_error: f64,
 }
 
-/// Gain of a channel; `None` of channels that are constant, or too short.
+/// Returns the gain of a channel; `None` if it is constant or too short.
 fn gain(low: &[f64], high: &[f64], dt: f64, twice: bool) -> Option<Gain> {
-    let pairs: Vec<[f64; 2]> = match twice {
-        false => {
-            let steps = low.windows(2).zip(high.windows(2));
-            steps.map(|(x, v)| [x[1] - x[0], 0.5 * dt * (v[0] + v[1])]).collect()
-        }
-        true => {
-            let steps = low.windows(3).zip(high.iter().skip(1));
-            steps.map(|(x, a)| [x[2] - 2.0 * x[1] + x[0], dt * dt * a]).collect()
-        }
+    let pairs: Vec<[f64; 2]> = if twice {
+        let steps = low.windows(3).zip(high.iter().skip(1));
+        steps.map(|(x, a)| [x[2] - 2.0 * x[1] + x[0], dt * dt * a]).collect()
+    } else {
+        let steps = low.windows(2).zip(high.windows(2));
+        steps.map(|(x, v)| [x[1] - x[0], 0.5 * dt * (v[0] + v[1])]).collect()
     };
     let count = pairs.len() as f64;
     let mean = |at: usize| pairs.iter().map(|pair| pair[at]).sum::<f64>() / count;
@@ -104,18 +103,20 @@ impl Gain {
     }
 }
 
-/// Two measured response quantities of one degree of freedom are not derivatives of each other.
+/// Two measured response quantities of one degree of freedom that are not derivatives of each
+/// other.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Kinematics {
     /// Degree of freedom.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub dof: usize,
-    /// The lower derivative.
+    /// Quantity of the lower derivative.
     pub quantity: ResponseQuantity,
-    /// The higher derivative.
+    /// Quantity of the higher derivative.
     pub derivative: ResponseQuantity,
-    /// Change of `quantity` over the change that `derivative` predicts; 1 if they agree (pure number).
+    /// Ratio of the change of `quantity` to the change that `derivative` predicts; 1 if they agree
+    /// (pure number).
     pub gain: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Resonances against the lines of the segments that were averaged.
+//! Width of resonances compared with the line spacing of averaged segments.
 
 use std::f64::consts::TAU;
 use std::fmt::{self, Formatter};
@@ -11,12 +11,14 @@ use super::finding::{Check, Finding, Names};
 use super::limits::RESONANCE_LINES;
 use super::{Subject, Verdict};
 
-/// Checks that the narrowest resonance in the band of frequency responses, averaged over segments under a window, is
-/// lines enough wide for what the window blunts to be told from it ([`Finding::Leakage`]); `settled` says whether
-/// that came to an end in the fit. `None` where no window blunts, and without a mode that oscillates in the band.
+/// Checks that the narrowest resonance in the band of frequency responses, averaged over windowed
+/// segments, has enough lines to separate its damping from the smoothing by the window
+/// ([`Finding::Leakage`]); `settled` states whether the correction of the window converged in the
+/// fit. `None` without a window, or without an oscillating mode in the band.
 ///
 /// # Source
-/// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (half-power bandwidth and resolution bandwidth).
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (half-power bandwidth and
+/// resolution bandwidth).
 pub fn leakage(frf: &Frf, modes: &[IdentifiedMode], settled: bool) -> Option<Finding> {
     let [spacing, samples] = frf.resolution()?;
     let spacing_hz = spacing / TAU;
@@ -29,8 +31,8 @@ pub fn leakage(frf: &Frf, modes: &[IdentifiedMode], settled: bool) -> Option<Fin
     let width = |mode: &IdentifiedMode| {
         2.0 * mode.damping_ratio.value.abs() * mode.natural_frequency_hz.value / spacing_hz
     };
-    let all = modes.iter().enumerate().filter(|(_, mode)| in_band(mode) && oscillates(mode));
-    let narrowest = all.min_by(|(_, a), (_, b)| width(a).total_cmp(&width(b)));
+    let candidates = modes.iter().enumerate().filter(|(_, mode)| in_band(mode) && oscillates(mode));
+    let narrowest = candidates.min_by(|(_, a), (_, b)| width(a).total_cmp(&width(b)));
     narrowest.map(|(at, mode)| {
         let lines = width(mode);
         let needed = samples * RESONANCE_LINES / lines.max(1e-6);
@@ -48,16 +50,16 @@ pub fn leakage(frf: &Frf, modes: &[IdentifiedMode], settled: bool) -> Option<Fin
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Leakage {
-    /// The mode, by rising natural frequency.
+    /// Index of the mode, by rising natural frequency.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub mode: usize,
     /// Natural frequency, in Hz.
     pub frequency_hz: f64,
-    /// Half-power bandwidth 2ζf over the distance of the lines (pure number).
+    /// Half-power bandwidth 2ζf divided by the line spacing (pure number).
     pub lines: f64,
-    /// Number of samples of a segment that would have as many lines in it as are needed.
+    /// Number of samples of a segment with sufficiently many lines in the bandwidth.
     pub samples_needed: usize,
-    /// True if what the window blunts could be told from the resonance.
+    /// True if the smoothing by the window could be separated from the resonance.
     pub settled: bool,
 }
 

@@ -1,14 +1,14 @@
 //! Checks of the data before a fit and of the residual after it.
 //!
-//! Every check returns [`Finding`]s: values with named numbers, a [`Verdict`], a [`Subject`] and, from
-//! a statistical test, a p-value. Their [`Display`](std::fmt::Display) is one sentence. The limits
-//! that decide a verdict are in [`limits`].
+//! Every check returns [`Finding`]s: values with named numbers, a [`Verdict`], a [`Subject`] and,
+//! from a statistical test, a p-value. Their [`Display`](std::fmt::Display) is one sentence. The
+//! limits of the verdicts are in [`limits`].
 //!
 //! ```
 //! use mechid_checks::{Verdict, periodicity};
 //! use mechid_signal::{Record, Sampling};
 //!
-//! // A parabola is no whole period of anything.
+//! // A parabola is not a whole period.
 //! let sampling = Sampling::new(0.01, 100)?;
 //! let parabola = sampling.times().map(|t| t * t).collect();
 //! let finding = periodicity(&Record::from_channel(sampling, parabola)?);
@@ -145,16 +145,16 @@ const MAX_SAMPLES: usize = 1 << 15;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Verdict {
-    /// The finding does not speak against them.
+    /// No objection.
     Good,
-    /// The fit can be done; the numbers tell how far to trust it.
+    /// The fit is possible; the numbers show its reliability.
     Doubtful,
     /// The fit will fail or mislead.
     Bad,
 }
 
 impl Verdict {
-    /// Returns the verdict on a value that is good below `doubtful`, and bad from `bad` on.
+    /// Returns the verdict on a value: good below `doubtful`, bad at `bad` or above.
     fn graded(value: f64, doubtful: f64, bad: f64) -> Self {
         match value {
             v if v < doubtful => Self::Good,
@@ -185,7 +185,7 @@ pub enum Subject {
     Unit,
     /// Conditioning of the regressors.
     Conditioning,
-    /// Channels that are clipped, constant, coarsely quantised, or hold a spike.
+    /// Channels that are clipped, constant, coarsely quantised, or have a spike.
     Range,
     /// Consistency of displacement, velocity and acceleration.
     Kinematics,
@@ -193,11 +193,11 @@ pub enum Subject {
     Power,
     /// Whole periods of a steady state.
     Periodicity,
-    /// Sampling step against the highest mode and the discretisation.
+    /// Sampling interval, compared with the highest mode and the discretisation.
     Step,
     /// Coherence of force and response.
     Coherence,
-    /// Width of the resonances against the lines of the segments.
+    /// Width of the resonances, compared with the line spacing of the segments.
     Leakage,
     /// Delay between force and response.
     Delay,
@@ -211,15 +211,15 @@ pub enum Subject {
     Mass,
     /// Symmetry of the mass matrix.
     Symmetry,
-    /// Residual power against the noise.
+    /// Residual power, compared with the noise.
     Misfit,
-    /// Parts of the data against one another.
+    /// Agreement between parts of the data.
     Parts,
-    /// Priors against the data.
+    /// Agreement of priors and data.
     Prior,
-    /// Searches from several first values.
+    /// Searches from several initial values.
     Search,
-    /// Residual against powers of the displacement.
+    /// Correlation of the residual with powers of displacement and velocity.
     Linearity,
     /// Whiteness of the residual.
     Whiteness,

@@ -1,93 +1,93 @@
-//! Limits at which a finding becomes a warning. Those without a named source are ours.
+//! Limits at which a finding becomes a warning. Limits without a named source are ours.
 
-/// Probability below which a statistic is not attributed to noise: the error rate of a single test, and of
-/// all tests on a fit together once [`adjust_p_values`](super::adjust_p_values) has seen them.
+/// Significance level: the error rate of a single test, and of all tests of a fit together after
+/// [`adjust_p_values`](super::adjust_p_values).
 pub const SIGNIFICANCE: f64 = 0.01;
 
-/// Part of the residual power beyond the noise that few lines must hold to be named.
+/// Minimum share of the residual power beyond the noise in few lines, for these to be reported.
 pub const CONCENTRATED: f64 = 0.8;
 
-/// Residual power of all other lines over that of the noise, up to which the model is right but for those.
+/// Maximum ratio of residual power to noise power on all other lines, for the model to count as
+/// right there.
 pub const DISTURBED_ALONE: f64 = 10.0;
 
-/// Part of what a linear model leaves that a nonlinear term has to explain to be named.
+/// Minimum share of the residual power of a linear model that a reported nonlinear term explains.
 pub const DISTORTION_EXPLAINED: f64 = 0.5;
 
-/// Maximum number of lines that a misfit names.
+/// Maximum number of lines that a misfit reports.
 pub const MOST_DISTURBED: usize = 8;
 
-/// Amplitude relative to that of the strongest line of a force, below which a line does not count as
-/// excited.
+/// Minimum amplitude of an excited line, relative to the strongest line of the force.
 pub const EXCITED_LINE: f64 = 1e-4;
 
-/// Condition number beyond which relative noise of 1 % hides some combination of parameters.
+/// Condition number above which relative noise of 1 % may hide a combination of parameters.
 pub const CONDITION_NUMBER: f64 = 1e4;
 
-/// Curvature from the last sample of a period to its first, over the RMS curvature inside, beyond
-/// which the record is hardly one period of a steady state.
+/// Ratio of the curvature from the last sample of a period to its first to the RMS curvature
+/// inside, above which the record is hardly one period of a steady state.
 pub const SEAM_DOUBTFUL: f64 = 5.0;
 
-/// The same, beyond which the record is no period.
+/// Ratio of these curvatures above which the record is not a period.
 pub const SEAM_BAD: f64 = 20.0;
 
-/// RMS deviation of a period from the mean of all, over the RMS of the response, beyond which the
-/// response is hardly steady.
+/// RMS deviation of a period from the mean of all, relative to the RMS of the response, above which
+/// the response is hardly steady.
 pub const PERIOD_SCATTER_DOUBTFUL: f64 = 0.1;
 
-/// The same, beyond which the response does not repeat.
+/// Relative RMS deviation above which the response does not repeat.
 pub const PERIOD_SCATTER_BAD: f64 = 0.5;
 
-/// Fraction of the power of a response that the forces do not explain (1 − coherence, median over the
-/// lines), beyond which frequency responses are uncertain.
+/// Fraction of the power of a response that the forces do not explain (1 − coherence, median over
+/// the lines), above which frequency responses are uncertain.
 pub const INCOHERENCE_DOUBTFUL: f64 = 0.1;
 
-/// The same, beyond which they are mostly noise.
+/// Unexplained fraction above which frequency responses are mostly noise.
 pub const INCOHERENCE_BAD: f64 = 0.5;
 
-/// Lines of a segment in the half-power bandwidth of a resonance, below which its intervals do not hold, whatever
-/// is known of the window.
+/// Minimum number of lines of a segment in the half-power bandwidth of a resonance; below it the
+/// intervals are unreliable, even with a known window.
 pub const RESONANCE_LINES: f64 = 1.0;
 
-/// Samples per period of the highest mode, below which a transition from sample to sample depends on
-/// what the force does between them: 2π/1.
+/// Minimum number of samples per period of the highest mode, for a transition from sample to sample
+/// that hardly depends on the force between them: 2π/1.
 pub const SAMPLES_PER_PERIOD_DOUBTFUL: f64 = std::f64::consts::TAU;
 
-/// The same, below which the mode is near the Nyquist frequency: 2π/2.5.
+/// Minimum number of samples per period of a mode well below the Nyquist frequency: 2π/2.5.
 pub const SAMPLES_PER_PERIOD_BAD: f64 = std::f64::consts::TAU / 2.5;
 
-/// Samples per period of the highest mode, below which the equation of motion at the samples is
-/// doubtful.
+/// Minimum number of samples per period of the highest mode, for the equation of motion at the
+/// samples.
 pub const SAMPLES_PER_PERIOD_AT_SAMPLES: f64 = 2.5;
 
 /// Samples per period at the Nyquist frequency.
 pub const SAMPLES_PER_PERIOD_NYQUIST: f64 = 2.0;
 
-/// Relative error of the state matrix by Euler's rule, beyond which the estimate is doubtful.
+/// Relative error of the state matrix by Euler's rule, above which the estimate is doubtful.
 pub const EULER_BIAS_DOUBTFUL: f64 = 0.01;
 
-/// The same, beyond which it is bad.
+/// Relative error of the state matrix by Euler's rule, above which the estimate is bad.
 pub const EULER_BIAS_BAD: f64 = 0.1;
 
-/// Fraction of the residual's power that a delayed model may leave, for the delay to be reported.
+/// Maximum fraction of the residual power with a delayed model, for the delay to be reported.
 pub const DELAY_REMAINING: f64 = 0.25;
 
-/// Factor between the derivative measured and the one that follows from another channel, beyond which
-/// units, columns or signs are wrong. Sensors do not err that much, nor does the rule between two
-/// samples, which reaches it at four tenths of the sampling rate.
+/// Factor between a measured derivative and the one computed from another channel, above which
+/// units, columns or signs are wrong. Sensor errors are smaller, and so is the error of the rule
+/// between two samples below four tenths of the sampling rate.
 pub const KINEMATIC_GAIN: f64 = 3.0;
 
-/// Power that forces take out of a machine, over the apparent power, beyond which it is neither noise
-/// nor leakage.
+/// Power that forces extract from a machine, relative to the apparent power, above which it is
+/// neither noise nor leakage.
 pub const POWER_TAKEN_OUT: f64 = 0.05;
 
-/// Number of distinct values of a quantised response, beyond which it is not counted as coarse.
+/// Maximum number of distinct values of a coarsely quantised response.
 pub const QUANTISATION_LEVELS: usize = 16;
 
-/// Second difference of a sample over the largest of the others, beyond which it is a spike: no motion
-/// of a band below the Nyquist frequency bends so at one sample alone.
+/// Ratio of the second difference of a sample to the largest of the others, above which it is a
+/// spike: a motion below the Nyquist frequency cannot have such a curvature at a single sample.
 pub const SPIKE: f64 = 20.0;
 
-/// Residual, relative to the signal fitted (RMS), below which it is rounding.
+/// Maximum residual, relative to the fitted signal (RMS), that counts as rounding.
 pub const ROUNDING: f64 = 1e-9;
 
 /// Number of lags, to either side for a force, at which a residual is correlated.
@@ -96,177 +96,194 @@ pub const LAGS: usize = 25;
 /// Minimum number of samples per lag.
 pub const SAMPLES_PER_LAG: usize = 4;
 
-/// Difference of two masses that are equal in a symmetric M, over the geometric mean of those on the diagonal, below
-/// which it is rounding.
+/// Maximum difference of two mirrored entries of M, relative to the geometric mean of the diagonal
+/// entries, that counts as rounding.
 pub const ASYMMETRY: f64 = 1e-6;
 
-/// Part of the motion from which it is doubtful that forces which were not measured account for it: few tests are as
-/// disturbed, and nonlinear machines leave more.
+/// Share of the response attributed to unmeasured forces, at or above which this explanation is
+/// doubtful: few tests are as disturbed, and nonlinear systems have a larger share.
 pub const UNMEASURED_FORCE: f64 = 0.1;
 
-/// Minimum number of standard errors by which the ratio of two mirrored entries differs from 1, in damping and in
-/// stiffness, for a gain to be named; below it noise may make the ratio.
+/// Minimum deviation from 1 of the ratio of two mirrored entries, in standard errors, in damping
+/// and in stiffness, for a gain to be reported; below it the ratio may be due to noise.
 pub const GAIN_SHOWS: f64 = 5.0;
 
-/// Maximum number of standard errors between the ratios in damping and in stiffness that count as the same gain.
+/// Maximum number of standard errors between the ratios in damping and in stiffness that count as
+/// the same gain.
 pub const GAIN_AGREES: f64 = 2.5;
 
-/// Maximum difference of the logarithms of both ratios, relative to that in stiffness, that counts as the same gain
-/// too, whatever the standard errors.
+/// Maximum difference of the logarithms of both ratios, relative to that in stiffness, that also
+/// counts as the same gain, for any standard errors.
 pub const GAIN_NEAR: f64 = 0.05;
 
-/// Fraction of samples that a coarsely quantised channel leaves at the level of the one before.
+/// Minimum fraction of samples of a coarsely quantised channel that equal the sample before.
 pub const REPEATED_SAMPLES: f64 = 0.2;
 
 /// Minimum number of samples per level of a quantised channel.
 pub const SAMPLES_PER_LEVEL: usize = 16;
 
-/// Difference of the neighbours of a spike, over the spike.
+/// Maximum difference between the neighbours of a spike, relative to the spike.
 pub const RETURN: f64 = 0.1;
 
-/// Deviation of a level from a multiple of the step, over the step, that is rounding.
+/// Maximum deviation of a level from a multiple of the step, relative to the step, that counts as
+/// rounding.
 pub const LEVEL_ROUNDING: f64 = 1e-6;
 
-/// Amplitude of a line over that of the strongest of its force, above which the response to it shows.
+/// Minimum amplitude of a strong line, relative to the strongest line of its force: the response to
+/// it exceeds the noise.
 pub const STRONG_LINE: f64 = 0.01;
 
-/// Lines beside each one named, of which at most one is.
+/// Minimum number of lines per reported line: at most an eighth of all lines are reported.
 pub(crate) const LINES_PER_DISTURBED: usize = 8;
 
-/// Relative difference of frequencies that are the same line of several records.
+/// Maximum relative difference of frequencies that count as the same line of several records.
 pub(crate) const SAME_LINE: f64 = 1e-9;
 
-/// Residual power of the equations, over that of their right-hand sides, beyond which it hardly does.
+/// Residual power of the equations, relative to their right-hand sides, above which the response
+/// hardly follows the force.
 pub(crate) const HARDLY_FOLLOWS: f64 = 0.25;
 
-/// Reductions of the interval around the best step, each to two thirds.
+/// Number of reductions of the interval around the best step, each to two thirds.
 pub(crate) const DELAY_REDUCTIONS: usize = 24;
 
-/// Samples from that delay of the equations of motion within which the one of maximum likelihood begins in the data
-/// without a delay.
+/// Maximum delay of the equations of motion, in samples, at which the search by maximum likelihood
+/// starts from the fit without a delay.
 pub(crate) const DELAY_NEAR: f64 = 0.5;
 
-/// Samples to either side of a delay through whose sums of squares a first parabola is laid.
+/// Half width of the first parabola through the sums of squares around a delay, in samples.
 pub(crate) const DELAY_REACH: f64 = 0.25;
 
-/// Parabolas at most, part of the reach of one that the next has at least, and reach, in samples, below which there
-/// is none.
+/// Maximum number of parabolic steps.
 pub(crate) const DELAY_PARABOLAS: usize = 8;
+
+/// Minimum ratio of successive parabola widths.
 pub(crate) const LEAST_PART: f64 = 0.1;
+
+/// Parabola width, in samples, that ends the search.
 pub(crate) const DELAY_RESOLVED: f64 = 0.005;
 
-/// Part of the residual power that a first parabola leaves at most where nothing else speaks for a delay.
+/// Maximum share of the residual power after the first parabolic step, if no correlation with a
+/// force indicates a delay.
 pub(crate) const DELAY_PROMISING: f64 = 0.5;
 
-/// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
+/// Maximum ratio of the residual power of a longer delay to that of a shorter one, for the longer
+/// to be preferred.
 pub(crate) const DELAY_PREFERRED: f64 = 0.99;
 
-/// Distance of a gain from 1, or of a fault of the acquisition from none, in its standard errors, that noise does not
-/// reach.
+/// Minimum deviation of a gain from 1, or of a fault of the acquisition from 0, in standard errors,
+/// that counts as significant.
 pub(crate) const STANDARD_ERRORS: f64 = 4.0;
 
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the errors of the estimate are left in
-/// the residual.
+/// Maximum number of sensitivities, residuals times parameters; in larger fits the residual is not
+/// corrected for the errors of the estimate.
 pub(crate) const LINEARITY_SENSITIVITIES: usize = 1 << 22;
 
-/// Lines to either side over which the spectrum of a residual is averaged.
+/// Number of lines on either side in the averages of a residual spectrum.
 pub(crate) const LINEARITY_NEIGHBOURS: usize = 10;
 
-/// Mismatch, over the RMS of the force, beyond which it does not repeat.
+/// Mismatch relative to the RMS of the force, above which it does not repeat.
 pub(crate) const PERIOD_WORST: f64 = 0.1;
 
-/// Factor between squared mismatches of lags after which the force repeats equally well.
+/// Maximum ratio between squared mismatches of lags at which the force repeats equally well.
 pub(crate) const PERIOD_ALIKE: f64 = 2.0;
 
-/// Squared mismatch that the rounding of Fourier transforms leaves.
+/// Squared mismatch due to rounding of Fourier transforms.
 pub(crate) const PERIOD_ROUNDING: f64 = 1e-12;
 
-/// Maximum number of samples by which a neighbouring period is longer or shorter.
+/// Maximum difference in length between a claimed and a neighbouring period, in samples.
 pub(crate) const PERIOD_NEIGHBOURS: usize = 2;
 
-/// Mismatch, over the RMS of the force, beyond which it does not repeat even with noise on it.
+/// Mismatch relative to the RMS of the force, above which it does not repeat, even with noise on
+/// it.
 pub(crate) const PERIOD_REPEATS: f64 = 0.5;
 
-/// Reduction of the squared mismatch, in its own scatter, from which a neighbouring period is better.
+/// Minimum reduction of the squared mismatch, relative to its scatter, for a neighbouring period to
+/// be better.
 pub(crate) const PERIOD_CLEARLY: f64 = 4.0;
 
 /// Minimum factor between the squared mismatch across an interruption and elsewhere.
 pub(crate) const PERIOD_INTERRUPTED: f64 = 10.0;
 
-/// Number of lines, those with the most power, of which [`STRONGEST_FRACTION`] must take power out.
+/// Number of strongest lines in the test of the power flow: the share [`STRONGEST_FRACTION`] of
+/// them must extract power.
 pub(crate) const STRONGEST_LINES: usize = 32;
 
-/// Fraction of the strongest lines that must take power out: not even seven lines do by chance.
+/// Minimum fraction of the strongest lines that extract power: chance does not reach it, even for
+/// seven lines.
 pub(crate) const STRONGEST_FRACTION: f64 = 0.9;
 
-/// Amplitude relative to that of the strongest line of a force, below which a line carries no force.
+/// Minimum amplitude of a line with force, relative to the strongest line.
 pub(crate) const FORCE_FLOOR: f64 = 1e-3;
 
 /// Minimum number of samples per unknown.
 pub(crate) const SAMPLES_PER_UNKNOWN: usize = 4;
 
-/// 1 − coherence (median over the lines), below which it is rounding.
+/// Maximum of 1 − coherence (median over the lines) that counts as rounding.
 pub(crate) const RESPONSE_ROUNDING: f64 = 1e-10;
 
-/// Distance of the lines, in lines, that Hann's window correlates, the custom of analysers.
+/// Largest distance of lines that Hann's window correlates, the usual window of analysers.
 pub(crate) const WINDOW_REACH: usize = 2;
 
 /// Maximum number of distances between lines at which residuals are correlated.
 pub(crate) const MAX_DISTANCES: usize = 12;
 
-/// Number of lines over the largest of those distances: beyond, few pairs are left, and their products
-/// are not normally distributed.
+/// Minimum ratio of the number of lines to the largest of those distances: fewer pairs of lines
+/// have products that are not normally distributed.
 pub(crate) const LINES_PER_DISTANCE: usize = 8;
 
 /// Minimum number of pairs of lines at a distance.
 pub(crate) const RESPONSE_PAIRS: usize = 8;
 
-/// Minimum number of lines per such distance, and per lag of the correlation with a force: more would
-/// leave no direction in which noise and an error of the model differ.
+/// Minimum number of lines per such distance, and per lag of the correlation with a force: with
+/// more of them, noise and model error could not be distinguished.
 pub(crate) const LINES_PER_CORRELATION: usize = 8;
 
-/// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
+/// Minimum number of residuals, real and imaginary parts, in excess of the parameters.
 pub(crate) const FREE_RESIDUALS: f64 = 8.0;
 
-/// Least part of the power that is stated of the response to an unmeasured force that the mean of periods has.
+/// Minimum residual power relative to the stated power of the response to an unmeasured force: a
+/// mean of periods may contain that little.
 pub(crate) const SPECTRAL_LEAKED: f64 = 0.5;
 
-/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
-/// combination of parameters has no effect.
+/// Minimum singular value of the sensitivity (columns of unit length), relative to the largest; a
+/// combination of parameters below it has no effect.
 pub(crate) const FIT_RANK: f64 = 1e-12;
 
-/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
+/// Ratio of the response variance by force noise to the response's own noise variance, above which
+/// the force noise dominates.
 pub(crate) const FIT_DECIDES: f64 = 10.0;
 
-/// Loads of the ends of a record that a channel is fitted with.
+/// Number of transient terms of each channel of a record.
 pub(crate) const FIT_LOADS: f64 = 6.0;
 
 /// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
 pub(crate) const FIT_STEPS: usize = 8;
 
-/// Residual power that another such step removes, over the variance of a residual, below which there is
-/// none.
+/// Decrease of the residual power by a further step, relative to the variance of a residual, below
+/// which the steps end.
 pub(crate) const FIT_SETTLED: f64 = 0.01;
 
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
-/// the estimate leaves it.
+/// Maximum number of sensitivities, residuals times parameters; in larger fits the residual of the
+/// estimate is tested without such steps.
 pub(crate) const MAX_SENSITIVITIES: usize = 1 << 24;
 
-/// Likewise, maximum number of products, sensitivities times parameters: some seconds.
+/// Maximum number of products, sensitivities times parameters, for such steps: some seconds.
 pub(crate) const FIT_PRODUCTS: usize = 1 << 32;
 
-/// Number of samples on either side of a run of equal ones by which a drop-out is judged.
+/// Number of samples on either side of a run of equal ones that decide about a drop-out.
 pub const DROP_OUT_NEIGHBOURS: usize = 64;
 
-/// Standard deviation of these samples, in steps of the converter, from which a channel moves: a structure that comes to
-/// rest goes through a few steps.
+/// Minimum standard deviation of these samples, in steps of the converter, for a channel to move: a
+/// structure that comes to rest moves through a few steps.
 pub const DROP_OUT_MOTION: f64 = 10.0;
 
-/// Probability at which a run of equal samples is a drop-out: those that are have far smaller ones.
+/// Maximum probability of a run of equal samples that counts as a drop-out; real drop-outs have far
+/// smaller ones.
 pub const DROP_OUT_LEVEL: f64 = 1e-4;
 
 /// Maximum number of rounds in which the corner frequency of a coupled channel is refined.
 pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 
-/// Difference of corner frequencies over the lowest line by which the effect of a high-pass is differentiated.
+/// Step of the corner frequency, relative to the lowest line, in the derivative of the effect of a
+/// high-pass.
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;

@@ -5,12 +5,13 @@ use nalgebra::Complex;
 
 use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
 
-/// Correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l + d), less
-/// their expectation, at the distances d = `first`, `first` + 1 … in lines; `explained` are orthonormal columns of
-/// what the parameters explain. `None` if there are too few lines or the residual is zero.
+/// Returns the correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l
+/// + d), minus their expectation, at the distances d = `first`, `first` + 1 … in lines; `explained`
+/// are orthonormal columns that span the effect of the parameters. `None` if there are too few
+/// lines or the residual is zero.
 ///
-/// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
-/// gives the variances of the products and the covariances of their squares.
+/// For given |r|, the phases of independent lines are random for any noise spectrum: this gives the
+/// variances of the products and the covariances of their squares.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
@@ -33,7 +34,7 @@ pub(crate) fn correlation_of_lines(
         return None;
     }
     let explained_power: f64 = explained.iter().flatten().map(|q| q.norm_sqr()).sum();
-    // Variance of a real or imaginary part that the parameters do not reduce.
+    // Variance of a real or imaginary part before the fit of the parameters.
     let unit = power / (2.0 * residual.len() as f64 - explained_power);
     let variance = |distance: usize| -> f64 {
         powers.iter().zip(&powers[distance..]).map(|(a, b)| a * b).sum()
@@ -60,8 +61,8 @@ pub(crate) fn correlation_of_lines(
     })
 }
 
-/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases
-/// and the given squares |r|².
+/// Returns the covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have
+/// random phases and the given squares |r|².
 fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
     let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
         .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])

@@ -17,29 +17,32 @@ use super::limits::{LINEARITY_NEIGHBOURS, LINEARITY_SENSITIVITIES};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Powers of a motion that are tested.
+/// Tested powers of a motion.
 const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Power::VelocitySign];
 
-/// Tests whether the response (samples × degrees of freedom) that a machine does not explain under a
-/// random force (N) is correlated with the square or the cube of its displacement, or with the cube or the
-/// sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
+/// Tests whether the residual response (samples × degrees of freedom) of an identified system under
+/// a random force (N) is correlated with the square or the cube of its displacement, or with the
+/// cube or the sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the
+/// power that correlates most).
 ///
-/// Frequency responses do not show that: under a random force a hardening spring looks like a stiffer
-/// one with more noise, and dry friction like damping. So the motion is predicted over the whole record, and those
-/// powers of it, less their linear parts, are applied as forces at each degree of freedom in turn. The responses to
-/// them must be uncorrelated with the residual, as they are with the noise of a linear
-/// machine; a Gaussian force keeps errors of the linear model out, too. The residual is weighted by Hann's window: at
-/// its ends it has the motion that the force before the record left.
+/// Frequency responses do not show this: under a random force a hardening spring looks like a
+/// stiffer one with more noise, and dry friction like damping. Therefore the motion is predicted
+/// over the whole record, and its powers, minus their linear parts, are applied as forces at each
+/// degree of freedom in turn. For a linear system the responses to them are uncorrelated with the
+/// residual; under a Gaussian force they are also uncorrelated with errors of the linear model. The
+/// residual is weighted by Hann's window, which suppresses the transients at the ends of the
+/// record.
 ///
 /// # Errors
-/// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is no machine,
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses and [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if fewer than three
-/// lines lie in the band.
+/// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is not a system,
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses
+/// and [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if fewer than
+/// three lines lie in the band.
 ///
 /// # Source
-/// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers less their linear
-/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and Signal Processing
-/// 14, 637–656, for the nonlinearity as a force.
+/// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers minus their linear
+/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and
+/// Signal Processing 14, 637–656, for the nonlinearity as a force.
 pub fn linearity(
     estimate: &Estimate,
     force: &Record,
@@ -62,11 +65,12 @@ pub fn linearity(
     tested.under_hann_window().finding(estimate, force, &lines.as_slice()[1..count - 1], &HANN)
 }
 
-/// The same of an open record whose ends were fitted: of its `data` on some lines, with the loads of the ends taken
-/// off, and the force (N) as it was measured.
+/// Tests the linearity like [`linearity`] in an open record: from its `data` on some lines after
+/// subtraction of the transients, and the measured force (N).
 ///
 /// # Errors
-/// The errors of [`linearity`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the data are not those of the lines.
+/// The errors of [`linearity`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
+/// the data do not match the lines.
 ///
 /// # Source
 /// The source of [`linearity`].
@@ -80,18 +84,18 @@ pub fn linearity_of_open_record(
     Tested::new(estimate, data)?.finding(estimate, force, lines.as_slice(), &[1.0])
 }
 
-/// Correlation of lines under Hann's window, by how many they are apart.
+/// Correlation of lines under Hann's window at distances 0, 1 and 2.
 ///
 /// # Source
 /// Harris (1978), Proceedings of the IEEE 66, 51–83.
 const HANN: [f64; 3] = [1.0, -2.0 / 3.0, 1.0 / 6.0];
 
-/// A residual and the receptances by which forces are seen in it.
+/// Residual, and receptances from forces to the residual.
 struct Tested {
-    /// Residual of the quantity measured, channels × lines.
+    /// Residual of the measured quantity, channels × lines.
     residual: DMatrix<Complex<f64>>,
     receptances: Vec<DMatrix<Complex<f64>>>,
-    /// Changes of the response with each parameter, channels × lines.
+    /// Derivatives of the response with respect to each parameter, channels × lines.
     sensitivities: Vec<DMatrix<Complex<f64>>>,
 }
 
@@ -104,7 +108,8 @@ impl Tested {
         for (row, omega) in data.omega().iter().enumerate() {
             let unit = data.measured().per_displacement(*omega);
             let receptance = system.receptance(*omega)? * unit;
-            let [f, x] = [data.force(), data.displacement()].map(|all| all.row(row).transpose());
+            let [f, x] =
+                [data.force(), data.displacement()].map(|record| record.row(row).transpose());
             residual.set_column(row, &(x * unit - &receptance * f));
             receptances.push(receptance);
         }
@@ -112,13 +117,13 @@ impl Tested {
         Ok(Self { residual, receptances, sensitivities })
     }
 
-    /// The same of the record under Hann's window, less the first and the last line.
+    /// Returns these under Hann's window, without the first and the last line.
     fn under_hann_window(&self) -> Self {
         let last = self.residual.ncols() - 1;
-        let windowed = |all: &DMatrix<Complex<f64>>| {
-            DMatrix::from_fn(all.nrows(), last - 1, |channel, at| {
-                let sides = all[(channel, at)] + all[(channel, at + 2)];
-                all[(channel, at + 1)] * 0.5 - sides * 0.25
+        let windowed = |lines: &DMatrix<Complex<f64>>| {
+            DMatrix::from_fn(lines.nrows(), last - 1, |channel, at| {
+                let sides = lines[(channel, at)] + lines[(channel, at + 2)];
+                lines[(channel, at + 1)] * 0.5 - sides * 0.25
             })
         };
         Self {
@@ -128,24 +133,27 @@ impl Tested {
         }
     }
 
-    /// Orthonormal combinations of what the parameters change, each value over the root of its size.
+    /// Returns orthonormal columns that span the sensitivities, weighted by the sizes of the
+    /// residuals.
     fn explained(&self, sizes: &[Vec<f64>]) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = self
             .sensitivities
             .iter()
-            .map(|all| {
-                let column = weighted(all, sizes);
+            .map(|sensitivity| {
+                let column = weighted(sensitivity, sizes);
                 let length = column.norm();
                 if length > 0.0 { column / length } else { column }
             })
             .collect();
-        match columns.is_empty() {
-            true => DMatrix::zeros(2 * self.residual.len(), 0),
-            false => DMatrix::from_columns(&columns).qr().q(),
+        if columns.is_empty() {
+            DMatrix::zeros(2 * self.residual.len(), 0)
+        } else {
+            DMatrix::from_columns(&columns).qr().q()
         }
     }
 
-    /// The power of the motion under a force that correlates most, on lines of that force which are correlated so.
+    /// Returns the power of the motion that correlates most, on lines of the force with this
+    /// correlation.
     fn finding(
         &self,
         estimate: &Estimate,
@@ -160,7 +168,8 @@ impl Tested {
             .row_iter()
             .map(|e| around(&e.iter().map(|e| e.norm_sqr()).collect::<Vec<_>>()))
             .collect();
-        // Errors of the estimate are in the residual, and follow the force as what is looked for does.
+        // Errors of the estimate also cause a residual that follows the force: this part is
+        // projected out.
         let explained = self.explained(&sizes);
         let mut least = (1.0, POWERS[0], 0);
         for dof in 0..n {
@@ -170,23 +179,24 @@ impl Tested {
                     |at: usize| self.receptances[at].column(dof) * forces.line(lines[at], 0);
                 let responses: Vec<_> = (0..lines.len()).map(response).collect();
                 let responses = DMatrix::from_columns(&responses);
-                let mut rest = weighted(&responses, &sizes);
-                rest -= &explained * explained.tr_mul(&rest);
-                let responses = unweighted(&rest, &sizes);
+                let mut remainder = weighted(&responses, &sizes);
+                remainder -= &explained * explained.tr_mul(&remainder);
+                let responses = unweighted(&remainder, &sizes);
                 let p_value = p_value(&self.residual, &sizes, &responses, correlation);
                 if p_value < least.0 {
                     least = (p_value, power, dof);
                 }
             }
         }
-        // Bonferroni: the least of so many.
+        // Bonferroni: the smallest of all tests.
         let (p_value, power, dof) = least;
         let p_value = PValue::of(((n * POWERS.len()) as f64 * p_value).min(1.0));
         Ok(Finding::Linearity(Linearity { power, dof, p_value }))
     }
 }
 
-/// Changes of the response, in the quantity measured, with each free parameter, channels × lines; `None` of large fits.
+/// Returns the derivatives of the response, in the measured quantity, with respect to each free
+/// parameter, channels × lines; `None` for large fits.
 fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatrix<Complex<f64>>>> {
     let (n, unknowns) = (data.dof(), estimate.unknowns());
     if 2 * n * data.len() * unknowns.independent() > LINEARITY_SENSITIVITIES {
@@ -207,29 +217,32 @@ fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatri
     let column = |column: DVectorView<'_, f64>| {
         DMatrix::from_fn(n, data.len(), |channel, row| {
             let at = 2 * (n * row + channel);
-            // By its size alone a displacement was turned into the quantity measured.
+            // The weights convert only the magnitude of a displacement into the measured quantity;
+            // this adds the phase.
             Complex::new(column[at], column[at + 1]) * (units[row] / units[row].norm())
         })
     };
     Some(white.sensitivity.column_iter().map(|one| column(one.as_view())).collect())
 }
 
-/// Real and imaginary parts of values, channels × lines, each over the root of its size.
+/// Returns real and imaginary parts of values, channels × lines, each divided by the root of its
+/// size.
 fn weighted(values: &DMatrix<Complex<f64>>, sizes: &[Vec<f64>]) -> DVector<f64> {
-    let mut all = DVector::zeros(2 * values.len());
-    for ((channel, at), pair) in places(values.shape()).zip(all.as_mut_slice().chunks_exact_mut(2))
+    let mut parts = DVector::zeros(2 * values.len());
+    for ((channel, at), pair) in
+        places(values.shape()).zip(parts.as_mut_slice().chunks_exact_mut(2))
     {
         let size = sizes[channel][at];
         let value = values[(channel, at)] * if size > 0.0 { size.sqrt().recip() } else { 0.0 };
         (pair[0], pair[1]) = (value.re, value.im);
     }
-    all
+    parts
 }
 
-/// The values, channels × lines, of what [`weighted`] returns.
-fn unweighted(all: &DVector<f64>, sizes: &[Vec<f64>]) -> DMatrix<Complex<f64>> {
+/// Returns the values, channels × lines, from the result of [`weighted`].
+fn unweighted(parts: &DVector<f64>, sizes: &[Vec<f64>]) -> DMatrix<Complex<f64>> {
     let mut values = DMatrix::zeros(sizes.len(), sizes[0].len());
-    for ((channel, at), pair) in places(values.shape()).zip(all.as_slice().chunks_exact(2)) {
+    for ((channel, at), pair) in places(values.shape()).zip(parts.as_slice().chunks_exact(2)) {
         values[(channel, at)] = Complex::new(pair[0], pair[1]) * sizes[channel][at].sqrt();
     }
     values
@@ -239,13 +252,13 @@ fn places((channels, lines): (usize, usize)) -> impl Iterator<Item = (usize, usi
     (0..lines).flat_map(move |at| (0..channels).map(move |channel| (channel, at)))
 }
 
-/// A power of the motion of a degree of freedom less its mean and its linear part.
+/// Returns a power of the motion of a degree of freedom without its mean and its linear part.
 fn without_linear_part(
     predicted: &Response,
     dof: usize,
     power: Power,
 ) -> Result<Record, EstimateError> {
-    let (motion, of): (&Record, fn(f64) -> f64) = match power {
+    let (motion, power_of): (&Record, fn(f64) -> f64) = match power {
         Power::Square => (predicted.displacement(), |x| x * x),
         Power::Cube => (predicted.displacement(), |x| x.powi(3)),
         Power::VelocityCube => (predicted.velocity(), |x| x.powi(3)),
@@ -254,17 +267,18 @@ fn without_linear_part(
     let x = motion.without_mean().channel(dof).to_vec();
     let size = (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     let x: Vec<f64> = x.iter().map(|x| if size > 0.0 { x / size } else { 0.0 }).collect();
-    let linear = x.iter().map(|x| of(*x) * x).sum::<f64>() / x.len() as f64;
-    let values = x.iter().map(|x| of(*x) - linear * x).collect();
+    let linear = x.iter().map(|x| power_of(*x) * x).sum::<f64>() / x.len() as f64;
+    let values = x.iter().map(|x| power_of(*x) - linear * x).collect();
     Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
-/// Probability that noise with the spectra of the residual (channels × lines, the sizes of its lines around each) is
-/// correlated as much with the responses, lines of it being correlated among themselves.
+/// Returns the probability that noise with the spectra of the residual (channels × lines, `sizes`
+/// averaged over neighbouring lines) is correlated as much with the responses; `correlation` is
+/// that between neighbouring lines.
 ///
-/// For given absolute values the phases of the lines of noise are random. The sum over the channels of a line has one
-/// phase: noise on a force, or an unmeasured one, is in all channels alike, which a variance of each channel by itself
-/// takes for as many independent witnesses.
+/// For given magnitudes the phases of the noise are random from line to line. The sum over the
+/// channels of a line has one phase, because noise on a force, or an unmeasured force, affects all
+/// channels: channels do not count as independent observations.
 ///
 /// # Source
 /// White (1980), Econometrica 48, 817–838, for the variance.
@@ -284,7 +298,8 @@ fn p_value(
         sum += product(at, at).re;
         for (apart, c) in correlation.iter().enumerate().take(residual.ncols() - at) {
             let (other, times) = (at + apart, if apart == 0 { 0.5 } else { 1.0 });
-            // By the residuals of both lines, which a narrow resonance makes larger than what is around.
+            // The residuals of both lines themselves give the variance: at a narrow resonance they
+            // exceed the average of the neighbours.
             let common = product(at, at).conj() * product(at, other)
                 + product(other, at).conj() * product(other, other);
             variance += times * c * 0.5 * common.re;
@@ -298,7 +313,7 @@ fn p_value(
     }
 }
 
-/// Mean of the values around each.
+/// Returns the mean of the neighbours of each value.
 fn around(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let window = |at: usize| {
@@ -308,21 +323,21 @@ fn around(values: &[f64]) -> Vec<f64> {
     (0..count).map(|at| mean(&values[window(at)])).collect()
 }
 
-/// Correlation of a residual with the square or the cube of a displacement as a force.
+/// Correlation of a residual with a power of displacement or velocity, applied as a force.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Linearity {
-    /// The power that correlates most.
+    /// Power with the strongest correlation.
     pub power: Power,
     /// Degree of freedom of the motion.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub dof: usize,
-    /// Probability that the noise of a linear machine correlates as much.
+    /// Probability of a correlation as strong for a linear system.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }
 
-/// Power of a motion that a force is looked for in.
+/// Power of a motion that may act as a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Power {

@@ -1,4 +1,4 @@
-//! Checks of a machine of named elements after its fit.
+//! Checks of a system of named elements after its fit.
 
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ use super::prior::PriorAgreement;
 use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
-/// Tests the power of the residual against the noise if `source` says where that is known from
-/// ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// Tests the power of the residual against the noise if `source` states the origin of the noise
+/// power ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether
 /// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source
@@ -50,7 +50,7 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
 /// line to line ([`Finding::Whiteness`]); empty if there are too few lines.
 ///
 /// # Source
-/// That of [`after_machine_fit`].
+/// As [`after_machine_fit`].
 pub fn whiteness_of_lines(
     estimate: &MachineEstimate,
     data: &LineData,

@@ -11,24 +11,25 @@ use super::finding::{Check, Finding, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Tells of a mass on the diagonal of M that is negative ([`Finding::NegativeMass`]), the one that noise explains
-/// least; `None` if there is none. The p-value is the probability that one of so many masses of zero is estimated as
-/// far below it: one-sided, Student's t times the number of masses.
+/// Finds the most significant negative mass on the diagonal of M ([`Finding::NegativeMass`]);
+/// `None` if there is none. The p-value is the probability that noise alone makes any mass of zero
+/// as negative: one-sided, Student's t times the number of masses.
 ///
-/// No machine has one, whatever it makes of damping and stiffness: a force or a response of the wrong sign turns the sign
-/// of all matrices, and leaves the modes as they are.
+/// A machine may have negative damping or stiffness, but no negative mass: a force or a response of
+/// the wrong sign changes the sign of all matrices and leaves the modes unchanged.
 ///
 /// # Source
-/// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is ours.
+/// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is
+/// ours.
 pub fn negative_mass(estimate: &Estimate) -> Option<Finding> {
     let (freedom, spread) = (estimate.degrees_of_freedom(), estimate.spread());
     let student = StudentsT::new(0.0, 1.0, freedom.max(1) as f64).ok()?;
     let free = estimate.unknowns().free();
-    let own = free
+    let diagonal = free
         .iter()
         .enumerate()
         .filter(|(_, p)| p.matrix() == Matrix::Mass && p.row() == p.column());
-    let masses: Vec<(usize, f64, f64)> = own
+    let masses: Vec<(usize, f64, f64)> = diagonal
         .map(|(at, p)| {
             (p.row(), estimate.mass()[(p.row(), p.row())], spread.variance_of(at).max(0.0).sqrt())
         })
@@ -46,7 +47,7 @@ pub fn negative_mass(estimate: &Estimate) -> Option<Finding> {
     Some(Finding::NegativeMass(NegativeMass { row, mass, standard_error, p_value }))
 }
 
-/// Mass that is negative.
+/// Negative mass.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct NegativeMass {
@@ -55,9 +56,9 @@ pub struct NegativeMass {
     pub row: usize,
     /// Entry of the diagonal of M, in kg.
     pub mass: f64,
-    /// Standard error of it, in kg.
+    /// Standard error of the mass, in kg.
     pub standard_error: f64,
-    /// Probability that noise alone makes any such mass of zero as negative.
+    /// Probability that noise alone makes any mass of zero as negative.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
 }

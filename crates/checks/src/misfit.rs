@@ -1,4 +1,4 @@
-//! Residual power against the power of the noise.
+//! Residual power compared with the noise power.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -7,32 +7,32 @@ use super::finding::{Check, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Residual power against the power of the noise.
+/// Residual power compared with the noise power.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Misfit {
-    /// Residual power over its expectation for noise alone (pure number).
+    /// Ratio of the residual power to its expectation for noise alone (pure number).
     pub ratio: f64,
-    /// Probability that noise alone deviates as much, to either side against periods, above
-    /// against coherence, below against the noise of the force.
+    /// Probability that noise alone deviates as much: to either side for periods, upwards for
+    /// coherence, downwards for the noise of the force.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
     /// Source of the noise power.
     pub source: NoiseSource,
-    /// The few lines that hold the power beyond the noise; `None` where it is no such lines.
+    /// Few lines with most of the power beyond the noise; `None` if there are no such lines.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub concentration: Option<Concentration>,
 }
 
-/// Few lines that hold most of a misfit.
+/// Few lines with most of a misfit.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Concentration {
-    /// Frequencies of the lines, in Hz, a list of them rising.
+    /// Frequencies of the lines, in Hz, rising.
     pub frequencies_hz: Vec<f64>,
-    /// Fraction of the residual power beyond the noise that goes with them.
+    /// Fraction of the residual power beyond the noise that vanishes without these lines.
     pub share: f64,
-    /// Frequency of which all of them are multiples, in Hz, where chance hardly makes them so.
+    /// Frequency, in Hz, that has all of them as multiples, unless this may be chance.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub multiples_of_hz: Option<f64>,
 }
@@ -47,7 +47,8 @@ pub enum NoiseSource {
     Coherence,
     /// Standard errors that the data state.
     Stated,
-    /// Noise of the force on the lines on which it decides, stated or read above the band that it drives.
+    /// Noise of the force on the lines where it dominates, stated or estimated above the excited
+    /// band.
     Force,
 }
 

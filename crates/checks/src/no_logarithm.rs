@@ -5,7 +5,8 @@ use std::fmt::{self, Formatter};
 use super::finding::{Check, Names};
 use super::{Subject, Verdict};
 
-/// The transition from sample to sample has no real logarithm: the step is too long for a mode.
+/// Transition from sample to sample without a real logarithm: the sampling interval is too long for
+/// a mode.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct NoLogarithm {

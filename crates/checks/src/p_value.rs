@@ -1,4 +1,4 @@
-//! P-values, and the numbers of a test for correlation.
+//! P-values, and results of tests for correlation.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -7,7 +7,7 @@ use mechid_signal::correlation::Correlation;
 use super::Verdict;
 use super::limits::SIGNIFICANCE;
 
-/// Probability that noise alone gives a statistic at least as large as the one found.
+/// Probability that noise alone gives a statistic at least as large as the observed one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PValue {
@@ -20,17 +20,17 @@ pub struct PValue {
 }
 
 impl PValue {
-    /// The p-value of a single test.
+    /// Creates the p-value of a single test.
     pub fn of(raw: f64) -> Self {
         Self { raw, adjusted: raw }
     }
 
-    /// Returns whether noise alone hardly gives such a statistic in any of the tests.
+    /// Returns whether the adjusted p-value is below the significance level.
     pub fn is_significant(self) -> bool {
         self.adjusted < SIGNIFICANCE
     }
 
-    /// Returns the verdict of a test that noise alone passes.
+    /// Returns the verdict of a test: doubtful if it is significant.
     pub(crate) fn verdict(self) -> Verdict {
         if self.is_significant() { Verdict::Doubtful } else { Verdict::Good }
     }
@@ -38,7 +38,7 @@ impl PValue {
 
 impl Display for PValue {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // A distribution function does not resolve the rest.
+        // Distribution functions are not accurate below this.
         match self.raw {
             p if p < 1e-15 => return f.write_str("p < 1e-15"),
             p if p < 1e-3 => write!(f, "p = {p:.1e}")?,
@@ -52,7 +52,7 @@ impl Display for PValue {
     }
 }
 
-/// Numbers of a test for correlation.
+/// Result of a test for correlation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CorrelationTest {
@@ -60,17 +60,17 @@ pub struct CorrelationTest {
     pub coefficients: usize,
     /// Number of coefficients beyond the bound.
     pub outside: usize,
-    /// Bound that 95 % of the coefficients of noise keep.
+    /// Bound that contains 95 % of the coefficients of noise.
     pub bound: f64,
-    /// Probability that noise alone is correlated as much.
+    /// Probability of a correlation as strong by noise alone.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// Returns whether the residual is rounding, of which correlations mean nothing.
+    /// `true` if the residual is only rounding, whose correlations have no meaning.
     pub rounding: bool,
 }
 
 impl CorrelationTest {
-    /// Returns the numbers of a test; `rounding` where the residual is rounding.
+    /// Creates the result of a test; `rounding` states that the residual is rounding.
     pub(super) fn new(correlation: &Correlation, rounding: bool) -> Self {
         Self {
             coefficients: correlation.coefficients.len(),
@@ -83,7 +83,7 @@ impl CorrelationTest {
 }
 
 impl CorrelationTest {
-    /// Returns whether the residual is more than rounding, and correlated more than noise is.
+    /// Returns whether the residual is more than rounding and significantly correlated.
     pub fn is_significant(&self) -> bool {
         !self.rounding && self.p_value.is_significant()
     }

@@ -1,4 +1,4 @@
-//! Agreement of the parts of the data about the parameters.
+//! Agreement of parts of the data about the parameters.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -12,16 +12,17 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 use crate::Finding;
 
-/// Difference of the parts of the data about the parameters: records, bands of lines, stretches of time.
+/// Difference of the parameters between parts of the data: records, bands of lines, stretches of
+/// time.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
     /// Probability that noise alone makes the parts of any split differ as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// The part that differs most from the others.
+    /// Part with the largest difference from the others.
     pub part: DataPart,
-    /// Parameter in which it does.
+    /// Parameter with the largest difference.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
     pub parameter: Parameter,
     /// Value by the part (unit of the parameter).
@@ -30,13 +31,14 @@ pub struct PartsAgreement {
     pub by_others: f64,
     /// Standard error of the difference by the noise alone (unit of the parameter).
     pub standard_error: f64,
-    /// Factor by which the scatter of the parts makes standard errors larger than the noise does (pure number).
+    /// Ratio of the standard errors from the scatter of the parts to those from the noise (pure
+    /// number).
     pub scatter: f64,
-    /// Number of independent differences of the parts behind that factor.
+    /// Number of independent differences of the parts in that ratio.
     pub degrees_of_freedom: usize,
 }
 
-/// A part of the data of a fit.
+/// Part of the data of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -44,7 +46,7 @@ pub struct PartsAgreement {
     serde(tag = "split", rename_all = "snake_case")
 )]
 pub enum DataPart {
-    /// One of several records, or of the hits of a hammer test.
+    /// One of several records, or one of the hits of a hammer test.
     Records {
         /// Number of the record.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
@@ -83,11 +85,12 @@ pub enum RowParts {
     Halves,
 }
 
-/// Tests whether the parts of the data agree about the parameters of a fit ([`Finding::PartsAgreement`]), with one error
-/// rate for all `splits`. `None` where no split can be made.
+/// Tests whether the parts of the data agree about the parameters of a fit
+/// ([`Finding::PartsAgreement`]), with one error rate for all `splits`. `None` if no split is
+/// possible.
 ///
 /// # Source
-/// That of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
+/// As [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
 pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) -> Option<Finding> {
     let compared = splits.iter().filter_map(|(split, rows)| Some((fit.compare(split)?, *rows)));
     let compared: Vec<(PartsComparison, RowParts)> = compared.collect();

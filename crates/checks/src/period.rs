@@ -1,4 +1,4 @@
-//! Claimed period against the force.
+//! Check of a claimed period by the force.
 
 use std::fmt::{self, Formatter};
 
@@ -12,14 +12,14 @@ use super::limits::{
 };
 use super::{Subject, Verdict};
 
-/// Finds out by the force (N), the samples of which are one or several such periods, what is wrong with
-/// a claimed period (in samples); `None` if nothing speaks against it.
+/// Checks a claimed period (in samples) with a force (N) of one or several such periods; `None` if
+/// the force does not contradict it.
 ///
-/// Three faults are looked for ([`PeriodFault`]): the force returns to itself better after one or two
-/// samples more or less; it returns after the claimed period except in one place, where samples are
-/// missing or too many; or it repeats after another number of samples altogether, of which the claimed
-/// one is no multiple. The last shows in a single claimed period, too, if it holds four thirds of the
-/// true one or more; the sentence then names the samples compared.
+/// Three faults are detected ([`PeriodFault`]): the force repeats better after one or two samples
+/// more or less; it repeats after the claimed period except at one sample, where samples are
+/// missing or inserted; or it repeats after a different number of samples, and the claimed period
+/// is not a multiple of it. The last fault is detected even in a single claimed period, if this
+/// contains at least four thirds of the true one; the sentence then names the compared samples.
 pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     let channels: Vec<Vec<f64>> = (0..force.channels()).filter_map(|c| unit(force, c)).collect();
     if channels.is_empty() || period == 0 || period > force.len() {
@@ -31,7 +31,7 @@ pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     Some(Finding::WrongPeriod(WrongPeriod { claimed: period, fault }))
 }
 
-/// A channel less its mean, with an RMS of 1; `None` if it does not vary.
+/// Returns a channel without its mean, scaled to an RMS of 1; `None` if it is constant.
 fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     let x = force.channel(channel);
     let mean = x.iter().sum::<f64>() / x.len() as f64;
@@ -40,9 +40,9 @@ fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     (rms > PERIOD_ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
 }
 
-/// A period close by after which the force repeats, and clearly better. Mismatches are RMS differences over
-/// √2 times the RMS of the force. The next longer and shorter periods must be worse: if not, the true one is
-/// further away.
+/// Returns a neighbouring period after which the force repeats clearly better. Mismatches are RMS
+/// differences relative to √2 times the RMS of the force. The next longer and shorter periods must
+/// be worse; otherwise the true period is not a neighbour.
 fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let longest = period + PERIOD_NEIGHBOURS + 1;
     let pairs = channels[0].len().checked_sub(longest)?;
@@ -50,17 +50,17 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
         return None;
     }
     let differences = |lag: usize| -> Vec<f64> {
-        let of = |x: &Vec<f64>| -> Vec<f64> {
+        let squared_difference = |x: &Vec<f64>| -> Vec<f64> {
             (0..pairs).map(|k| (x[k + lag] - x[k]).powi(2)).collect()
         };
-        channels.iter().flat_map(of).collect()
+        channels.iter().flat_map(squared_difference).collect()
     };
     let sum = |squares: &[f64]| squares.iter().sum::<f64>();
     let claimed = differences(period);
-    let (found, best) = (period - PERIOD_NEIGHBOURS - 1..=longest)
+    let (nearest, best) = (period - PERIOD_NEIGHBOURS - 1..=longest)
         .map(|lag| (lag, differences(lag)))
         .min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1)))?;
-    if found.abs_diff(period) > PERIOD_NEIGHBOURS {
+    if nearest.abs_diff(period) > PERIOD_NEIGHBOURS {
         return None;
     }
     let gain: Vec<f64> = claimed.iter().zip(&best).map(|(a, b)| a - b).collect();
@@ -70,18 +70,18 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
         && share(&claimed) > PERIOD_ROUNDING.sqrt()
         && sum(&gain) > PERIOD_CLEARLY * scatter;
     clear.then(|| PeriodFault::Neighbour {
-        period: found,
+        period: nearest,
         mismatch: share(&best),
         claimed_mismatch: share(&claimed),
     })
 }
 
-/// The first sample that does not follow from the one a claimed period before, if that holds of one
-/// stretch of a period at most and of no other. The mismatch is the RMS difference of the others over
-/// √2 times the RMS of the force.
+/// Returns the first sample that differs from the sample a claimed period before, if only one
+/// stretch of at most a period differs. The mismatch is the RMS difference of the other samples
+/// relative to √2 times the RMS of the force.
 fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let pairs = channels[0].len().checked_sub(period)?;
-    // On both sides together there must be a period at least that meets the next one.
+    // One period at least outside the stretch must be comparable with the next one.
     if pairs < 2 * period {
         return None;
     }
@@ -98,40 +98,42 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let within = |first: usize| (sums[first + period] - sums[first]) / period as f64;
     let stretches = 0..=pairs - period;
     let worst = stretches.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
-    // Summed anew: the difference of large sums is rounding.
-    let others: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
-    let others = others / (pairs - period) as f64;
+    // A new sum: the difference of large sums would be rounding.
+    let outside: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
+    let outside = outside / (pairs - period) as f64;
     if within(worst) <= PERIOD_WORST * PERIOD_WORST
-        || others > (PERIOD_WORST * PERIOD_WORST).min(within(worst) / PERIOD_INTERRUPTED)
+        || outside > (PERIOD_WORST * PERIOD_WORST).min(within(worst) / PERIOD_INTERRUPTED)
     {
         return None;
     }
-    // A single sample may be like the one a period before by chance, or unlike it by noise.
-    let off = others.max(within(worst) / PERIOD_INTERRUPTED);
+    // A single sample may agree with the one a period before by chance, or differ from it by noise.
+    let off = outside.max(within(worst) / PERIOD_INTERRUPTED);
     let first = (worst..worst + period).find(|k| squares[*k] > off)?;
-    Some(PeriodFault::Interruption { sample: first + period, mismatch: others.sqrt() })
+    Some(PeriodFault::Interruption { sample: first + period, mismatch: outside.sqrt() })
 }
 
-/// The shortest number of samples after which all channels repeat, if the claimed period is no
-/// multiple of it and does not repeat as well.
+/// Returns the shortest number of samples after which all channels repeat, if the claimed period is
+/// not a multiple of it and repeats less well.
 fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let squares = squared_mismatches(channels);
-    // Behind the lags at which a slow force resembles itself.
+    // Excludes the first lags, at which a slow force resembles itself.
     let apart = (1..squares.len()).find(|lag| squares[*lag] > PERIOD_WORST * PERIOD_WORST)?;
     let best = squares[apart..].iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-    let alike = |lag: &usize| squares[*lag] <= PERIOD_ALIKE * best + PERIOD_ROUNDING;
-    if best > PERIOD_WORST * PERIOD_WORST || squares.get(period).is_some_and(|_| alike(&period)) {
+    let repeats_equally = |lag: &usize| squares[*lag] <= PERIOD_ALIKE * best + PERIOD_ROUNDING;
+    if best > PERIOD_WORST * PERIOD_WORST
+        || squares.get(period).is_some_and(|_| repeats_equally(&period))
+    {
         return None;
     }
-    let first = (apart..squares.len()).find(alike)?;
-    let around = (first..squares.len()).take_while(alike);
+    let first = (apart..squares.len()).find(repeats_equally)?;
+    let around = (first..squares.len()).take_while(repeats_equally);
     let nearest = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
-    // What wanders slowly repeats better after several periods.
+    // A signal with slow drift may repeat better after several periods.
     let repeats = squares.get(period).is_some_and(|square| *square <= PERIOD_WORST * PERIOD_WORST);
     if repeats && nearest % period == 0 {
         return None;
     }
-    // Each of so many may be half a sample longer or shorter.
+    // Each period may be half a sample longer or shorter.
     let times = (period as f64 / nearest as f64).round();
     let off = (period as f64 - times * nearest as f64).abs();
     (off > 0.5 * times + 0.5).then(|| PeriodFault::Other {
@@ -141,17 +143,17 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     })
 }
 
-/// Squared differences of samples a lag apart over the squares of both, for the lags up to three
-/// quarters of the record; 1 where the overlapping samples hardly vary.
+/// Returns the squared differences of samples a lag apart, relative to the squares of both, for
+/// lags up to three quarters of the record; 1 if the overlapping samples hardly vary.
 fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
     let len = channels[0].len();
-    let mut all = vec![(0.0, 0.0); 3 * len / 4 + 1];
+    let mut sums = vec![(0.0, 0.0); 3 * len / 4 + 1];
     for x in channels {
         let products = aperiodic_autocorrelation(x);
         let total: f64 = x.iter().map(|v| v * v).sum();
-        // Squares left out at the end and at the beginning.
+        // Squares outside the overlap, at the end and at the beginning.
         let (mut end, mut beginning) = (0.0, 0.0);
-        for (lag, (difference, overlap)) in all.iter_mut().enumerate() {
+        for (lag, (difference, overlap)) in sums.iter_mut().enumerate() {
             let power = (total - end) + (total - beginning);
             *overlap += power;
             *difference += power - 2.0 * products[lag] * len as f64;
@@ -163,14 +165,14 @@ fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
     let ratio = |(lag, (difference, overlap)): (usize, (f64, f64))| {
         if overlap > 0.5 * usual(lag) { difference / overlap } else { 1.0 }
     };
-    all.into_iter().enumerate().map(ratio).collect()
+    sums.into_iter().enumerate().map(ratio).collect()
 }
 
-/// The force does not repeat after the claimed period.
+/// Claimed period after which the force does not repeat.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct WrongPeriod {
-    /// Period claimed, in samples.
+    /// Claimed period, in samples.
     pub claimed: usize,
     /// Contradiction by the force.
     #[cfg_attr(feature = "serde", serde(flatten))]
@@ -185,28 +187,32 @@ pub struct WrongPeriod {
     serde(tag = "fault", rename_all = "snake_case")
 )]
 pub enum PeriodFault {
-    /// The force returns to itself better after one or two samples more or less.
+    /// The force repeats better after one or two samples more or less.
     Neighbour {
         /// Number of samples after which it repeats best.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
+        /// RMS difference from one such period to the next, over the RMS of the force (pure
+        /// number).
         mismatch: f64,
-        /// The same after the claimed period (pure number).
+        /// RMS difference after the claimed period, relative to the RMS of the force (pure number).
         claimed_mismatch: f64,
     },
-    /// The force returns after the claimed period except in one place: samples are missing or too many.
+    /// The force repeats after the claimed period except at one sample, where samples are missing
+    /// or inserted.
     Interruption {
-        /// The sample that does not follow, counted from 0 in the window.
+        /// First sample that does not repeat, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         sample: usize,
-        /// RMS difference elsewhere, over the RMS of the force (pure number).
+        /// RMS difference elsewhere, relative to the RMS of the force (pure number).
         mismatch: f64,
     },
-    /// The force repeats after a number of samples of which the claimed one is no multiple.
+    /// The force repeats after a different number of samples, and the claimed period is not a
+    /// multiple of it.
     Other {
         /// Number of samples after which it repeats.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
+        /// RMS difference from one such period to the next, over the RMS of the force (pure
+        /// number).
         mismatch: f64,
         /// Number of samples of the force.
         samples: usize,

@@ -14,11 +14,11 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PeriodScatter {
-    /// Largest RMS deviation of a period over the RMS of the response (pure number).
+    /// Largest RMS deviation of a period, relative to the RMS of the response (pure number).
     pub fraction: f64,
 }
 
-/// Deviation of the periods from their mean; of a single period, its seam.
+/// Returns the deviation of the periods from their mean; for a single period, its seam.
 pub(super) fn repetition(response: &Record, period: usize) -> Result<Finding, EstimateError> {
     if response.len() / 2 < period {
         return Ok(periodicity(response));
@@ -26,7 +26,8 @@ pub(super) fn repetition(response: &Record, period: usize) -> Result<Finding, Es
     Ok(Finding::PeriodScatter(PeriodScatter { fraction: deviation_of_periods(response, period)? }))
 }
 
-/// Largest RMS deviation of a period from the mean of all, over the RMS of that without its constant part.
+/// Returns the largest RMS deviation of a period from the mean period, relative to the RMS of the
+/// mean period without its constant part.
 pub(super) fn deviation_of_periods(record: &Record, period: usize) -> Result<f64, EstimateError> {
     let mean = record.period_mean(period)?;
     let around = mean.without_mean();

@@ -10,7 +10,7 @@ use super::finding::{Check, Finding, Names};
 use super::limits::EXCITED_LINE;
 use super::{Subject, Verdict};
 
-/// Order of persistent excitation of a force, against the order that the unknowns need.
+/// Order of persistent excitation of a force, compared with the order that the unknowns need.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PersistentExcitation {
@@ -23,8 +23,8 @@ pub struct PersistentExcitation {
     pub needed: usize,
 }
 
-/// Order of persistent excitation of each force in the record that excites it most, against the number of
-/// states and inputs, or of unknowns.
+/// Returns the order of persistent excitation of each force, in the record with the highest,
+/// compared with the number of states and inputs, or of unknowns.
 pub(super) fn excitation<'a>(
     records: impl Iterator<Item = &'a Record>,
     needed: usize,

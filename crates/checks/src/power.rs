@@ -1,4 +1,4 @@
-//! Direction of the power between force and machine.
+//! Direction of the power between force and system.
 
 use std::fmt::{self, Formatter};
 
@@ -12,14 +12,15 @@ use super::limits::POWER_TAKEN_OUT;
 use super::limits::{FORCE_FLOOR, STRONGEST_FRACTION, STRONGEST_LINES};
 use super::{Subject, Verdict};
 
-/// Finds forces (N) that take power out of the machine, line by line and in the mean
-/// ([`Finding::PowerFlow`]): then they are not what drives it. Force and response have one channel per
-/// degree of freedom. `None` if the forces put power in.
+/// Finds forces (N) that extract power from the system, line by line and in the mean
+/// ([`Finding::PowerFlow`]): such forces do not drive it. Force and response have one channel per
+/// degree of freedom. `None` if the forces supply power.
 ///
 /// The power is Σ ½ Re(F V̄), the apparent power Σ ½ |F| |V|.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
+/// the records do not match.
 ///
 /// # Source
 /// Cremer, Heckl & Petersson, *Structure-Borne Sound*, 3rd ed. (2005), the section on mechanical
@@ -32,9 +33,9 @@ pub fn power(
     force.check_same_sampling(response)?;
     check_size("channels of the response", force.channels(), response.channels())?;
     let (forces, responses) = (Spectrum::of(force), Spectrum::of(response));
-    let all = &forces;
+    let force_spectrum = &forces;
     let carried = |dof: usize| {
-        let line = move |n: usize| all.line(n, dof).norm();
+        let line = move |n: usize| force_spectrum.line(n, dof).norm();
         let strongest = (1..forces.len()).map(line).fold(0.0, f64::max);
         (1..forces.len()).filter(move |n| line(*n) > FORCE_FLOOR * strongest)
     };
@@ -57,11 +58,11 @@ pub fn power(
     Ok((!driven).then_some(Finding::PowerFlow(PowerFlow { fraction })))
 }
 
-/// The forces take power out of the machine.
+/// Forces that extract power from the system.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PowerFlow {
-    /// Mean power into the machine over the apparent power, negative (pure number).
+    /// Mean power into the system relative to the apparent power, negative (pure number).
     pub fraction: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Priors against the data.
+//! Agreement of priors and data.
 
 use std::fmt::{self, Formatter};
 
@@ -7,7 +7,7 @@ use super::finding::{Check, Names};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Prior of a parameter against what the data say of it.
+/// Agreement of the prior of a parameter with its estimate from the data.
 ///
 /// If both are right, estimate − mean has the variance s² − v, with the variance s² of the prior
 /// and v of the estimate.

@@ -9,11 +9,11 @@ use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::limits::{LEVEL_ROUNDING, QUANTISATION_LEVELS, REPEATED_SAMPLES, SAMPLES_PER_LEVEL};
 use super::{Subject, Verdict};
 
-/// A channel has a few equally spaced values only.
+/// Channel with only a few equally spaced values.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Quantisation {
-    /// The channel.
+    /// Affected channel.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub channel: Channel,
     /// Number of distinct values.
@@ -22,7 +22,7 @@ pub struct Quantisation {
     pub step: f64,
 }
 
-/// Finds the channels of a response (any unit) with a few equally spaced values only
+/// Finds the channels of a response (any unit) with only a few equally spaced values
 /// ([`Finding::Quantisation`]): a converter whose range is far too wide, or with too few bits.
 ///
 /// # Source
@@ -36,11 +36,11 @@ pub fn quantised_channels(quantity: Quantity, response: &Record) -> Vec<Finding>
     (0..response.channels()).filter_map(one).collect()
 }
 
-/// Number of levels of a coarsely quantised channel, and the step between them.
+/// Returns the number of levels of a coarsely quantised channel, and the step between them.
 fn quantisation(x: &[f64]) -> Option<(usize, f64)> {
     let mut levels: Vec<f64> = Vec::new();
     for value in x {
-        // Zero has one sign.
+        // Adding zero removes the sign of −0.
         let value = value + 0.0;
         if let Err(at) = levels.binary_search_by(|level| level.total_cmp(&value)) {
             if levels.len() == QUANTISATION_LEVELS {
@@ -54,7 +54,7 @@ fn quantisation(x: &[f64]) -> Option<(usize, f64)> {
     let multiple =
         |gap: f64| (gap / step - (gap / step).round()).abs() <= LEVEL_ROUNDING * gap / step;
     let repeated = x.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    // Of a channel at rest before it moves, or of a short period, this is not true.
+    // A channel at rest before it moves, or with a short period, does not satisfy all of these.
     let coarse = levels.len() > 2
         && x.len() >= SAMPLES_PER_LEVEL * levels.len()
         && repeated as f64 >= REPEATED_SAMPLES * x.len() as f64

@@ -1,4 +1,4 @@
-//! Noise on the response that biases least squares while its residual stays white.
+//! Noise on the response that biases least squares although the residual is white.
 
 use mechid_estimate::{Estimate, EstimateError};
 use mechid_model::{Matrix, Parameter, Response};
@@ -18,20 +18,20 @@ use super::p_value::PValue;
 
 /// Tests whether the response one sample before and after explains the residual of the equation of
 /// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
-/// ([`Finding::Bias`]): it does with white noise on the response, it does not with noise on
-/// the force. `None` if it does not, if no parameter changes by more than its standard error with those
-/// neighbours as instruments, if the residual is not white (then that is the finding), or if there is no
-/// noise. The first 32,768 samples of a long record are used.
+/// ([`Finding::Bias`]): it does with white noise on the response, but not with noise on the force.
+/// `None` if it does not, if no parameter changes by more than its standard error with these
+/// neighbours as instruments, if the residual is not white (this is another finding), or if there
+/// is no noise. Only the first 32,768 samples of a long record are used.
 ///
-/// The finding names the parameter that changes most, in standard errors of `estimate`.
+/// The finding names the parameter with the largest change, in standard errors of `estimate`.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together, and
-/// what [`LeastSquares::push_rows`] refuses.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if
+/// the records do not match, and the errors of [`LeastSquares::push_rows`].
 ///
 /// # Source
-/// Hausman (1978), Econometrica 46, 1251–1271, as a regression: Davidson & MacKinnon, *Estimation and
-/// Inference in Econometrics* (1993), section 7.9; Söderström & Stoica, *System Identification*
+/// Hausman (1978), Econometrica 46, 1251–1271, as a regression: Davidson & MacKinnon, *Estimation
+/// and Inference in Econometrics* (1993), section 7.9; Söderström & Stoica, *System Identification*
 /// (1989), chapter 8 (instruments).
 pub fn noise_on_response(
     response: &Response,
@@ -49,17 +49,17 @@ pub fn noise_on_response(
         if parameters.is_empty() || !enough {
             continue;
         }
-        let equation = Equation::of(response, force, estimate, dof, &parameters);
+        let equation = Equation::new(response, force, estimate, dof, &parameters);
         let change = equation.change(estimate, &parameters)?;
         least = match (least, change) {
             (Some(a), Some(b)) => Some(if b.p_value < a.p_value { b } else { a }),
             (a, b) => a.or(b),
         };
     }
-    // Bonferroni: the least of all equations.
+    // Bonferroni: the smallest of all equations.
     let p_value = |change: &Change| (change.p_value * equations as f64).min(1.0);
     let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
-    // A long record shows a smaller bias than that, but the interval still holds.
+    // A smaller bias is significant, too, in a long record, but hardly affects the interval.
     let relevant = significant.filter(|change| change.standard_errors() > 1.0);
     Ok(relevant.map(|change| {
         Finding::Bias(Bias {
@@ -73,7 +73,7 @@ pub fn noise_on_response(
     }))
 }
 
-/// One equation of motion at all samples but the first and the last.
+/// One equation of motion at all samples except the first and the last.
 struct Equation {
     regressors: DMatrix<f64>,
     /// Mean of the regressors one sample before and after.
@@ -91,7 +91,7 @@ struct Change {
 }
 
 impl Equation {
-    fn of(
+    fn new(
         response: &Response,
         force: &Record,
         estimate: &Estimate,
@@ -143,8 +143,9 @@ impl Equation {
         }
         let [variance, reduced] =
             [&alone, &both].map(|solution| solution.residual_covariance[(0, 0)]);
-        let (freedom, all) = (both.degrees_of_freedom as f64, alone.degrees_of_freedom as f64);
-        let explained = (variance * all - reduced * freedom).max(0.0) / added as f64;
+        let (freedom, total_freedom) =
+            (both.degrees_of_freedom as f64, alone.degrees_of_freedom as f64);
+        let explained = (variance * total_freedom - reduced * freedom).max(0.0) / added as f64;
         let distribution = FisherSnedecor::new(added as f64, freedom).expect("positive numbers");
         let p_value = distribution.sf(explained / reduced);
         // y = Φa + Zb and Φ = ZΠ + noise: instruments Z give a + Π⁻¹b.
@@ -157,7 +158,7 @@ impl Equation {
         Ok(largest_change(estimate, parameters, &values, p_value))
     }
 
-    /// Π⁻¹b, with both in units of the regressors.
+    /// Returns Π⁻¹b, with both scaled by the norms of the regressors.
     fn scaled_solve(
         &self,
         mut projection: DMatrix<f64>,
@@ -181,7 +182,7 @@ fn fit(regressors: &DMatrix<f64>, targets: &DMatrix<f64>) -> Result<Solution, Nu
     rows.solve()
 }
 
-/// Change of the parameter that changes most, in its standard errors.
+/// Returns the largest change of a parameter, in its standard errors.
 fn largest_change(
     estimate: &Estimate,
     parameters: &[Parameter],
@@ -198,8 +199,8 @@ fn largest_change(
             standard_error: fitted.standard_error,
         })
     };
-    let all = parameters.iter().zip(values.iter()).filter_map(one);
-    all.max_by(|a, b| a.standard_errors().total_cmp(&b.standard_errors()))
+    let changes = parameters.iter().zip(values.iter()).filter_map(one);
+    changes.max_by(|a, b| a.standard_errors().total_cmp(&b.standard_errors()))
 }
 
 impl Change {

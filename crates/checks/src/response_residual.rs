@@ -1,4 +1,4 @@
-//! Residuals of frequency responses against the noise that their coherence shows.
+//! Tests of residuals of frequency responses with the noise from their coherence.
 
 use mechid_estimate::frequency_domain::in_units_of_noise;
 use mechid_estimate::{Estimate, EstimateError};
@@ -21,11 +21,11 @@ use super::whiteness::{Residual, Whiteness};
 /// Tests whether the residual of an estimate on frequency responses has the power that follows from
 /// their coherence ([`Finding::Misfit`]), and whether it is correlated from line to line beyond the
 /// correlation by the window ([`Finding::Whiteness`]). The forces act at the degrees of freedom
-/// `force_dof`, as for [`Frf::data`]. `fitted` is the number of parameters (a pure number) fitted to these
-/// data: all, or of several records fitted together the share of this one.
+/// `force_dof`, as for [`Frf::data`]. `fitted` is the number of parameters (a pure number) fitted
+/// to these data; for several records fitted together, the share of this record.
 ///
 /// Both allow for the correlation of lines by the window and the overlap of the segments; lines of
-/// responses measured elsewhere are taken as independent. The power is tested if there are more than
+/// responses from other sources count as independent. The power is tested if there are more than
 /// two independent averages beyond the number of forces.
 ///
 /// # Errors
@@ -49,7 +49,7 @@ pub fn after_response_fit(
     }
     let Some(residual) = in_units_of_noise(&data, estimate) else { return Ok(Vec::new()) };
     let n = residual.ncols();
-    let series = Series::of(&residual, frf);
+    let series = Series::new(&residual, frf);
     let mut findings = Vec::from_iter(series.misfit(frf.deviations(), fitted));
     for (at, lines) in series.each.iter().enumerate() {
         if let Some((correlation, distance)) = series.line_to_line(lines) {
@@ -62,16 +62,16 @@ pub fn after_response_fit(
     Ok(findings)
 }
 
-/// Tests the residual of an estimate on tables of frequency responses against the noise of their standard errors, where
-/// all `columns` state it ([`Finding::Misfit`]), and for correlation of lines that no window of an analyser correlates
-/// ([`Finding::Whiteness`]). A column has the responses to a force at one degree of freedom. Returns the findings of
-/// each column.
+/// Tests the residual of an estimate on tables of frequency responses against the noise of their
+/// standard errors, if all `columns` state it ([`Finding::Misfit`]), and for correlation of lines
+/// too far apart for the window of an analyser ([`Finding::Whiteness`]). A column has the responses
+/// to a force at one degree of freedom. Returns the findings of each column.
 ///
 /// # Errors
 /// As [`after_spectral_fit`].
 ///
 /// # Source
-/// That of [`SpectralResidual::findings`](super::SpectralResidual::findings).
+/// As [`SpectralResidual::findings`](super::SpectralResidual::findings).
 pub fn after_table_fit(
     columns: &[(FrequencyData, usize)],
     estimate: &Estimate,
@@ -79,7 +79,7 @@ pub fn after_table_fit(
     let data: Vec<FrequencyData> = columns.iter().map(|(data, _)| data.clone()).collect();
     let AfterSpectralFit { records, .. } =
         after_spectral_fit(&data, estimate, Extent::WholePeriod)?;
-    let of_column = |(residual, (_, force)): (&SpectralResidual, &(FrequencyData, usize))| {
+    let column_findings = |(residual, (_, force)): (&SpectralResidual, &(FrequencyData, usize))| {
         let mut findings = Vec::from_iter(residual.misfit(NoiseSource::Stated));
         for response in 0..residual.dof() {
             let distance = WINDOW_REACH + 1;
@@ -91,10 +91,10 @@ pub fn after_table_fit(
         }
         findings
     };
-    Ok(records.iter().zip(columns).map(of_column).collect())
+    Ok(records.iter().zip(columns).map(column_findings).collect())
 }
 
-/// Mean and variance of a weighted residual power if only noise is left.
+/// Mean and variance of a weighted residual power of noise alone.
 struct Expected {
     mean: f64,
     variance: f64,
@@ -107,40 +107,40 @@ impl Expected {
     }
 }
 
-/// Residuals of responses from line to line, in units of their noise.
+/// Residuals of responses over the lines, in units of their noise.
 struct Series<'a> {
-    /// One for each force and, within, each response.
+    /// Residual for each force and, within, each response.
     each: Vec<Vec<Complex<f64>>>,
-    /// Numbers of the lines, sorted, and their places in `each`.
+    /// Numbers of the lines, sorted, and their indices in `each`.
     lines: Vec<(usize, usize)>,
     /// Correlation of the noise of two lines at a distance.
     correlation: &'a [f64],
 }
 
 impl<'a> Series<'a> {
-    fn of(residual: &DMatrix<Complex<f64>>, frf: &'a Frf) -> Self {
+    fn new(residual: &DMatrix<Complex<f64>>, frf: &'a Frf) -> Self {
         let count = frf.omega().len();
         let inputs = residual.nrows() / count;
         let one = |(input, response): (usize, usize)| {
             residual.column(response).rows(input * count, count).iter().copied().collect()
         };
-        let all = (0..inputs).flat_map(|input| (0..residual.ncols()).map(move |o| (input, o)));
+        let pairs = (0..inputs).flat_map(|input| (0..residual.ncols()).map(move |o| (input, o)));
         let mut lines: Vec<_> = frf.lines().iter().copied().zip(0..).collect();
         lines.sort_unstable();
-        Self { each: all.map(one).collect(), lines, correlation: frf.line_correlation() }
+        Self { each: pairs.map(one).collect(), lines, correlation: frf.line_correlation() }
     }
 
-    /// Places of the pairs of lines at a distance.
+    /// Returns the indices of the pairs of lines at a distance.
     fn pairs(&self, distance: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.lines.iter().filter_map(move |(number, at)| {
-            let other =
+            let partner =
                 self.lines.binary_search_by_key(&(number + distance), |line| line.0).ok()?;
-            Some((*at, self.lines[other].1))
+            Some((*at, self.lines[partner].1))
         })
     }
 
-    /// Power against variances that are estimated from `nu` independent complex numbers each, and
-    /// correlated from line to line like the squares of the residuals.
+    /// Returns the test of the power against variances that are estimated from `nu` independent
+    /// complex numbers each, and correlated from line to line like the squares of the residuals.
     fn misfit(&self, nu: f64, fitted: f64) -> Option<Finding> {
         if nu <= 2.0 {
             return None;
@@ -160,8 +160,8 @@ impl<'a> Series<'a> {
         Some(expected.misfit(power, NoiseSource::Coherence))
     }
 
-    /// Σ r̄(n) r(n + d) at distances d beyond those that the window correlates, and the smallest of
-    /// them; `None` if there are too few lines.
+    /// Returns the correlation Σ r̄(n) r(n + d) at distances d that the window does not correlate,
+    /// and the smallest of them; `None` if there are too few lines.
     fn line_to_line(&self, residual: &[Complex<f64>]) -> Option<(Correlation, usize)> {
         let (count, first) = (residual.len() as f64, self.correlation.len());
         let distances: Vec<usize> = (first..self.lines.len() / LINES_PER_DISTANCE)
@@ -197,7 +197,7 @@ impl<'a> Series<'a> {
     }
 }
 
-/// Coherence of two series of noise, less its expectation by chance.
+/// Returns the coherence of two series of noise, corrected for its expectation by chance.
 fn coherence(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
     let power = |a: &[Complex<f64>]| a.iter().map(|r| r.norm_sqr()).sum::<f64>();
     let product: Complex<f64> = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();

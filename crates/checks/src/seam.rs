@@ -12,13 +12,13 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Seam {
-    /// Curvature there over the RMS curvature inside, largest channel (pure number).
+    /// Ratio of the curvature there to the RMS curvature inside, largest channel (pure number).
     pub ratio: f64,
 }
 
 /// Checks whether a record of any response quantity is one whole period of a steady state: the
-/// curvature across the seam, where the last sample is followed by the first, against the RMS
-/// curvature inside ([`Finding::Seam`]). In a whole period the seam is like any other place.
+/// curvature across the seam, from the last sample to the first, relative to the RMS curvature
+/// inside ([`Finding::Seam`]). In a whole period the seam is like any other sample.
 ///
 /// # Source
 /// Ours.
@@ -26,9 +26,9 @@ pub fn periodicity(response: &Record) -> Finding {
     periodicity_across(response, response)
 }
 
-/// Checks the seam as [`periodicity`] does, of a period too long to be held in memory: the RMS
-/// curvature is that of its `beginning`; `end` is its last two samples, or more (samples × channels,
-/// the same quantity and channels).
+/// Checks the seam like [`periodicity`] for a period too long for the memory: the RMS curvature is
+/// computed from its `beginning`; `end` has at least its last two samples (samples × channels, the
+/// same quantity and channels).
 ///
 /// # Panics
 /// If `end` has fewer channels.

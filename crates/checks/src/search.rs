@@ -5,13 +5,13 @@ use std::fmt::{self, Formatter};
 use super::finding::{Check, Names};
 use super::{Subject, Verdict};
 
-/// Number of searches from different first values that ended at the highest likelihood.
+/// Number of searches from different initial values that ended at the highest likelihood.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SearchAgreement {
-    /// Searches made.
+    /// Number of searches.
     pub searches: usize,
-    /// Searches that ended at the highest likelihood.
+    /// Number of searches that ended at the highest likelihood.
     pub agreeing: usize,
 }
 

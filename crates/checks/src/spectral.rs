@@ -13,8 +13,8 @@ use super::finding::Finding;
 use super::period_scatter::repetition;
 use super::unequal_periods::unequal_periods;
 
-/// Checks excitation and conditioning before spectra or frequency responses are fitted: of all
-/// experiments that are fitted together, since one shaker at a time excites one degree of freedom each.
+/// Checks excitation and conditioning before spectra or frequency responses are fitted, for all
+/// experiments that are fitted together, for example with one shaker at a time.
 ///
 /// # Errors
 /// As [`equation_error`](mechid_estimate::frequency_domain::equation_error).
@@ -27,19 +27,19 @@ pub fn before_spectral_fit(
 ) -> Result<Vec<Finding>, EstimateError> {
     let mut findings = vec![excited_lines::excitation(data, unknowns)];
     match equation_rows(data)?.solve(unknowns) {
-        // Nothing else can be checked then.
+        // Too few rows: conditioning cannot be checked.
         Err(EstimateError::Numerics(NumericsError::TooFewRows { .. })) => {}
         solved => findings.push(conditioning(&solved?)),
     }
     Ok(findings)
 }
 
-/// Checks whether force (N) and response of one record, in any quantity, consist of periods of `period`
-/// samples: the deviation of the periods from their mean or the seam of a single one, and by
-/// [`claimed_period`] the force.
+/// Checks whether force (N) and response of one record, in any quantity, consist of periods of
+/// `period` samples: by the deviation of the periods from their mean, or the seam of a single
+/// period, and by [`claimed_period`].
 ///
 /// # Errors
-/// [`EstimateError::Signal`] if the records are no whole number of periods.
+/// [`EstimateError::Signal`] if the records are not a whole number of periods.
 ///
 /// # Source
 /// Ours.

@@ -21,30 +21,33 @@ use super::whiteness::{Residual, Whiteness};
 #[derive(Debug, Clone)]
 pub struct SpectralResidual {
     data: FrequencyData,
-    /// Otherwise the weights are those of white noise of unknown level.
+    /// `false` if the weights assume white noise of unknown level.
     noise_stated: bool,
-    /// Weighted residual less the part that the step explains.
+    /// Weighted residual without the part that a step of the parameters explains.
     values: DVector<f64>,
     /// Q of the covariance I − QQᵀ of the values.
     explained: DMatrix<f64>,
-    /// Both with what the ends of the record leave, where that is a part of the noise and of its stated power.
+    /// Values and Q with the transients of the record, if these are part of the noise and of its
+    /// stated power.
     with_ends: Option<(DVector<f64>, DMatrix<f64>)>,
-    /// Standard deviation of every residual before the parameters were fitted, from its own size.
+    /// Standard deviation of every residual before the fit of the parameters, from its own size.
     deviations: DVector<f64>,
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
-    /// Forces, rows × n, less what the residual tells of their noise: with that it is correlated of a right model, too.
+    /// Forces, rows × n, without the part of their noise that the residual shows: the residual of a
+    /// right model is correlated with this part, too.
     force: DMatrix<Complex<f64>>,
     rounding: bool,
-    /// Power of the residual over that of the noise, on the lines on which that of the forces decides, and the
-    /// probability that it is as little.
+    /// Ratio of residual power to noise power on the lines where force noise dominates, and the
+    /// probability of a ratio as small.
     force_decides: Option<(f64, f64)>,
-    /// Few lines that hold the misfit of all records.
+    /// Few lines with most of the misfit of all records.
     concentration: Option<Concentration>,
 }
 
 impl SpectralResidual {
-    /// The weighted values of data that state their noise or not, with covariance I − QQᵀ of the `explained` Q.
+    /// Creates the residual of data with or without stated noise, from weighted values with
+    /// covariance I − QQᵀ for the `explained` Q.
     pub(super) fn new(
         data: FrequencyData,
         noise_stated: bool,
@@ -71,40 +74,40 @@ impl SpectralResidual {
         }
     }
 
-    /// The same whose power is that of other values, of a covariance of their own, with what the ends leave.
+    /// Sets values and Q of the power test, if these include the transients.
     pub(super) fn with_ends(self, with_ends: Option<(DVector<f64>, DMatrix<f64>)>) -> Self {
         Self { with_ends, ..self }
     }
 
-    /// The same, of rounding or not.
-    pub(super) fn of_rounding(self, rounding: bool) -> Self {
+    /// Sets whether the residual is rounding.
+    pub(super) fn with_rounding(self, rounding: bool) -> Self {
         Self { rounding, ..self }
     }
 
-    /// The same with the most likely forces in place of the measured ones.
+    /// Replaces the measured forces by the most likely ones.
     pub(super) fn with_likely_force(self, force: Option<DMatrix<Complex<f64>>>) -> Self {
         Self { force: force.unwrap_or(self.force), ..self }
     }
 
-    /// The same with a power where the noise of the forces decides.
+    /// Sets the result of the power test on lines where force noise dominates.
     pub(super) fn with_force_decides(self, force_decides: Option<(f64, f64)>) -> Self {
         Self { force_decides, ..self }
     }
 
-    /// Keeps the lines that hold the misfit of all records.
+    /// Sets the lines with most of the misfit of all records.
     pub(super) fn hold_misfit(&mut self, lines: Option<Concentration>) {
         self.concentration = lines;
     }
 
-    /// Tests the power of the residual against the noise, if it is stated ([`Finding::Misfit`]), and its
-    /// correlation from line to line ([`Finding::Whiteness`]) and with the forces
-    /// ([`Finding::CrossCorrelation`]). Residuals of rounding pass. Empty if the parameters leave too
-    /// few residuals free.
+    /// Tests the power of the residual against the noise, if it is stated ([`Finding::Misfit`]),
+    /// and its correlation from line to line ([`Finding::Whiteness`]) and with the forces
+    /// ([`Finding::CrossCorrelation`]). Residuals of rounding pass. Empty if there are too few
+    /// residuals in excess of the parameters.
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
-    /// validation (whiteness of the residuals, Hotelling's T² with a covariance sampled from complex
-    /// numbers).
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+    /// model validation (whiteness of the residuals, Hotelling's T² with a covariance sampled from
+    /// complex numbers).
     pub fn findings(&self) -> Vec<Finding> {
         let mut findings = Vec::new();
         let free = self.values.len() as f64 - self.explained.norm_squared();
@@ -152,7 +155,7 @@ impl SpectralResidual {
         })
     }
 
-    /// Values and explained columns of the power.
+    /// Returns values and explained columns for the power test.
     fn whole(&self) -> (&DVector<f64>, &DMatrix<f64>) {
         match &self.with_ends {
             Some((values, explained)) => (values, explained),
@@ -160,18 +163,18 @@ impl SpectralResidual {
         }
     }
 
-    /// Returns whether the residual is no more than rounding.
+    /// Returns whether the residual is only rounding.
     #[must_use]
     pub fn is_rounding(&self) -> bool {
         self.rounding
     }
 
-    /// Returns the weighted residual less the part that the parameters explain.
+    /// Returns the weighted residual without the part that the parameters explain.
     pub(super) fn values(&self) -> &DVector<f64> {
         &self.values
     }
 
-    /// Returns orthonormal columns that the parameters and the ends of the record explain.
+    /// Returns orthonormal columns that span the effect of the parameters and transients.
     pub(super) fn explained(&self) -> &DMatrix<f64> {
         &self.explained
     }
@@ -181,44 +184,47 @@ impl SpectralResidual {
         &self.deviations
     }
 
-    /// Number of degrees of freedom, each with a channel of the residual and one of the force.
+    /// Returns the number of degrees of freedom, each with a channel of the residual and one of the
+    /// force.
     pub fn dof(&self) -> usize {
         self.data.dof()
     }
 
-    /// Residual power against its expectation for the noise of a source, such as covariances sampled from few
-    /// periods.
+    /// Returns the test of the residual power against its expectation for the noise of a source,
+    /// such as covariances from few periods.
     pub(super) fn misfit(&self, source: NoiseSource) -> Option<Finding> {
         let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
         let (n, rows) = (self.data.dof() as f64, self.data.len() as f64);
         let nu = noise.degrees_of_freedom();
-        // Rows with a common covariance make one statistic.
+        // Rows with a common covariance form one statistic.
         let groups = noise.groups();
-        let each = rows / groups;
+        let group_rows = rows / groups;
         let (mean, variance) = if nu.is_infinite() {
             (n * rows, n * rows)
         } else {
             if nu <= n + 1.0 {
                 return None;
             }
-            let mean = n * each * nu / (nu - n);
-            let square = n * each * (n * each + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
+            let mean = n * group_rows * nu / (nu - n);
+            let square =
+                n * group_rows * (n * group_rows + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
             (groups * mean, groups * (square - mean * mean))
         };
         let power_of = |values: &DVector<f64>, explained: &DMatrix<f64>| {
             let gram = explained.transpose() * explained;
-            let all = values.len() as f64;
-            let free = (all - gram.trace()) / all;
-            let spread = (all - 2.0 * gram.trace() + gram.norm_squared()) / all;
+            let count = values.len() as f64;
+            let free = (count - gram.trace()) / count;
+            let spread = (count - 2.0 * gram.trace() + gram.norm_squared()) / count;
             // Real and imaginary parts have unit variance each.
             let power = 0.5 * values.norm_squared();
             (power, mean * free, share_above_of(power, mean * free, 0.5 * variance * spread))
         };
         let (values, explained) = self.whole();
         let (power, mean, above) = power_of(values, explained);
-        // Too little is no noise, either: then the periods differ by more than noise.
+        // A power far below the noise is also significant: then the periods differ by more than
+        // noise.
         let below = match &self.with_ends {
-            // The noise of few periods also has what an unmeasured force leaves at the ends of each.
+            // The noise from few periods also contains the transients of an unmeasured force.
             Some(_) if power > SPECTRAL_LEAKED * mean => 1.0,
             _ => 1.0 - above,
         };
@@ -235,27 +241,29 @@ impl SpectralResidual {
         Some(Finding::Misfit(Misfit { ratio: power / mean, p_value, source, concentration }))
     }
 
-    /// Places of the lines by rising frequency.
+    /// Returns the indices of the lines by rising frequency.
     fn ascending(&self) -> Vec<usize> {
         let mut rows: Vec<usize> = (0..self.data.len()).collect();
         rows.sort_by(|a, b| self.data.omega()[*a].total_cmp(&self.data.omega()[*b]));
         rows
     }
 
-    /// Row of the real part of a line and channel; that of the imaginary part is the next.
+    /// Returns the row of the real part of a line and channel; the imaginary part is in the next
+    /// row.
     fn row(&self, line: usize, channel: usize) -> usize {
         2 * (self.data.dof() * line + channel)
     }
 
-    /// Correlation of the residual of a channel from line to line, at a distance of `first` lines (at least 1) or
-    /// more. `None` if there are too few lines or the residual is zero.
+    /// Returns the correlation of the residual of a channel from line to line, at a distance of
+    /// `first` lines (at least 1) or more. `None` if there are too few lines or the residual is
+    /// zero.
     ///
     /// # Panics
     /// If there is no such channel.
     ///
     /// # Source
-    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
-    /// validation; White (1980), Econometrica 48, 817–838, for the variance.
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+    /// model validation; White (1980), Econometrica 48, 817–838, for the variance.
     pub fn line_to_line(&self, channel: usize, first: usize) -> Option<Correlation> {
         let rows: Vec<usize> =
             self.ascending().into_iter().map(|line| self.row(line, channel)).collect();
@@ -268,9 +276,9 @@ impl SpectralResidual {
         correlation_of_lines(&residual, &explained, first)
     }
 
-    /// Correlation of the residual of each channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of
-    /// lags τ, multiples of [`SpectralResidual::lag`] around 0: up to 51, fewer where there are few lines.
-    /// `None` for a channel without residual, and if the force is zero.
+    /// Returns the correlation of the residual of each channel with a force, Re Σ F̄(l) r(l)
+    /// e^{iωτ}, at an odd number of lags τ, multiples of [`SpectralResidual::lag`] around 0: up to
+    /// 51, fewer with few lines. `None` for a channel without residual, and if the force is zero.
     ///
     /// # Panics
     /// If there is no such force.
@@ -284,7 +292,7 @@ impl SpectralResidual {
         let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
         let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
         for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
-            // From lag to lag by the same angle.
+            // The phase increases by the same angle from lag to lag.
             let turn = Complex::cis(omega * lag);
             let mut weight = f.conj() * Complex::cis(-omega * lag * lags as f64);
             for at in 0..weights.nrows() {
@@ -294,16 +302,18 @@ impl SpectralResidual {
                 weight *= turn;
             }
         }
-        // Residual and variance of channel c, the latter times the weights of the first lag.
+        // The left columns are the residuals of each channel, the right ones their variances times
+        // the weights of the first lag.
         let right = DMatrix::from_fn(2 * lines, 2 * dof, |at, column| {
             let row = self.row(at / 2, column % dof) + at % 2;
-            match column < dof {
-                true => self.values[row],
-                false => self.deviations[row].powi(2) * weights[(0, at)],
+            if column < dof {
+                self.values[row]
+            } else {
+                self.deviations[row].powi(2) * weights[(0, at)]
             }
         });
         let products = &weights * &right;
-        let of_channel = |channel: usize| {
+        let channel_correlation = |channel: usize| {
             let (sums, white) = (products.column(channel), products.column(dof + channel));
             let covariance = self.covariance(&weights, white, channel)?;
             let size = right.column(channel).norm() * forces.norm();
@@ -315,19 +325,20 @@ impl SpectralResidual {
                 p_value: share_above_of(sums.norm_squared(), mean, covariance.norm_squared()),
             })
         };
-        (0..dof).map(of_channel).collect()
+        (0..dof).map(channel_correlation).collect()
     }
 
-    /// Lag at which the correlation with a force is computed, in s: half a period of the highest line.
+    /// Returns the spacing of the lags of the correlation with a force, in s: half a period of the
+    /// highest line.
     pub fn lag(&self) -> f64 {
         PI / self.data.omega().iter().copied().fold(0.0, f64::max)
     }
 
-    /// Covariance A P Σ P Aᵀ of weighted sums A over the rows of a channel, with P = I − QQᵀ and the variances
-    /// Σ that the residuals show themselves. `white` is the first column of A Σ Aᵀ.
+    /// Returns the covariance A P Σ P Aᵀ of weighted sums A over the rows of a channel, with P = I
+    /// − QQᵀ and the variances Σ from the residuals. `white` is the first column of A Σ Aᵀ.
     ///
-    /// Real and imaginary part of a line have one variance, so that the entries of A Σ Aᵀ depend on the
-    /// distance of two lags alone.
+    /// Real and imaginary part of a line have the same variance; therefore the entries of A Σ Aᵀ
+    /// depend only on the distance of two lags.
     fn covariance(
         &self,
         weights: &DMatrix<f64>,
@@ -338,12 +349,12 @@ impl SpectralResidual {
         let mut covariance = DMatrix::from_fn(count, count, |a, b| white[a.abs_diff(b)]);
         if self.explained.ncols() > 0 {
             let row = |line| self.row(line, channel);
-            let places: Vec<usize> =
+            let rows: Vec<usize> =
                 (0..self.data.len()).map(row).flat_map(|row| [row, row + 1]).collect();
-            let mut explained = self.explained.select_rows(&places);
+            let mut explained = self.explained.select_rows(&rows);
             let loads = weights * &explained;
-            for (mut row, place) in explained.row_iter_mut().zip(&places) {
-                row *= self.deviations[*place].powi(2);
+            for (mut row, index) in explained.row_iter_mut().zip(&rows) {
+                row *= self.deviations[*index].powi(2);
             }
             let cross = weights * explained * loads.transpose();
             let inner = &loads * &self.explained_spread * loads.transpose();
@@ -353,7 +364,7 @@ impl SpectralResidual {
     }
 }
 
-/// Standard deviation of every residual before the parameters were fitted, from its own size.
+/// Standard deviation of every residual before the fit of the parameters, from its own size.
 fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
     let leverage = |row: usize| explained.row(row).norm_squared();
     let mut deviations = DVector::zeros(values.len());
@@ -372,7 +383,8 @@ mod tests {
 
     use super::*;
 
-    /// The correlations with a force are those of the sums written out: every product, and A P Σ P Aᵀ.
+    /// The correlations with a force are those of the sums written out: every product, and A P Σ P
+    /// Aᵀ.
     #[test]
     fn correlations_with_a_force_are_those_of_the_sums_written_out() {
         let (lines, dof) = (30, 2);

@@ -9,25 +9,26 @@ use super::finding::{Channel, Check, Finding, Names, Quantity};
 use super::limits::{RETURN, SPIKE};
 use super::{Subject, Verdict};
 
-/// One sample of a channel stands far outside its neighbours.
+/// Channel with one sample far outside its neighbours.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Spike {
-    /// The channel.
+    /// Affected channel.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub channel: Channel,
-    /// The sample, counted from 0 in the window.
+    /// Sample of the spike, counted from 0 in the window.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub sample: usize,
-    /// Second difference at the sample over the largest of the others (pure number).
+    /// Ratio of the second difference at the sample to the largest of the others (pure number).
     pub ratio: f64,
 }
 
 /// Finds the channels of a response (any unit) with one sample far outside its neighbours
-/// ([`Finding::Spike`]) where no force (N) has one: an error of the transmission, not a motion.
+/// ([`Finding::Spike`]) at a sample without a spike of a force (N): an error of the transmission,
+/// not a motion.
 ///
 /// # Source
-/// Ours: the largest second difference against the next that the same sample does not cause.
+/// Ours: the largest second difference compared with the next one that another sample causes.
 pub fn spiked_channels(quantity: Quantity, response: &Record, force: &Record) -> Vec<Finding> {
     let blows: Vec<usize> = (0..force.channels())
         .filter_map(|index| spike(force.channel(index)).map(|(sample, _)| sample))
@@ -40,13 +41,14 @@ pub fn spiked_channels(quantity: Quantity, response: &Record, force: &Record) ->
     (0..response.channels()).filter_map(one).collect()
 }
 
-/// Sample of a spike, and its second difference over the largest of the others.
+/// Returns the sample of a spike, and the ratio of its second difference to the largest of the
+/// others.
 fn spike(x: &[f64]) -> Option<(usize, f64)> {
     let bend: Vec<f64> = x.windows(3).map(|x| (x[1] - 0.5 * (x[0] + x[2])).abs()).collect();
     let largest = (0..bend.len()).max_by(|a, b| bend[*a].total_cmp(&bend[*b]))?;
-    let others = (0..bend.len()).filter(|at| at.abs_diff(largest) > 1).map(|at| bend[at]);
-    let next = others.fold(0.0, f64::max);
-    // After a jump, as of an acceleration under a blow, the channel does not return at once.
+    let remaining = (0..bend.len()).filter(|at| at.abs_diff(largest) > 1).map(|at| bend[at]);
+    let next = remaining.fold(0.0, f64::max);
+    // A jump, for example of an acceleration under an impact, does not return at the next sample.
     let returns = (x[largest + 2] - x[largest]).abs() < RETURN * bend[largest];
     let is_spike = next > 0.0 && bend[largest] > SPIKE * next && returns;
     is_spike.then(|| (largest + 1, bend[largest] / next))

@@ -1,4 +1,4 @@
-//! Symmetry of the mass matrix, and of damping and stiffness but for gains.
+//! Symmetry of the mass matrix.
 
 use std::fmt::{self, Formatter};
 
@@ -12,32 +12,34 @@ use super::limits::ASYMMETRY;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
-/// Tells how far the estimated mass matrix is from a symmetric one; `None` where no two masses could differ.
+/// Tests the symmetry of the estimated mass matrix; `None` if no two entries can differ.
 ///
-/// The kinetic energy ½ ẋᵀMẋ has a symmetric M, whatever bearings, gyroscopic forces and controls make of C and K: an M
-/// that is not symmetric says that forces and displacements are not those of the same points and directions.
+/// The kinetic energy ½ ẋᵀMẋ has a symmetric M, also with bearings, gyroscopic forces and controls,
+/// which make C and K non-symmetric. An M that is not symmetric shows that forces and displacements
+/// do not belong to the same points and directions.
 ///
-/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by as many standard errors:
-/// two-sided, Student's t times the number of pairs.
+/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by as many
+/// standard errors: two-sided, Student's t times the number of pairs.
 ///
 /// # Source
-/// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is ours.
+/// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is
+/// ours.
 pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
     let (n, unknowns) = (estimate.dof(), estimate.unknowns());
     let freedom = estimate.degrees_of_freedom();
     if unknowns.is_symmetric(Matrix::Mass) || freedom == 0 {
         return None;
     }
-    let mut places = vec![None; n * n];
+    let mut indices = vec![None; n * n];
     for (at, p) in unknowns.free().iter().enumerate().filter(|(_, p)| p.matrix() == Matrix::Mass) {
-        places[p.row() * n + p.column()] = Some(at);
+        indices[p.row() * n + p.column()] = Some(at);
     }
     let (mass, spread) = (estimate.mass(), estimate.spread());
     let student = StudentsT::new(0.0, 1.0, freedom as f64).expect("positive degrees of freedom");
     let mut pairs = 0;
     let mut worst: Option<(f64, Finding)> = None;
     for (i, j) in (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))) {
-        let free = [places[i * n + j], places[j * n + i]];
+        let free = [indices[i * n + j], indices[j * n + i]];
         let variance = match free {
             [None, None] => continue,
             [Some(one), None] | [None, Some(one)] => spread.variance_of(one),
@@ -76,21 +78,21 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
     Some(finding)
 }
 
-/// Difference of two masses that the kinetic energy makes equal.
+/// Difference of two mirrored entries of M, which are equal in the kinetic energy.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MassSymmetry {
-    /// Degree of freedom of the row of the one, and of the column of the other.
+    /// Degree of freedom of the row of `above`, and of the column of `below`.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub row: usize,
-    /// Degree of freedom of the column of the one, and of the row of the other.
+    /// Degree of freedom of the column of `above`, and of the row of `below`.
     #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
     pub column: usize,
     /// Entry (`row`, `column`) of M, in kg.
     pub above: f64,
     /// Entry (`column`, `row`) of M, in kg.
     pub below: f64,
-    /// Standard error of their difference, in kg.
+    /// Standard error of the difference, in kg.
     pub standard_error: f64,
     /// Probability that noise alone makes any two such entries differ as much.
     #[cfg_attr(feature = "serde", serde(flatten))]

@@ -1,4 +1,4 @@
-//! Periods whose force differs, and the response with it.
+//! Periods with different forces and, consequently, different responses.
 
 use std::fmt::{self, Formatter};
 
@@ -17,16 +17,16 @@ use super::limits::{PERIOD_SCATTER_DOUBTFUL, STRONG_LINE};
 use super::period_scatter::deviation_of_periods;
 use super::{Subject, Verdict};
 
-/// The force differs from period to period, and the response with it.
+/// Force that differs from period to period, with a response that follows.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct UnequalPeriods {
-    /// Largest RMS deviation of a period over the RMS of the force (pure number).
+    /// Largest RMS deviation of a period, relative to the RMS of the force (pure number).
     pub fraction: f64,
 }
 
-/// Whether the force differs from period to period by more than noise of its channel, which no response
-/// would follow.
+/// Tests whether the force differs from period to period by more than the noise of its channel; a
+/// response does not follow such noise.
 pub(super) fn unequal_periods(
     force: &Record,
     response: &Record,
@@ -42,27 +42,31 @@ pub(super) fn unequal_periods(
     let amplitude = |line: usize, channel: usize| -> f64 { spectrum.line(line, channel).norm() };
     let strongest =
         |channel: usize| lines.iter().map(|line| amplitude(*line, channel)).fold(0.0, f64::max);
-    let of_channels: Vec<(usize, f64)> =
+    let channels: Vec<(usize, f64)> =
         (0..force.channels()).map(|c| (c, strongest(c))).filter(|(_, s)| *s > 0.0).collect();
     let is_strong = |line: &usize| {
-        of_channels.iter().any(|(c, strongest)| amplitude(*line, *c) > STRONG_LINE * strongest)
+        channels.iter().any(|(c, strongest)| amplitude(*line, *c) > STRONG_LINE * strongest)
     };
     let chosen = Lines::new(mean.sampling(), lines.iter().copied().filter(is_strong))?;
-    let acting: Vec<usize> = of_channels.iter().map(|(channel, _)| *channel).collect();
-    let apart = |record: &Record, channels: &[usize]| -> Result<Record, EstimateError> {
+    let acting: Vec<usize> = channels.iter().map(|(channel, _)| *channel).collect();
+    let deviations = |record: &Record, channels: &[usize]| -> Result<Record, EstimateError> {
         let mean = record.period_mean(period)?;
         let data = DMatrix::from_fn(record.len(), channels.len(), |k, at| {
             record.data()[(k, channels[at])] - mean.data()[(k % period, channels[at])]
         });
         Ok(Record::new(record.sampling(), data)?)
     };
-    let all: Vec<usize> = (0..response.channels()).collect();
-    // Whatever was measured: a share of power has no unit.
+    let responses: Vec<usize> = (0..response.channels()).collect();
+    // Any quantity gives the same result: a share of power has no unit.
     let quantity = ResponseQuantity::Displacement;
-    let mut average =
-        FrfAverage::new(chosen, [acting.len(), all.len()], quantity, Segments::Periods(period))?;
-    average.push(&apart(force, &acting)?, &apart(response, &all)?)?;
-    // The mean was taken off.
+    let mut average = FrfAverage::new(
+        chosen,
+        [acting.len(), responses.len()],
+        quantity,
+        Segments::Periods(period),
+    )?;
+    average.push(&deviations(force, &acting)?, &deviations(response, &responses)?)?;
+    // The mean has been subtracted.
     let independent = average.pieces().saturating_sub(1);
     let follows = average.response_follows(independent as f64);
     Ok(follows.then_some(Finding::UnequalPeriods(UnequalPeriods { fraction })))

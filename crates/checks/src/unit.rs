@@ -12,9 +12,9 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Unit {
-    /// The column, in words.
+    /// Description of the column.
     pub column: String,
-    /// The text, as it is written.
+    /// Text in the header.
     pub text: String,
     /// Factor that it makes or would make, in SI units per unit of the column; `None` if it is not
     /// understood.
@@ -65,7 +65,7 @@ impl Check for Unit {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TimeUnit {
-    /// The column, in words.
+    /// Description of the column.
     pub column: String,
     /// Sampling rate of instants in seconds, in Hz.
     pub rate_hz: f64,

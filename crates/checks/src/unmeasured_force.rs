@@ -1,4 +1,4 @@
-//! Motion that a fit takes for the response to forces that were not measured.
+//! Share of the response that a fit attributes to unmeasured forces.
 
 use std::fmt::{self, Formatter};
 
@@ -7,11 +7,11 @@ use super::finding::{Check, Names};
 use super::limits::UNMEASURED_FORCE;
 use super::{Subject, Verdict};
 
-/// Motion that a fit leaves and takes for the response to forces that were not measured.
+/// Residual of a fit that is attributed to unmeasured forces.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct UnmeasuredForce {
-    /// Part of the motion (ratio of RMS values).
+    /// Share of the response (ratio of RMS values).
     pub fraction: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Responses of which the force explains no more than chance does.
+//! Responses that are unrelated to the force.
 
 use std::fmt::{self, Formatter};
 
@@ -9,33 +9,35 @@ use super::finding::{Check, Finding, Names};
 use super::limits::SIGNIFICANCE;
 use super::{Subject, Verdict};
 
-/// The response does not follow the force: a fit explains as little of it as it would of noise.
+/// Response that does not follow the force: a fit explains no more of it than of noise.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Unrelated {
-    /// Part of the power of the response that the fit explains, a ratio.
+    /// Share of the power of the response that the fit explains.
     pub explained: f64,
-    /// Bound on the probability that it explains as much of a response that has nothing to do with the force.
+    /// Upper bound of the probability that a fit explains as much of a response unrelated to the
+    /// force.
     pub p_value: f64,
 }
 
-/// Finds a response that does not follow the force ([`Finding::Unrelated`]) by what a fit of `unknowns` parameters to
-/// `equations` real equations (each of one degree of freedom) leaves, `unexplained` (ratio of RMS values); `None` where
-/// the response follows.
+/// Finds a response that does not follow the force ([`Finding::Unrelated`]) from the residual,
+/// `unexplained` (ratio of RMS values), of a fit of `unknowns` parameters to `equations` real
+/// equations (each of one degree of freedom); `None` if the response follows.
 ///
-/// The F test of the regression, times the number of lines: a fit looks for the resonance among all of them.
+/// F test of the regression, times the number of lines: a fit can place the resonance at any of
+/// them.
 ///
 /// # Source
 /// Draper & Smith, *Applied Regression Analysis*, 3rd ed. (1998), chapter 1; Bonferroni's bound.
 pub fn unrelated_response(unexplained: f64, equations: usize, unknowns: usize) -> Option<Finding> {
     let freedom = equations.checked_sub(unknowns).filter(|spare| *spare > 0 && unknowns > 0)?;
     let (freedom, unknowns) = (freedom as f64, unknowns as f64);
-    let left = unexplained * unexplained;
-    let explained = (1.0 - left).max(0.0);
-    if !left.is_finite() || left == 0.0 {
+    let residual_power = unexplained * unexplained;
+    let explained = (1.0 - residual_power).max(0.0);
+    if !residual_power.is_finite() || residual_power == 0.0 {
         return None;
     }
-    let ratio = (explained / unknowns) / (left / freedom);
+    let ratio = (explained / unknowns) / (residual_power / freedom);
     let lines = 0.5 * equations as f64;
     let tail = FisherSnedecor::new(unknowns, freedom).ok()?.sf(ratio);
     let p_value = (lines * tail).min(1.0);

@@ -1,4 +1,5 @@
-//! Residuals of spectra weighted by their covariance, with what other parameters explain of them.
+//! Residuals of spectra weighted by their covariance, without the part that other parameters
+//! explain.
 
 use mechid_estimate::Relations;
 use mechid_estimate::frequency_domain::Whitened;
@@ -29,32 +30,36 @@ use super::spectral_residual::SpectralResidual;
 pub struct AfterSpectralFit {
     /// Residual of each record.
     pub records: Vec<SpectralResidual>,
-    /// Test for a bias of the estimate ([`Finding::Bias`]); `None` where a record states no noise or the
-    /// standard errors of the estimate are not known.
+    /// Test for a bias of the estimate ([`Finding::Bias`]); `None` if a record states no noise or
+    /// the standard errors of the estimate are unknown.
     pub bias: Option<Finding>,
 }
 
-/// Weights the residuals of a fit of spectra by their own covariance, and tests the estimate for a bias.
+/// Weights the residuals of a fit of spectra by their own covariance, and tests the estimate for a
+/// bias.
 ///
-/// The covariance follows from the noise of force and response that the data state. Of the weighted
-/// residual, the part that other parameters explain is removed by a few Gauss–Newton steps of maximum
-/// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
-/// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
-/// parameters together and the one that changes most alone.
-/// All residuals are weighted as white noise on the response, beside that of the forces if the data know it, where a
-/// record states no noise, or only rounding.
+/// The covariance follows from the noise of force and response that the data state. A few
+/// Gauss–Newton steps of maximum likelihood remove the part of the weighted residual that other
+/// parameters explain: the tests of [`SpectralResidual::findings`] then concern the model and not
+/// the estimator. The bias of the estimator has a separate test: the sum of these steps relative to
+/// the standard errors of the estimate, for all parameters together and for the one with the
+/// largest change. If a record states no noise, or only rounding, all residuals are weighted as for
+/// white noise on the response, plus the stated noise of the forces.
 ///
-/// The noise of an open record begins and ends at values that differ: that jump, which ties low lines together, is left
-/// out of the tests. The data are those whose own ends are taken off. So is what the response to an unmeasured force
-/// leaves at the ends of several periods, where the noise is found to be one.
+/// Noise in an open record has different values at its two ends; this step correlates the low lines
+/// and is projected out of the tests. The transients of the response have been subtracted from the
+/// data. The transients of the response to an unmeasured force in several periods are projected
+/// out, too, if the noise is such a response.
 ///
 /// # Errors
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the estimate has another number of degrees of freedom than the data.
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the estimate has another number
+/// of degrees of freedom than the data.
 ///
 /// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on maximum
-/// likelihood and on model validation; Hausman (1978), Econometrica 46, 1251–1271, for the bias, here
-/// with the covariance of the estimate, which is an upper bound of that of the difference.
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
+/// maximum likelihood and on model validation; Hausman (1978), Econometrica 46, 1251–1271, for the
+/// bias, here with the covariance of the estimate, an upper bound of the covariance of the
+/// difference.
 pub fn after_spectral_fit(
     records: &[FrequencyData],
     estimate: &Estimate,
@@ -64,7 +69,7 @@ pub fn after_spectral_fit(
         let what = "degrees of freedom of the data";
         check_size(what, data.dof(), estimate.dof())?;
     }
-    let Some(fit) = WeightedFit::of(records, estimate, extent) else {
+    let Some(fit) = WeightedFit::new(records, estimate, extent) else {
         return Ok(AfterSpectralFit { records: Vec::new(), bias: None });
     };
     let bias = if fit.noise_stated { fit.bias(estimate) } else { None };
@@ -83,16 +88,16 @@ struct WeightedFit {
 /// Weighted residuals of all records, and their sensitivities in an orthonormal basis.
 struct Linearised {
     weighted: Vec<Whitened>,
-    /// Combinations of parameters, one per column, that change the residuals by orthonormal columns.
+    /// Combinations of parameters, one per column, whose effects on the residuals are orthonormal.
     basis: DMatrix<f64>,
-    /// Orthonormal columns that the parameters explain.
+    /// Orthonormal columns that span the effect of the parameters.
     explained: Vec<DMatrix<f64>>,
     /// Scalar products of the residuals with those columns.
     coefficients: DVector<f64>,
 }
 
 impl Linearised {
-    fn of(weighted: Vec<Whitened>) -> Option<Self> {
+    fn new(weighted: Vec<Whitened>) -> Option<Self> {
         let basis = orthonormal_basis(&weighted)?;
         let explained: Vec<DMatrix<f64>> =
             weighted.iter().map(|record| &record.sensitivity * &basis).collect();
@@ -102,11 +107,11 @@ impl Linearised {
         Some(Self { weighted, basis, explained, coefficients })
     }
 
-    /// Residuals of which the parameters are taken to explain nothing.
+    /// Creates residuals without the effect of the parameters.
     fn without_sensitivity(weighted: Vec<Whitened>, parameters: usize) -> Self {
-        let nothing = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
+        let no_columns = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
         Self {
-            explained: weighted.iter().map(nothing).collect(),
+            explained: weighted.iter().map(no_columns).collect(),
             weighted,
             basis: DMatrix::zeros(parameters, 0),
             coefficients: DVector::zeros(0),
@@ -117,22 +122,22 @@ impl Linearised {
         self.weighted.iter().map(|record| record.residual.norm_squared()).sum()
     }
 
-    /// Gauss–Newton step of the parameters.
+    /// Returns the Gauss–Newton step of the parameters.
     fn step(&self) -> DVector<f64> {
         &self.basis * &self.coefficients
     }
 }
 
-/// Records of a fit with what weighs their residuals.
+/// Records of a fit with the weights of their residuals.
 pub(super) struct Weighing<'a> {
     records: &'a [FrequencyData],
     estimate: &'a Estimate,
     relations: Option<Relations>,
     /// Noise that every record states; `None` if one of them does not.
     noise: Option<Vec<&'a NoiseSpectrum>>,
-    /// Levels of white noise, where none is stated.
+    /// Levels of white noise, used if no noise is stated.
     levels: Vec<f64>,
-    /// Few enough sensitivities to be found.
+    /// `true` if the number of sensitivities is within the limits.
     small: bool,
     extent: Extent,
 }
@@ -164,7 +169,7 @@ impl<'a> Weighing<'a> {
         self.estimate.parameters().map(|p| p.value).collect()
     }
 
-    /// Returns the parameters that the estimate has.
+    /// Returns the estimated parameters.
     fn start(&self) -> DVector<f64> {
         match &self.relations {
             None => DVector::from_vec(self.entries()),
@@ -190,28 +195,31 @@ impl<'a> Weighing<'a> {
         let (entries, unknowns) = (&self.entries_of(values), self.estimate.unknowns());
         let one = |(at, data): (usize, &FrequencyData)| {
             let covariance = |row: usize| self.covariance(at, row);
-            match self.small {
-                true => Whitened::new(data, unknowns, entries, covariance),
-                false => Whitened::residual_of(data, unknowns, entries, covariance),
+            if self.small {
+                Whitened::new(data, unknowns, entries, covariance)
+            } else {
+                Whitened::residual_of(data, unknowns, entries, covariance)
             }
         };
         let weighted = self.records.iter().enumerate().map(one).collect::<Option<_>>()?;
-        match self.small {
-            true => Linearised::of(weighted),
-            false => Some(Linearised::without_sensitivity(weighted, values.len())),
+        if self.small {
+            Linearised::new(weighted)
+        } else {
+            Some(Linearised::without_sensitivity(weighted, values.len()))
         }
     }
 
-    /// Returns the weighted residual of other data of a record, of the estimate.
+    /// Returns the weighted residual of the estimate for modified data of a record.
     pub(super) fn residual_of(&self, at: usize, data: &FrequencyData) -> Option<DVector<f64>> {
         let (entries, unknowns) = (DVector::from_vec(self.entries()), self.estimate.unknowns());
         let covariance = |row: usize| self.covariance(at, row);
         Some(Whitened::residual_of(data, unknowns, &entries, covariance)?.residual)
     }
 
-    /// Returns the least power of the residual of other data of the same records, in the weights of these.
+    /// Returns the minimum residual power for modified data of the same records, with unchanged
+    /// weights.
     pub(super) fn least_power(&self, records: &[FrequencyData]) -> Option<f64> {
-        let other = Weighing {
+        let modified = Weighing {
             records,
             estimate: self.estimate,
             relations: Relations::from_unknowns(self.estimate.unknowns()),
@@ -220,7 +228,7 @@ impl<'a> Weighing<'a> {
             small: self.small,
             extent: self.extent,
         };
-        let (_, linear) = other.settled()?;
+        let (_, linear) = modified.settled()?;
         Some(linear.power() - linear.coefficients.norm_squared())
     }
 
@@ -233,7 +241,7 @@ impl<'a> Weighing<'a> {
             if linear.coefficients.norm_squared() <= FIT_SETTLED * unit {
                 break;
             }
-            // Half a step where a whole one goes too far.
+            // A shorter step is used if the full step increases the power.
             let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
                 let values = &values + linear.step() * *length;
                 let next = self.linearised(&values)?;
@@ -245,11 +253,11 @@ impl<'a> Weighing<'a> {
         Some((values, linear))
     }
 
-    /// Returns what the ends of a record leave in its residual: jumps of an open record, loads of periods whose noise
-    /// is the response to an unmeasured force.
+    /// Returns the effect of the ends of a record on its residual: steps of an open record, or
+    /// transients of periods whose noise is the response to an unmeasured force.
     fn jumps(&self, at: usize, values: &DVector<f64>) -> Vec<DVector<f64>> {
         let entries = self.entries_of(values);
-        let seen = |data: FrequencyData| {
+        let weighted = |data: FrequencyData| {
             let covariance = |row| self.covariance(at, row);
             Whitened::residual_of(&data, self.estimate.unknowns(), &entries, covariance)
         };
@@ -262,10 +270,11 @@ impl<'a> Weighing<'a> {
             }
             Extent::WholePeriod => Vec::new(),
         };
-        jumps.into_iter().filter_map(seen).map(|jump| jump.residual).collect()
+        jumps.into_iter().filter_map(weighted).map(|jump| jump.residual).collect()
     }
 
-    /// Returns the residual of a record, of which the parameters explain some columns.
+    /// Returns the residual of a record, given its values and the columns that the parameters
+    /// explain.
     fn residual(
         &self,
         at: usize,
@@ -277,19 +286,19 @@ impl<'a> Weighing<'a> {
         let is_noise = self.extent == Extent::WholePeriod && has_unmeasured_force(data);
         let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
         let (values, explained) = without(jumps, values, explained);
-        let of_force = if is_stated { None } else { force_decides(data, self.estimate) };
+        let force_noise = if is_stated { None } else { force_decides(data, self.estimate) };
         let likely =
             system.and_then(|system| likely_force(data, system, |row| self.covariance(at, row)));
         SpectralResidual::new(data.clone(), is_stated, values, explained)
             .with_ends(with_ends)
-            .of_rounding(is_rounding(data, &self.levels))
-            .with_force_decides(of_force)
+            .with_rounding(is_rounding(data, &self.levels))
+            .with_force_decides(force_noise)
             .with_likely_force(likely)
     }
 }
 
 impl WeightedFit {
-    fn of(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
+    fn new(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
         let weighing = Weighing::new(records, estimate, extent)?;
         let (values, linear) = weighing.settled()?;
         let end = &values + linear.step();
@@ -299,9 +308,9 @@ impl WeightedFit {
         let Linearised { weighted, explained, coefficients, .. } = linear;
         let residuals = weighted.into_iter().zip(explained).enumerate();
         let residuals = residuals.map(|(at, (weighted, explained))| {
-            let left = weighted.residual - &explained * &coefficients;
+            let remainder = weighted.residual - &explained * &coefficients;
             let jumps = weighing.jumps(at, &values);
-            weighing.residual(at, system.as_ref(), &jumps, (left, explained))
+            weighing.residual(at, system.as_ref(), &jumps, (remainder, explained))
         });
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
@@ -321,13 +330,12 @@ impl WeightedFit {
         let (scale, change) = (DVector::from_vec(errors), self.step.as_ref()?);
         let step = change.component_div(&scale);
         let count = scale.len() as f64;
-        let together = match estimate.unknowns().is_related() {
-            false => {
-                let statistic = estimate.squared_length(change)?;
-                ChiSquared::new(count).expect("at least one parameter").sf(statistic)
-            }
-            // Entries that follow from others have no inverse of their covariance.
-            true => 1.0,
+        let together = if estimate.unknowns().is_related() {
+            // Related entries have a singular covariance.
+            1.0
+        } else {
+            let statistic = estimate.squared_length(change)?;
+            ChiSquared::new(count).expect("at least one parameter").sf(statistic)
         };
         let largest = step.iamax();
         let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
@@ -343,8 +351,9 @@ impl WeightedFit {
     }
 }
 
-/// The most likely forces, rows × n, of a machine of which displacements and forces have the noise of a covariance:
-/// F − Cov(F, e) Var(e)⁻¹ e of the residual e = X − G F. `None` where the forces have none.
+/// Returns the most likely forces, rows × n, for noise of this covariance on displacements and
+/// forces: F − Cov(F, e) Var(e)⁻¹ e with the residual e = X − G F. `None` if the forces have no
+/// noise.
 ///
 /// # Source
 /// Fuller, *Measurement Error Models* (1987), section 1.2.3 (true values given the observations).
@@ -358,8 +367,8 @@ fn likely_force(
     let mut is_exact = true;
     for (row, omega) in data.omega().iter().enumerate() {
         let covariance = covariance(row);
-        let of_force = covariance.view((n, n), (n, n));
-        if of_force.iter().all(|entry| *entry == Complex::ZERO) {
+        let force_covariance = covariance.view((n, n), (n, n));
+        if force_covariance.iter().all(|entry| *entry == Complex::ZERO) {
             continue;
         }
         is_exact = false;
@@ -367,7 +376,7 @@ fn likely_force(
         let force = data.force().row(row).transpose();
         let residual = data.displacement().row(row).transpose() - &receptance * &force;
         let both = covariance.view((n, 0), (n, n));
-        let with_residual = both - of_force * receptance.adjoint();
+        let with_residual = both - force_covariance * receptance.adjoint();
         let variance = covariance.view((0, 0), (n, n))
             - both.adjoint() * receptance.adjoint()
             - &receptance * &with_residual;
@@ -377,15 +386,15 @@ fn likely_force(
     (!is_exact).then_some(likely)
 }
 
-/// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
-/// stated noise of the forces, the most likely one.
+/// Returns the level of white noise of each channel in the measured quantity, over all records: the
+/// RMS residual or, with stated noise of the forces, the most likely level.
 fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
-    let each = residuals(records, estimate)?;
-    Some(each.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+    let pairs_by_channel = residuals(records, estimate)?;
+    Some(pairs_by_channel.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
 }
 
-/// Power of the residual of each channel in the quantity measured, with the variance that the noise of the forces
-/// makes of it, over all records.
+/// Returns the residual power of each channel in the measured quantity, with its variance by force
+/// noise, over all records.
 fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
     let system = estimate.system().ok()?;
     let mut residuals = vec![Vec::new(); system.dof()];
@@ -405,9 +414,9 @@ fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(
     Some(residuals)
 }
 
-/// Power of the residual over that of the noise, on the lines on which that of the forces decides, with the
-/// probability of so little times the number of channels; of the channel where it is least probable. `None` where
-/// no noise of the forces is stated, or where it decides on too few lines.
+/// Returns the ratio of residual power to noise power on the lines where force noise dominates, and
+/// the probability of a ratio as small times the number of channels, for the channel with the
+/// smallest probability. `None` if no force noise is stated, or if it dominates on too few lines.
 fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
     if data.force_variance().iter().all(|variance| *variance == 0.0) {
         return None;
@@ -415,13 +424,13 @@ fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)
     let residuals = residuals(std::slice::from_ref(data), estimate)?;
     let channels = residuals.len() as f64;
     let fitted = estimate.parameters().len() as f64 / channels + FIT_LOADS;
-    let of_channel = |pairs: Vec<(f64, f64)>| {
-        let own = motion_level(pairs.iter().copied()).powi(2);
-        let decided = pairs.iter().filter(|(_, known)| *known > FIT_DECIDES * own);
+    let channel_test = |pairs: Vec<(f64, f64)>| {
+        let level = motion_level(pairs.iter().copied()).powi(2);
+        let decided = pairs.iter().filter(|(_, known)| *known > FIT_DECIDES * level);
         let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
-            (count + 1.0, over + power / (own + known))
+            (count + 1.0, over + power / (level + known))
         });
-        // A sum of squares of complex numbers has two degrees of freedom each.
+        // Each squared complex number has two degrees of freedom.
         let free = 2.0 * count - fitted;
         if free < FREE_RESIDUALS {
             return None;
@@ -429,7 +438,7 @@ fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)
         let below = ChiSquared::new(free).ok()?.cdf(2.0 * over);
         Some((2.0 * over / free, (channels * below).min(1.0)))
     };
-    residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
+    residuals.into_iter().filter_map(channel_test).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Returns whether the residual of every channel is rounding.
@@ -445,23 +454,24 @@ fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
     levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
 }
 
-/// Covariance of displacement and force for white noise of these levels on the quantity measured, and what noise of
-/// the forces is stated.
+/// Returns the covariance of displacement and force for white noise of these levels on the measured
+/// quantity, and the stated noise of the forces.
 fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
     let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
     let scale = data.measured().per_displacement(data.omega()[row]).norm();
-    // A channel without any residual must not take all the weight.
+    // The minimum level prevents an infinite weight of a channel without residual.
     let least = levels.iter().copied().fold(0.0, f64::max) * 1e-6;
     for (channel, level) in levels.iter().enumerate().take(n) {
         let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
         covariance[(channel, channel)] = Complex::from(level * level);
-        let of_force = data.force_variance()[(row, channel)];
-        covariance[(n + channel, n + channel)] = Complex::from(of_force);
+        let force_variance = data.force_variance()[(row, channel)];
+        covariance[(n + channel, n + channel)] = Complex::from(force_variance);
     }
     covariance
 }
 
-/// B for which J B of the stacked sensitivities J has orthonormal columns that span those of J.
+/// Returns B such that J B, for the stacked sensitivities J, has orthonormal columns with the span
+/// of J.
 fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
     let parameters = records.first()?.sensitivity.ncols();
     let mut factor = TriangularFactor::new(parameters);
@@ -477,7 +487,8 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
             column /= length;
         }
     }
-    // Without dependent parameters the triangle alone tells, in a fraction of the time.
+    // The inverse of the triangular factor suffices without dependent parameters, in a fraction of
+    // the time.
     if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
         && r.norm() * inverse.norm() * FIT_RANK < 1.0
     {
@@ -487,20 +498,20 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
     }
     let svd = svd(r).ok()?;
     let (singular, v_t) = (&svd.singular_values, svd.v_t.as_ref()?);
-    let kept: Vec<usize> =
+    let retained: Vec<usize> =
         (0..parameters).filter(|at| singular[*at] > FIT_RANK * singular.max()).collect();
-    Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
-        v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
+    Some(DMatrix::from_fn(parameters, retained.len(), |row, column| {
+        v_t[(retained[column], row)] / (singular[retained[column]] * scale[row])
     }))
 }
 
 /// Returns whether the noise of a record is the response to an unmeasured force.
 fn has_unmeasured_force(data: &FrequencyData) -> bool {
-    let of_force = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
-    data.noise().is_some_and(|noise| noise.models().iter().any(of_force))
+    let by_force = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+    data.noise().is_some_and(|noise| noise.models().iter().any(by_force))
 }
 
-/// Leaves some `parts` out of the values, and adds them to the orthonormal columns that are explained.
+/// Projects `parts` out of the values, and adds them to the orthonormal explained columns.
 fn without(
     parts: &[DVector<f64>],
     mut values: DVector<f64>,
@@ -511,9 +522,9 @@ fn without(
         for _ in 0..2 {
             column -= &explained * explained.tr_mul(&column);
         }
-        let left = column.norm();
-        if left > FIT_RANK.sqrt() {
-            column.unscale_mut(left);
+        let length = column.norm();
+        if length > FIT_RANK.sqrt() {
+            column.unscale_mut(length);
             values.axpy(-column.dot(&values), &column, 1.0);
             let at = explained.ncols();
             explained = explained.insert_column(at, 0.0);

@@ -10,17 +10,17 @@ use super::{Subject, Verdict};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Whiteness {
-    /// The residual.
+    /// Tested residual.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub residual: Residual,
-    /// Numbers of the test.
+    /// Result of the test.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub test: CorrelationTest,
-    /// The residual is correlated as far as noise on the response does it, and no further.
+    /// Lags over which noise on the response correlates the residual, if it is uncorrelated beyond.
     pub span: Option<NoiseSpan>,
 }
 
-/// A residual that is tested for whiteness.
+/// Residual that is tested for whiteness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "serde",
@@ -48,7 +48,7 @@ pub enum Residual {
         /// Degree of freedom of the force.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
         force: usize,
-        /// Smallest distance of the lines correlated.
+        /// Smallest distance of the correlated lines.
         distance: usize,
     },
 }
@@ -61,7 +61,7 @@ pub struct NoiseSpan {
     pub lags: usize,
     /// Autocorrelation at lag 1 (pure number).
     pub first_coefficient: f64,
-    /// Numbers of the test beyond those lags.
+    /// Result of the test beyond those lags.
     pub beyond: CorrelationTest,
 }
 
