@@ -14,6 +14,8 @@ pub struct Judged {
     pub scatter: f64,
     /// The same of the worst parameter.
     pub worst_scatter: f64,
+    /// Mean error, in standard errors of the mean, of the parameter where it is largest.
+    pub bias: f64,
     /// Number of experiments whose search failed.
     pub failed: usize,
 }
@@ -29,16 +31,19 @@ pub fn judge(
     let estimates: Vec<LikelihoodEstimate> = estimates.into_iter().flatten().collect();
     let runs = estimates.len() as f64;
     let (mut held, mut scatter): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut bias = 0.0_f64;
     for (name, truth) in truth {
-        let (mut inside, mut errors, mut variances) = (0.0, 0.0_f64, 0.0_f64);
+        let (mut inside, mut errors, mut variances, mut sum) = (0.0, 0.0_f64, 0.0_f64, 0.0_f64);
         for estimate in &estimates {
             let p = estimate.parameter(name).unwrap();
             inside += f64::from(u8::from((p.interval[0]..=p.interval[1]).contains(truth)));
             errors += (p.value - truth).powi(2);
+            sum += p.value - truth;
             variances += p.standard_error.map_or(0.0, |error| error * error);
         }
         held.push(inside / runs);
         scatter.push((errors / variances).sqrt());
+        bias = bias.max((sum / variances.sqrt()).abs());
     }
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
     Judged {
@@ -46,6 +51,7 @@ pub fn judge(
         worst: held.iter().copied().fold(1.0, f64::min),
         scatter: mean(&scatter.iter().map(|s| s * s).collect::<Vec<_>>()).sqrt(),
         worst_scatter: scatter.iter().copied().fold(0.0, f64::max),
+        bias,
         failed,
     }
 }
