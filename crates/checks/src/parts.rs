@@ -1,9 +1,9 @@
-//! Agreement of parts of the data about the parameters.
+//! Agreement of the parts of the data about the parameters.
 
 use std::fmt::{self, Display, Formatter};
 
 use mechid_estimate::frequency_domain::{self, PartsComparison, PartsOfFit, Split};
-use mechid_model::Parameter;
+use mechid_estimate::likelihood::LikelihoodEstimate;
 
 use super::digits::{line_hz, six_digits, three_digits};
 use super::finding::{Check, Names};
@@ -12,33 +12,30 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 use crate::Finding;
 
-/// Difference of the parameters between parts of the data: records, bands of lines, stretches of
-/// time.
+/// Difference of the parts of the data about the parameters: records, bands of lines, stretches of time.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
     /// Probability that noise alone makes the parts of any split differ as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// Part with the largest difference from the others.
+    /// The part that differs most from the others.
     pub part: DataPart,
-    /// Parameter with the largest difference.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
-    pub parameter: Parameter,
+    /// Name of the parameter in which it does.
+    pub parameter: String,
     /// Value by the part (unit of the parameter).
     pub by_part: f64,
     /// Value by the other parts (unit of the parameter).
     pub by_others: f64,
     /// Standard error of the difference by the noise alone (unit of the parameter).
     pub standard_error: f64,
-    /// Ratio of the standard errors from the scatter of the parts to those from the noise (pure
-    /// number).
+    /// Factor by which the scatter of the parts makes standard errors larger than the noise does (pure number).
     pub scatter: f64,
-    /// Number of independent differences of the parts in that ratio.
+    /// Number of independent differences of the parts behind that factor.
     pub degrees_of_freedom: usize,
 }
 
-/// Part of the data of a fit.
+/// A part of the data of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -46,7 +43,7 @@ pub struct PartsAgreement {
     serde(tag = "split", rename_all = "snake_case")
 )]
 pub enum DataPart {
-    /// One of several records, or one of the hits of a hammer test.
+    /// One of several records, or of the hits of a hammer test.
     Records {
         /// Number of the record.
         #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::from_one"))]
@@ -85,12 +82,11 @@ pub enum RowParts {
     Halves,
 }
 
-/// Tests whether the parts of the data agree about the parameters of a fit
-/// ([`Finding::PartsAgreement`]), with one error rate for all `splits`. `None` if no split is
-/// possible.
+/// Tests whether the parts of the data agree about the parameters of a fit ([`Finding::PartsAgreement`]), with one error
+/// rate for all `splits`. `None` where no split can be made.
 ///
 /// # Source
-/// As [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
+/// That of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.
 pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) -> Option<Finding> {
     let compared = splits.iter().filter_map(|(split, rows)| Some((fit.compare(split)?, *rows)));
     let compared: Vec<(PartsComparison, RowParts)> = compared.collect();
@@ -104,12 +100,28 @@ pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) ->
     Some(Finding::PartsAgreement(PartsAgreement {
         p_value: PValue::of((count * worst.p_value).min(1.0)),
         part: DataPart::new(difference.part, rows),
-        parameter: difference.parameter,
+        parameter: difference.parameter.to_string(),
         by_part: difference.by_part,
         by_others: difference.by_others,
         standard_error: difference.standard_error,
         scatter,
         degrees_of_freedom,
+    }))
+}
+
+/// Returns the agreement of records and bands of lines about the unknowns of a machine
+/// ([`Finding::PartsAgreement`]); `None` where they were not compared.
+pub(crate) fn agreement_of_lines(likelihood: &LikelihoodEstimate) -> Option<Finding> {
+    let parts = likelihood.parts.as_ref()?;
+    Some(Finding::PartsAgreement(PartsAgreement {
+        p_value: PValue::of(parts.p_value),
+        part: DataPart::new(parts.part, RowParts::Records),
+        parameter: likelihood.parameters.get(parts.parameter)?.name.clone(),
+        by_part: parts.by_part,
+        by_others: parts.by_others,
+        standard_error: parts.standard_error,
+        scatter: parts.scatter,
+        degrees_of_freedom: parts.degrees_of_freedom,
     }))
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use mechid_checks::Subject;
 use serde::Serialize;
 
 use crate::text::{compact, scaled_errors, significant};
@@ -22,6 +23,8 @@ pub enum ElementNote {
     ScaledErrors {
         /// Factor.
         factor: f64,
+        /// What disagrees beyond the noise.
+        because: Vec<Subject>,
     },
     /// Most of the information on a parameter comes from its prior.
     FromPrior {
@@ -61,7 +64,10 @@ impl fmt::Display for ElementNote {
                 "{parameter} lies at its bound {}: the data would have it beyond; its interval is one-sided",
                 compact(*bound, 6)
             ),
-            Self::ScaledErrors { factor } => f.write_str(&scaled_errors(*factor, "misfit")),
+            Self::ScaledErrors { factor, because } => {
+                let names: Vec<String> = because.iter().map(Subject::to_string).collect();
+                f.write_str(&scaled_errors(*factor, &names.join(", ")))
+            }
             Self::FromPrior { parameter, share } => write!(
                 f,
                 "{} % of the information on {parameter} comes from its prior",

@@ -9,6 +9,7 @@ use super::covariance::Information;
 use super::limits::{
     CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
 };
+use super::parts::{self, ComparedParts};
 use super::multi_start::{self, Minima, starts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
@@ -16,6 +17,7 @@ use super::search::{Bounds, Minimum};
 use super::unknown_noise::{UnknownNoise, WeightedMinimum};
 use super::weights::Weights;
 use super::{LikelihoodError, NoiseSource, Settings};
+use crate::frequency_domain::Level;
 
 /// Initial values, bounds and priors of the parameters of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +45,8 @@ pub(super) struct Fit<'a, M> {
     /// Probability of a larger misfit under a correct model.
     pub(super) misfit_p_value: Option<f64>,
     pub(super) is_white: Option<bool>,
+    /// Agreement of the parts of the data; `None` where they are not compared.
+    pub(super) parts: Option<ComparedParts>,
 }
 
 /// Fits `model` to `data`.
@@ -123,7 +127,10 @@ fn with_known_noise<'a, M: ResponseModel>(
     let minima = searched(&residual, space, settings, agreeing)?;
     let minimum = minima.best().minimum.clone();
     let information = Information::new(&residual, &minimum, inflation)?;
+    let level = Level::Known { inflation, degrees_of_freedom: (2.0 * total).min(1e6) };
+    let parts = parts::compare(&residual, &minimum, &information, &level);
     Ok(Fit {
+        parts,
         model,
         data,
         space,
@@ -206,7 +213,11 @@ fn with_unknown_noise<'a, M: ResponseModel>(
         let of_weights = information.add_weight_uncertainty(data, &jacobian, &bases);
         freedom = of_weights.map_or(freedom, |of_weights| of_weights.clamp(1.0, freedom));
     }
+    let free = residual.len().saturating_sub(unknowns) as f64;
+    let level = Level::Residual { inflation: 1.0, cost: minimum.cost, free };
+    let parts = parts::compare(&residual, &minimum, &information, &level);
     Ok(Fit {
+        parts,
         model,
         data,
         space,
@@ -259,23 +270,27 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Factor on the standard errors from the noise: the Birge ratio if the noise does not explain
-    /// the misfit, otherwise 1.
+    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the misfit is
+    /// too large for the noise, the scatter of the parts of the data where they disagree, the larger of
+    /// both; otherwise 1.
     ///
     /// # Source
-    /// Birge (1932), Physical Review 40, 207–227.
+    /// Birge (1932), Physical Review 40, 207–227; Liang & Zeger (1986), Biometrika 73, 13–22.
     pub(super) fn error_scale(&self) -> f64 {
         let is_misfit = self.misfit_p_value.is_some_and(|p_value| p_value < MISFIT_SIGNIFICANCE);
-        match self.misfit_ratio.filter(|_| is_misfit) {
-            Some(ratio) => ratio.sqrt().max(1.0),
-            None => 1.0,
-        }
+        let of_misfit = self.misfit_ratio.filter(|_| is_misfit).map_or(1.0, f64::sqrt);
+        self.disagreement().map_or(1.0, |parts| parts.scatter).max(of_misfit).max(1.0)
+    }
+
+    fn disagreement(&self) -> Option<&ComparedParts> {
+        self.parts.as_ref().filter(|parts| parts.disagree())
     }
 
     /// Returns a quantile of the error of an estimate in units of its standard error without
     /// [`Fit::error_scale`].
     pub(super) fn quantile(&self, probability: f64) -> f64 {
-        let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
+        let of_parts = self.disagreement().map_or(1e6, |parts| parts.degrees_of_freedom as f64);
+        let freedom = self.degrees_of_freedom.min(of_parts).clamp(1.0, 1e6);
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))
     }
 

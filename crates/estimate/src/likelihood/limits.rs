@@ -63,9 +63,11 @@ pub(super) const CONFIRMED: usize = 2;
 /// misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
-/// Significance level of the misfit test with known noise: for a smaller p-value the standard
-/// errors are scaled by the misfit. A correct model has too wide intervals in one of a thousand
-/// fits.
+/// Residual of an output relative to the output below which it is rounding, whose parts have no scatter of noise.
+pub(super) const ROUNDING_RESIDUAL: f64 = 1e-10;
+
+/// Level of significance of the misfit of known noise, and of differences of the parts of the data, below which standard errors and intervals are those of
+/// the misfit: a right model gets wider intervals than it needs in one of a thousand fits.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
 /// Maximum share of a gradient outside the determined combinations for a determined quantity; this

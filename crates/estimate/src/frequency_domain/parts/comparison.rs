@@ -1,4 +1,4 @@
-//! Test whether the parts of the data agree about the parameters.
+//! Test that the parts of the data say the same about the parameters.
 
 use mechid_model::Parameter;
 use mechid_numerics::linear_algebra::hermitian_eigen;
@@ -16,15 +16,14 @@ use crate::limits::PART_INFORMS;
 pub struct PartsComparison {
     /// Number of parts.
     pub parts: usize,
-    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by
-    /// noise alone.
+    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by that alone.
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
     /// Probability that noise alone makes the parts differ as much.
     pub p_value: f64,
-    /// Ratio of standard errors from the scatter of the parts to those from the noise: the larger
-    /// of the ratio for the parameter with the largest disagreement and the ratio for all together.
+    /// Factor by which the scatter of the parts makes standard errors larger than those of the noise, for the parameter
+    /// about which they disagree most or, where that is more, for all together.
     pub error_scale: f64,
     /// The largest difference of a part from the others in units of its standard error.
     pub largest: Option<Difference>,
@@ -37,58 +36,77 @@ pub struct Difference {
     pub part: Part,
     /// The parameter.
     pub parameter: Parameter,
-    /// Value from the part, in the unit of the parameter.
+    /// Value by the part, in the unit of the parameter.
     pub by_part: f64,
-    /// Value from the others, in the unit of the parameter.
+    /// Value by the others, in the unit of the parameter.
     pub by_others: f64,
     /// Standard error of the difference, in the unit of the parameter.
     pub standard_error: f64,
 }
 
-/// Scores of the parts and their covariance in units of the noise.
-struct Scores {
+/// Scores of the parts of a linearised fit, and their covariance in units of the noise.
+pub(crate) struct Scores<'a> {
+    /// Orthonormal columns Q that the parameters explain.
+    pub(crate) basis: &'a DMatrix<f64>,
+    /// Change of every parameter by one of each column, parameters × columns.
+    pub(crate) root: &'a DMatrix<f64>,
+    /// Values of the parameters, each in its unit.
+    pub(crate) values: &'a DVector<f64>,
+    /// D_p Q of every part.
+    pub(crate) parts: Vec<DMatrix<f64>>,
     /// Qᵀ D_p e, one below the other.
-    scores: DVector<f64>,
-    covariance: DMatrix<f64>,
-    /// Number of parameters.
-    count: usize,
+    pub(crate) scores: DVector<f64>,
+    pub(crate) covariance: DMatrix<f64>,
 }
 
-impl Scores {
+/// Variance of the residual in units of the noise.
+pub(crate) enum Level {
+    /// That of the noise stated, times a factor for weights that are sampled, with its degrees of freedom.
+    Known { inflation: f64, degrees_of_freedom: f64 },
+    /// That of a residual with this sum of squares and so many free numbers, times such a factor.
+    Residual { inflation: f64, cost: f64, free: f64 },
+}
+
+/// Result of [`Scores::compare`], with parts and parameters by their index.
+pub(crate) struct ScoreComparison {
+    pub(crate) ratio: f64,
+    pub(crate) degrees_of_freedom: usize,
+    pub(crate) p_value: f64,
+    pub(crate) error_scale: f64,
+    pub(crate) largest: Option<PartDifference>,
+}
+
+/// Difference of one part from the others about one parameter, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PartDifference {
+    pub(crate) part: usize,
+    pub(crate) parameter: usize,
+    pub(crate) by_part: f64,
+    pub(crate) by_others: f64,
+    pub(crate) standard_error: f64,
+}
+
+impl Scores<'_> {
     /// Returns the scores of a part.
-    fn part_scores(&self, part: usize) -> DVector<f64> {
-        self.scores.rows(part * self.count, self.count).into_owned()
+    fn of(&self, part: usize) -> DVector<f64> {
+        self.scores.rows(part * self.basis.ncols(), self.basis.ncols()).into_owned()
     }
 
     /// Returns the covariance of the scores of a part.
     fn covariance_of(&self, part: usize) -> DMatrix<f64> {
-        let at = part * self.count;
-        self.covariance.view((at, at), (self.count, self.count)).into_owned()
+        let count = self.basis.ncols();
+        self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
-}
 
-impl PartsOfFit<'_> {
-    /// Compares the parameters that the parts of a split determine; `None` with fewer than two
-    /// parts or too few residuals for an estimate of the noise.
-    ///
-    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's F distribution with
-    /// d degrees of freedom and the degrees of freedom of the noise level.
-    ///
-    /// # Source
-    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40,
-    /// 207–227, for the factor; Liang & Zeger (1986), Biometrika 73, 13–22, for that of one
-    /// parameter (scatter of the scores of parts).
-    pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
-        let cuts = Cuts::new(self, split)?;
-        let scores = self.scores(&cuts);
-        let (squares, rank) = whitened_square(&scores.covariance, &scores.scores)?;
+    /// Compares the scores with their covariance; `None` where there are too few residuals to know the noise by.
+    pub(crate) fn compare(&self, level: &Level) -> Option<ScoreComparison> {
+        let (squares, rank) = whitened_square(&self.covariance, &self.scores)?;
         let degrees = rank as f64;
-        let (level, of_level) = match self.known {
-            Some(known) => (self.inflation, known),
-            None => {
-                let free = self.linear.free() - degrees;
-                let level = (self.linear.cost() - squares) / free;
-                (level * self.inflation, free)
+        let (level, of_level) = match *level {
+            Level::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),
+            Level::Residual { inflation, cost, free } => {
+                let free = free - degrees;
+                (inflation * (cost - squares) / free, free)
             }
         };
         if rank == 0 || of_level < 1.0 || level.is_nan() || level <= 0.0 {
@@ -96,90 +114,133 @@ impl PartsOfFit<'_> {
         }
         let ratio = squares / (degrees * level);
         let law = FisherSnedecor::new(degrees, of_level).ok()?;
-        let of_one = self.largest_scatter(&scores, level).unwrap_or(0.0);
-        Some(PartsComparison {
-            parts: cuts.parts().count(),
+        let of_one = self.largest_scatter(level).unwrap_or(0.0);
+        Some(ScoreComparison {
             ratio,
             degrees_of_freedom: rank,
             p_value: law.sf(ratio),
             error_scale: ratio.sqrt().max(of_one),
-            largest: self.largest_difference(&cuts, &scores, level),
+            largest: self.largest_difference(level),
         })
     }
 
-    fn scores(&self, cuts: &Cuts) -> Scores {
-        let count = self.linear.basis.ncols();
-        let parts = cuts.columns(self.data, &self.linear.basis);
-        let parts: Vec<DMatrix<f64>> =
-            parts.into_iter().map(|part| self.linear.unexplained(part)).collect();
-        let mut columns = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
-        for (at, part) in parts.iter().enumerate() {
-            columns.columns_mut(at * count, count).copy_from(part);
-        }
-        let mut covariance = match self.responses {
-            Some(records) => covariance_of_errors(records, self.data.dof(), &columns).0,
-            None => columns.tr_mul(&columns),
-        };
-        if let Some(responses) = &self.linear.responses {
-            covariance += scatter(self.data, responses, &columns);
-        }
-        Scores { scores: columns.tr_mul(&self.linear.residual), covariance, count }
-    }
-
-    /// Returns the largest ratio of a standard error from the scatter of the scores to its value from the
-    /// noise.
-    fn largest_scatter(&self, scores: &Scores, level: f64) -> Option<f64> {
-        let parts = scores.scores.len() / scores.count;
+    /// Returns the largest factor by which the scatter of the scores makes the standard error of a parameter larger.
+    fn largest_scatter(&self, level: f64) -> Option<f64> {
         let of_row = |row: usize| {
-            let root = self.linear.root.row(row).transpose();
-            let square = |part: usize| root.dot(&scores.part_scores(part)).powi(2);
-            let expected = |part: usize| root.dot(&(scores.covariance_of(part) * &root));
+            let root = self.root.row(row).transpose();
+            let square = |part: usize| root.dot(&self.of(part)).powi(2);
+            let expected = |part: usize| root.dot(&(self.covariance_of(part) * &root));
+            let parts = self.parts.len();
             let (squares, expected) = (
                 (0..parts).map(square).sum::<f64>(),
                 (0..parts).map(expected).sum::<f64>() * level,
             );
             (expected > 0.0).then(|| (squares / expected).sqrt())
         };
-        (0..self.linear.root.nrows()).filter_map(of_row).max_by(f64::total_cmp)
+        (0..self.root.nrows()).filter_map(of_row).max_by(f64::total_cmp)
     }
 
-    /// Returns the difference of one part from the others that is largest in units of its standard
-    /// error.
-    fn largest_difference(&self, cuts: &Cuts, scores: &Scores, level: f64) -> Option<Difference> {
-        let parts = cuts.columns(self.data, &self.linear.basis);
-        let of_part = |(at, part): (usize, Part)| {
-            let (inverse, _) = pseudo_inverse(&scores.covariance_of(at))?;
-            let difference = &inverse * scores.part_scores(at);
-            let of_others = -self.linear.basis.tr_mul(&(&parts[at] * &difference));
+    /// Returns the difference of one part from the others that is largest in units of its standard error.
+    fn largest_difference(&self, level: f64) -> Option<PartDifference> {
+        let of_part = |(part, own): (usize, &DMatrix<f64>)| {
+            let (inverse, _) = pseudo_inverse(&self.covariance_of(part))?;
+            let difference = &inverse * self.of(part);
+            let of_others = -self.basis.tr_mul(&(own * &difference));
             let one = |row: usize| {
-                let root = self.linear.root.row(row).transpose();
+                let root = self.root.row(row).transpose();
                 let variance = level * root.dot(&(&inverse * &root));
                 let by_others = self.values[row] + root.dot(&of_others);
-                Difference {
+                PartDifference {
                     part,
-                    parameter: self.parameters[row],
+                    parameter: row,
                     by_part: by_others + root.dot(&difference),
                     by_others,
                     standard_error: variance.max(0.0).sqrt(),
                 }
             };
-            let differences = (0..self.linear.root.nrows()).map(one);
-            differences.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+            let all = (0..self.root.nrows()).map(one);
+            all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
         };
-        let differences = cuts.parts().enumerate().filter_map(of_part);
-        differences.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
+        let all = self.parts.iter().enumerate().filter_map(of_part);
+        all.max_by(|a, b| a.in_errors().total_cmp(&b.in_errors()))
     }
 }
 
-impl Difference {
+impl PartDifference {
     /// Returns the difference in units of its standard error.
-    pub fn in_errors(&self) -> f64 {
+    fn in_errors(&self) -> f64 {
         let errors = (self.by_part - self.by_others).abs() / self.standard_error;
         if errors.is_finite() { errors } else { 0.0 }
     }
 }
 
-/// Returns the pseudo-inverse of a covariance, and its rank.
+impl PartsOfFit<'_> {
+    /// Compares what the parts of a split say about the parameters; `None` where there are fewer than two parts or too
+    /// few residuals to know the noise by.
+    ///
+    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d degrees of freedom and
+    /// those of the level of the noise.
+    ///
+    /// # Source
+    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40, 207–227, for the
+    /// factor; Liang & Zeger (1986), Biometrika 73, 13–22, for that of one parameter (scatter of the scores of parts).
+    pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
+        let cuts = Cuts::new(self, split)?;
+        let parts: Vec<Part> = cuts.parts().collect();
+        let level = match self.known {
+            Some(known) => {
+                Level::Known { inflation: self.inflation, degrees_of_freedom: known }
+            }
+            None => {
+                let (cost, free) = (self.linear.cost(), self.linear.free());
+                Level::Residual { inflation: self.inflation, cost, free }
+            }
+        };
+        let found = self.scores(&cuts).compare(&level)?;
+        let largest = found.largest.map(|largest| Difference {
+            part: parts[largest.part],
+            parameter: self.parameters[largest.parameter],
+            by_part: largest.by_part,
+            by_others: largest.by_others,
+            standard_error: largest.standard_error,
+        });
+        Some(PartsComparison {
+            parts: parts.len(),
+            ratio: found.ratio,
+            degrees_of_freedom: found.degrees_of_freedom,
+            p_value: found.p_value,
+            error_scale: found.error_scale,
+            largest,
+        })
+    }
+
+    fn scores(&self, cuts: &Cuts) -> Scores<'_> {
+        let count = self.linear.basis.ncols();
+        let parts = cuts.columns(self.data, &self.linear.basis);
+        let mut all = DMatrix::zeros(self.linear.residual.len(), count * parts.len());
+        for (at, part) in parts.iter().enumerate() {
+            let unexplained = self.linear.unexplained(part.clone());
+            all.columns_mut(at * count, count).copy_from(&unexplained);
+        }
+        let mut covariance = match self.responses {
+            Some(records) => covariance_of_errors(records, self.data.dof(), &all).0,
+            None => all.tr_mul(&all),
+        };
+        if let Some(responses) = &self.linear.responses {
+            covariance += scatter(self.data, responses, &all);
+        }
+        Scores {
+            basis: &self.linear.basis,
+            root: &self.linear.root,
+            values: &self.values,
+            parts,
+            scores: all.tr_mul(&self.linear.residual),
+            covariance,
+        }
+    }
+}
+
+/// Returns the inverse of a covariance on the directions that it has, and their number.
 fn pseudo_inverse(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
     let eigen = hermitian_eigen(covariance.clone()).ok()?;
     let least = PART_INFORMS * eigen.eigenvalues.max();

@@ -19,6 +19,7 @@ use crate::relations::Relations;
 use linearised::Linearised;
 
 pub use comparison::{Difference, PartsComparison};
+pub(crate) use comparison::{Level, PartDifference, ScoreComparison, Scores};
 pub use split::{Part, Split};
 
 /// A fit, linearised at its minimum, for a comparison of parts of its data.
