@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::IdentifyElements;
 use crate::AnalysisError;
+use crate::hits::HitRow;
 use crate::identify::rows::WindowRow;
 use crate::measurement::Channels;
 
@@ -27,6 +28,8 @@ pub struct ElementData {
     pub(super) findings: Vec<(usize, Finding)>,
     /// Names of the channels, for the findings.
     pub(super) channels: Channels,
+    /// Hits of a hammer, used or left out.
+    pub(super) hits: Vec<HitRow>,
     /// Remarks on what was read.
     pub(super) remarks: Vec<String>,
     /// Part of the machine whose receptance was measured.
@@ -53,6 +56,8 @@ pub enum TestKind {
     Periods,
     /// Open record, with the transient of its ends.
     Open,
+    /// Hit of a hammer, as an open record.
+    Hit,
     /// Frequency responses.
     Responses,
     /// Synchronous responses over the speed.
@@ -79,6 +84,7 @@ impl ElementData {
             noise: String::new(),
             findings: Vec::new(),
             channels,
+            hits: Vec::new(),
             remarks: Vec::new(),
             part: None,
         }
@@ -95,6 +101,7 @@ impl ElementData {
         }
         let moved = other.findings.into_iter().map(|(at, finding)| (at + before, finding));
         self.findings.extend(moved);
+        self.hits.extend(other.hits);
         self.remarks.extend(other.remarks);
         Ok(self)
     }

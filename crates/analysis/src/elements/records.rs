@@ -3,7 +3,7 @@
 use mechid_checks::NoiseSource;
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::Input;
-use mechid_signal::Record;
+use mechid_signal::{HitRule, Record};
 use mechid_spectra::{
     FrequencyData, LineData, LineNoise, Lines, Pooling, RepeatedPeriods, Transient,
 };
@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::data::{TestKind, TestRow, joined};
 use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
+use crate::hits;
 use crate::identify::checks;
 use crate::identify::left_out::LineRule;
 use crate::identify::rows::WindowRow;
@@ -28,18 +29,49 @@ struct Signals {
 }
 
 impl ElementData {
-    /// Takes records with the columns of [`IdentifyElements::channels`]: whole periods where the
-    /// window has a period, otherwise open records.
+    /// Takes records with the columns of [`IdentifyElements::channels`]: their hits if there is a
+    /// rule for them, whole periods where the window has a period, otherwise open records.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] for settings that do not belong
-    /// together or leave no line, and if a file cannot be read.
+    /// [`AnalysisError::NoRecord`], [`AnalysisError::NoHit`] if no hit of a record is good,
+    /// [`AnalysisError::Setting`] for settings that do not belong together or leave no line, and if
+    /// a file cannot be read.
     pub fn from_records(
         measurements: &[Measurement],
         how: &IdentifyElements,
     ) -> Result<Self, AnalysisError> {
-        joined(measurements.iter().map(|measurement| from_record(measurement, how)))
+        joined(measurements.iter().map(|measurement| match &how.hits {
+            Some(rule) => from_hits(measurement, rule, how),
+            None => from_record(measurement, how),
+        }))
     }
+}
+
+/// The good hits of a record, each an open record of its own under the pulse alone.
+fn from_hits(
+    measurement: &Measurement,
+    rule: &HitRule,
+    how: &IdentifyElements,
+) -> Result<ElementData, AnalysisError> {
+    if measurement.window_settings().period.is_some() {
+        let why = "hits are no periods: leave out `period`".into();
+        return Err(AnalysisError::Setting { setting: "hits", why });
+    }
+    if measurement.channels().force.is_empty() {
+        let why = "a hammer test needs an input that is a force".into();
+        return Err(AnalysisError::Setting { setting: "hits", why });
+    }
+    let cut = hits::cut(&[measurement.hold_any()?], rule)?;
+    let tests = cut.hits.into_iter().map(|hit| {
+        let block = hit.into_held();
+        let mut data = Signals::new(&block, how)?.open(&block, TestKind::Hit, how)?;
+        data.remarks = block.unit_notes();
+        Ok(data)
+    });
+    let mut data = joined(tests)?;
+    data.hits = cut.rows;
+    data.remarks.extend(cut.remarks);
+    Ok(data)
 }
 
 fn from_record(
@@ -50,7 +82,7 @@ fn from_record(
     let signals = Signals::new(&block, how)?;
     let is_periodic = measurement.window_settings().period.is_some();
     let mut data =
-        if is_periodic { signals.periods(&block, how)? } else { signals.open(&block, how)? };
+        if is_periodic { signals.periods(&block, how)? } else { signals.open(&block, TestKind::Open, how)? };
     data.remarks = block.unit_notes();
     data.findings = checks::of_sensors(&block).into_iter().map(|finding| (0, finding)).collect();
     Ok(data)
@@ -148,7 +180,12 @@ impl Signals {
     }
 
     /// All lines of a band, without a window.
-    fn open(&self, block: &Block, how: &IdentifyElements) -> Result<ElementData, AnalysisError> {
+    fn open(
+        &self,
+        block: &Block,
+        kind: TestKind,
+        how: &IdentifyElements,
+    ) -> Result<ElementData, AnalysisError> {
         let is_of_periods = matches!(how.noise, Pooling::Neighbours(_) | Pooling::PerLine);
         if is_of_periods {
             let why = format!(
@@ -164,7 +201,7 @@ impl Signals {
         let data = LineData::from_open_record(Some(&self.inputs), &self.outputs, band_hz)?;
         let spacing_hz = self.inputs.sampling().line_spacing_hz();
         let data = ElementData::kept(data, spacing_hz, how)?;
-        let test = self.test(block, TestKind::Open);
+        let test = self.test(block, kind);
         let of_test = ElementData::of_test(data, test, block.names.as_ref().clone());
         Ok(ElementData { noise: "taken from the residual".to_owned(), ..of_test })
     }

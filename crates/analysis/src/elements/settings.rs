@@ -3,6 +3,7 @@
 use mechid_estimate::likelihood::{NoiseSource, Settings};
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::{Input, InstrumentedMachine};
+use mechid_signal::HitRule;
 use mechid_spectra::Pooling;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +15,7 @@ use crate::measurement::Channels;
 /// Settings of the identification of a machine of named elements.
 ///
 /// Whether a record is taken as whole periods or as an open one follows from its window: whole
-/// periods where `period` is given.
+/// periods where `period` is given. With `hits` every good hit of a hammer is an open record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentifyElements {
@@ -26,6 +27,13 @@ pub struct IdentifyElements {
     /// Frequencies whose lines are left out.
     #[serde(default)]
     pub without_hz: Vec<Disturbance>,
+    /// Rule by which records of a hammer test are cut into their hits.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "crate::words::written::optional"
+    )]
+    pub hits: Option<HitRule>,
     /// Noise spectrum by which the lines are weighted.
     #[serde(default)]
     pub noise: Pooling,
@@ -55,6 +63,7 @@ impl IdentifyElements {
             machine,
             band: None,
             without_hz: Vec::new(),
+            hits: None,
             noise: Pooling::Automatic,
             starts: usual_starts(),
             seed: 0,

@@ -17,6 +17,7 @@ use super::machine::{self, StatedMachine, freedom};
 use super::notes::ElementNote;
 use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
+use crate::hits::HitRow;
 use crate::identify::checks::{CheckRow, When};
 use crate::identify::rows::ModeRow;
 use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
@@ -27,6 +28,9 @@ use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
 pub struct ElementSummary {
     /// Tests that were fitted together.
     pub tests: Vec<TestRow>,
+    /// Hits of hammer tests, used or left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hits: Vec<HitRow>,
     /// Names of the inputs.
     pub inputs: Vec<String>,
     /// Sensors.
@@ -151,6 +155,7 @@ impl ElementSummary {
         let remarks = data.remarks.iter().map(|text| ElementNote::Read { text: text.clone() });
         Ok(Self {
             tests: data.tests.clone(),
+            hits: data.hits.clone(),
             inputs: instruments(how).inputs.iter().map(|input| input.name().to_owned()).collect(),
             sensors: sensors(estimate, how),
             points: estimate.assembly.dofs().to_vec(),

@@ -7,6 +7,7 @@ use mechid_signal::message;
 
 use super::data::{TestKind, TestRow};
 use super::summary::{CandidateRow, ElementRow, ElementSummary};
+use crate::hits;
 use crate::identify::checks::CheckRow;
 use crate::identify::rows::{ModeRow, Uncertain};
 use crate::text::{compact, paragraph, significant, text_table};
@@ -30,7 +31,12 @@ impl fmt::Display for ElementSummary {
 
 impl ElementSummary {
     fn heading(&self) -> String {
-        let mut text: String = self.tests.iter().map(test).collect();
+        let mut text = match self.tests.iter().find_map(|test| test.window.as_ref()) {
+            Some(window) if !self.hits.is_empty() => {
+                hits::heading(&self.hits, &compact(window.sample_rate_hz, 6))
+            }
+            _ => self.tests.iter().map(|test| format!("{}: {}\n", test.file, test.words())).collect(),
+        };
         let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
         text += &format!(
             "{}, {}, {}; maximum likelihood, {}, {low} to {high} Hz; ± is one standard error\n",
@@ -51,10 +57,11 @@ impl ElementSummary {
             header.push("from the prior (%)".into());
         }
         let mut rows = vec![header];
-        for ElementRow { unit, estimate } in &self.parameters {
+        for row in &self.parameters {
+            let (unit, estimate) = (row.unit, &row.estimate);
             let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
             let name = format!("{}{unit}", estimate.name);
-            let [value, error, interval] = cells(estimate);
+            let [value, error, interval] = row.cells();
             let mut row = vec![name, value, error, interval];
             if with_priors {
                 let share = estimate.prior.map(|prior| significant(100.0 * prior.share, 3));
@@ -101,7 +108,7 @@ impl ElementSummary {
 
     /// Mean over the determined parameters of what a candidate takes off their standard errors, in
     /// per cent.
-    fn reduction(&self, row: &CandidateRow) -> Option<f64> {
+    pub fn reduction(&self, row: &CandidateRow) -> Option<f64> {
         let pairs = self.parameters.iter().zip(&row.standard_errors);
         let reductions: Vec<f64> = pairs
             .filter_map(|(parameter, after)| {
@@ -145,24 +152,33 @@ impl ElementSummary {
     }
 }
 
-fn test(TestRow { file, kind, window }: &TestRow) -> String {
-    let samples = window.as_ref().map(|window| {
-        let rate = compact(window.sample_rate_hz, 6);
-        let (first, last) = (window.first_sample, window.last_sample);
-        match kind {
-            TestKind::Periods => format!(
-                "samples {first} to {last}, {} of {}, {rate} Hz",
-                message::count(window.periods, "period"),
-                window.period_samples
-            ),
-            _ => format!("samples {first} to {last}, {rate} Hz, an open record"),
-        }
-    });
-    let words = samples.unwrap_or_else(|| match kind {
-        TestKind::Speeds => "synchronous responses over the speed".into(),
-        _ => "frequency responses".into(),
-    });
-    format!("{file}: {words}\n")
+impl TestRow {
+    /// Returns in words what was used of the file.
+    pub fn words(&self) -> String {
+        let samples = self.window.as_ref().map(|window| {
+            let rate = compact(window.sample_rate_hz, 6);
+            let (first, last) = (window.first_sample, window.last_sample);
+            match self.kind {
+                TestKind::Periods => format!(
+                    "samples {first} to {last}, {} of {}, {rate} Hz",
+                    message::count(window.periods, "period"),
+                    window.period_samples
+                ),
+                _ => format!("samples {first} to {last}, {rate} Hz, an open record"),
+            }
+        });
+        samples.unwrap_or_else(|| match self.kind {
+            TestKind::Speeds => "synchronous responses over the speed".into(),
+            _ => "frequency responses".into(),
+        })
+    }
+}
+
+impl ElementRow {
+    /// Returns value, standard error and interval; the error tells how many digits they deserve.
+    pub fn cells(&self) -> [String; 3] {
+        cells(&self.estimate)
+    }
 }
 
 /// Value, standard error and interval; the error tells how many digits they deserve.

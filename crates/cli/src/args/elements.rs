@@ -18,17 +18,17 @@ pub struct ElementArgs {
     /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
     /// inputs (forces, motion of the support, unbalance). Columns have the names of sensors and
     /// inputs. A record with
-    /// --period is taken as whole periods, otherwise as an open record
+    /// --period is taken as whole periods, one with --hits as the hits of a hammer, otherwise as an open record
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
-          "between_samples", "ac_coupling", "mass", "structure", "hits", "struck", "nonlinear", "candidates",
+          "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",
           "derivatives", "refine", "from_frf", "segment", "validate", "fitted_lines", "more_starts", "quantity", "averages", "points"])]
     machine: Option<PathBuf>,
     /// The files are tables of synchronous responses, a row for each speed of a run: speed_rpm (or
     /// speed_hz), and of each sensor and unbalance NAME_amplitude and NAME_phase_deg, or NAME_real
     /// and NAME_imaginary; in SI units, unbalance in kg·m
     #[arg(long, requires = "machine", conflicts_with_all = ["frf_table", "period", "start",
-          "sample_rate", "time", "detrend", "noise"])]
+          "sample_rate", "time", "detrend", "noise", "hits"])]
     speed_table: bool,
     /// Table of frequency responses of a part whose receptance stands for a model of it, free of
     /// all other parts; may be repeated
@@ -66,6 +66,7 @@ impl FitArgs {
         let how = IdentifyElements {
             band: self.lines.band_hz,
             without_hz: self.lines.without_hz.clone(),
+            hits: self.hits.rule(),
             noise: self.noise.unwrap_or_default(),
             starts: elements.starts.unwrap_or(usual.starts),
             seed: elements.seed.unwrap_or(usual.seed),

@@ -90,7 +90,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "FORM", value_delimiter = ' ')]
     structure: Vec<Form>,
     #[command(flatten)]
-    hits: HitArgs,
+    pub(super) hits: HitArgs,
     #[command(flatten)]
     nonlinear: NonlinearArgs,
     #[command(flatten)]
@@ -213,6 +213,13 @@ pub struct TableArgs {
     /// Points to use, one per degree of freedom, as the table names them [default: all]
     #[arg(long, value_name = "POINT,…", value_delimiter = ',', requires = "frf_table")]
     points: Vec<String>,
+}
+
+impl TableArgs {
+    /// Returns whether the files are tables of frequency responses.
+    pub fn is_given(&self) -> bool {
+        self.frf_table
+    }
 }
 
 /// A record to predict, written `RECORD:START:COUNT`.

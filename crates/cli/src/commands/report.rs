@@ -5,13 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mechid::analysis::Identified;
 use mechid::io::{Geometry, input_name, is_standard_output, output_name};
-use mechid::report::{PageSettings, page};
+use mechid::report::{PageSettings, elements_page, page};
 use serde::Serialize;
 
 use crate::args::ReportArgs;
-use crate::args::fit::FitArgs;
+use crate::args::elements::ElementArgs;
+use crate::args::fit::{FitArgs, TableArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 use crate::{options, repeat};
@@ -24,19 +24,26 @@ use crate::{options, repeat};
 /// A long text is gone through a stretch at a time and held as by `mechid identify`: levels, time
 /// histories and mean periods are those of all samples; the residual in time and, of an open record,
 /// its spectrum and the force found are those of the first 262144 samples, and the page says so.
+///
+/// With --machine the page is that of a machine of named elements.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
   mechid report rotor.csv --force fx,fy --displacement x,y --period 1024 --reconstruct-force \\
       --title 'Rotor at 3000 rpm' --output rotor.html
   mechid report a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
-      --validate c.csv --output rig.html")]
+      --validate c.csv --output rig.html
+  mechid report chain.csv --machine chain.json --period 2048 --output chain.html")]
 pub struct PageArgs {
     #[command(flatten)]
     fit: FitArgs,
+    #[command(flatten)]
+    table: TableArgs,
+    #[command(flatten)]
+    elements: ElementArgs,
     /// Also reconstruct the force from the response with the identified system, and compare it with
     /// the measured one
-    #[arg(long)]
+    #[arg(long, conflicts_with = "machine")]
     reconstruct_force: bool,
     /// File for the report (-: standard output)
     #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
@@ -50,7 +57,7 @@ pub struct PageArgs {
     about: Option<PathBuf>,
     /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and 82), or a table with
     /// rows name,x,y,z in m and line,name,name [default: a row, by the names of the channels]
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "machine")]
     geometry: Option<PathBuf>,
     #[command(flatten)]
     pub report: ReportArgs,
@@ -83,21 +90,20 @@ pub fn html_file(text: &str) -> Result<PathBuf, String> {
 
 /// The identification, and where the page is.
 #[derive(Serialize)]
-struct Printed<'a> {
+struct Printed<'a, R> {
     #[serde(flatten)]
-    identified: &'a Identified,
+    identified: &'a R,
     html: String,
 }
 
 impl PageArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        self.fit.files().reads(&self.about).reads(&self.geometry).writes([&self.output])
+        self.fit.files().reads(self.elements.inputs()).reads(&self.about).reads(&self.geometry).writes([&self.output])
     }
 
     /// Reads, identifies, draws and writes; `words` are the arguments of the program.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        let identified = self.fit.identify()?;
         let settings = PageSettings {
             title: self.title.clone(),
             reconstruct_force: self.reconstruct_force,
@@ -105,10 +111,28 @@ impl PageArgs {
             about: self.about.as_deref().map(read_about).transpose()?.unwrap_or_default(),
             geometry: self.geometry.as_ref().map(Geometry::read).transpose()?,
         };
-        let page = options::spelled(&page(&identified, &settings)?);
+        if let Some(identified) = self.fit.identify_elements(&self.table, &self.elements)? {
+            let text = self.fit.text_of_elements(&identified);
+            return self.outcome(&text, &identified, &elements_page(&identified, &settings)?);
+        }
+        if self.table.is_given() {
+            let (option, why) = ("--frf-table", "of a report belongs to --machine");
+            return Err(CliError::MisplacedOption { option, why });
+        }
+        let identified = self.fit.identify()?;
+        self.outcome(&self.fit.text(&identified), &identified, &page(&identified, &settings)?)
+    }
+
+    /// Prints the identification, and writes its page.
+    fn outcome<R: Serialize>(
+        &self,
+        text: &str,
+        identified: &R,
+        page: &str,
+    ) -> Result<Outcome, CliError> {
         let html = output_name(&self.output);
-        let text = format!("{}\nreport: {html}\n", self.fit.text(&identified));
-        Ok(Outcome::new(text, &Printed { identified: &identified, html })?
-            .with_file(&self.output, page))
+        let text = format!("{text}\nreport: {html}\n");
+        Ok(Outcome::new(text, &Printed { identified, html })?
+            .with_file(&self.output, options::spelled(page)))
     }
 }

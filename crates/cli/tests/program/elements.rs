@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use nalgebra::Complex;
+use mechid::ResponseQuantity;
+use mechid::signal::{NoiseLevel, Sampling, noise};
+use mechid_problems::HammerTest;
+use nalgebra::{Complex, dmatrix};
 use serde_json::{Value, json};
 
 use super::{mechid, refused};
@@ -315,6 +318,65 @@ fn two_loggers_on_a_shake_table() {
         let is_told = |check: &Value| check["subject"] == "whiteness" && check["verdict"] != "good";
         assert!(checks.iter().any(is_told), "{checks:?}");
     }
+}
+
+/// Good hits of a hammer, as open records; bad ones are left out and named, on the page too. Judge:
+/// the matrices behind the modes of the generator.
+#[test]
+fn hits_of_a_hammer_and_the_page() {
+    let rig = HammerTest {
+        frequencies_hz: vec![11.0, 27.0],
+        damping_ratios: vec![0.02, 0.015],
+        shapes: dmatrix![0.5, 0.6; 0.7, -0.4],
+        sampling: Sampling::new(1.0 / 256.0, 6144).unwrap(),
+        quantity: ResponseQuantity::Acceleration,
+        hits: 6,
+        peak: 200.0,
+        duration: 0.015,
+        force_noise: 0.02,
+    };
+    let test = rig.measure(0, 1, 4).unwrap();
+    let level = NoiseLevel::FractionOfRms(0.01);
+    let response = noise::add_white(&test.response, level, 5).unwrap();
+    let mut text = String::from("hammer,a2\n");
+    for (f, a) in test.force.channel(0).iter().zip(response.channel(1)) {
+        writeln!(text, "{f},{a}").unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("hits.csv"), text).unwrap();
+    let system = rig.system().unwrap();
+    let rows = |m: &nalgebra::DMatrix<f64>| json!([[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]);
+    let start = json!({"start": 1.3, "min": 0});
+    let machine = json!({
+        "dofs": ["x1", "x2"],
+        "elements": [{"name": "frame", "dofs": ["x1", "x2"], "mass": rows(system.mass()),
+            "damping": rows(system.damping()), "stiffness": rows(system.stiffness()),
+            "damping_factor": start, "stiffness_factor": start}],
+        "sensors": [{"name": "a2", "at": "x2", "quantity": "acceleration"}],
+        "inputs": [{"kind": "force", "name": "hammer", "at": "x1"}]
+    });
+    write(at, "frame.json", &machine);
+    let fit = "hits.csv --machine frame.json --hits --sample-rate 256";
+    let report = identified(at, fit);
+    for name in ["frame.damping", "frame.stiffness"] {
+        let [value, error] = unknown(&report, name);
+        assert!((value - 1.0).abs() < 4.5 * error && error < 1e-2, "{name}: {value} ± {error}");
+    }
+    let used = |hits: &Value| hits.as_array().unwrap().iter().filter(|h| h["used"] == true).count();
+    assert_eq!((report["hits"].as_array().unwrap().len(), used(&report["hits"])), (6, 5));
+    assert_eq!(report["tests"][0]["kind"], "hit");
+    let text = mechid(at, &format!("report {fit} --output page.html"));
+    assert!(text.contains("5 of 6 hits on degree of freedom 1 used"), "{text}");
+    let page = fs::read_to_string(at.join("page.html")).unwrap();
+    let [value, _] = unknown(&report, "frame.stiffness");
+    for part in ["left out", "frame.stiffness", &format!("{value:.4}"), "mechid report hits.csv"] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+    let message = refused(at, &format!("identify {fit} --period 512"));
+    assert!(message.contains("hits are no periods: leave out --period"), "{message}");
+    let message = refused(at, "report hits.csv --frf-table --output page.html");
+    assert!(message.contains("--frf-table of a report belongs to --machine"), "{message}");
 }
 
 /// A saved analysis of the same kind makes a row of every record.

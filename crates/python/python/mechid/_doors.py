@@ -251,6 +251,7 @@ def identify_elements(
     speed_table: bool = False,
     band_hz: tuple[float, float] | None = None,
     without_hz: Sequence[float | Mapping[str, Any]] = (),
+    hits: bool | str | Mapping[str, Any] = False,
     noise: str = "auto",
     starts: int | None = None,
     seed: int = 0,
@@ -280,6 +281,8 @@ def identify_elements(
         Frequencies to use, in Hz; those that the inputs drive, without.
     without_hz : sequence of float or dict
         Frequencies whose lines are left out, as in `identify`.
+    hits : bool or str or dict, optional
+        Cut the records of a hammer test into its good hits, as in `identify`.
     noise : str
         Noise spectrum by which the lines are weighted, as in `identify`.
     starts : int, optional
@@ -327,6 +330,7 @@ def identify_elements(
     told |= {
         "band": None if band_hz is None else {"low_hz": float(band_hz[0]), "high_hz": float(band_hz[1])},
         "without_hz": json.loads(_without(None, without_hz))["frequencies"],
+        "hits": hits,
         "noise": noise,
         "seed": _index("seed", seed) if seed else 0,
         "confidence": float(confidence),
@@ -335,7 +339,7 @@ def identify_elements(
         told["starts"] = _index("starts", starts)
     given = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in parts]
     of_parts = [one._inner for one in given]
-    settings = json.dumps(told)
+    settings = json.dumps(told, default=_plain)
     if speed_table:
         paths = [os.fspath(source) for source in sources]  # type: ignore[call-overload]
         inner = _mechid.identify_elements([], [], paths, of_parts, settings, threads)

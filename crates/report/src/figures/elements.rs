@@ -10,6 +10,15 @@ const SENSORS: usize = 6;
 /// Maximum number of points of a curve; a panel cannot show more.
 const POINTS: usize = 4000;
 
+/// Returns the amplitudes of every sensor, each a figure with its name.
+pub fn set(identified: &IdentifiedElements) -> Vec<(String, Figure)> {
+    let spectra = identified.spectra();
+    spectra
+        .iter()
+        .map(|sensor| (sensor.name.clone(), Figure::new(&sensor.name).panel(panel(sensor))))
+        .collect()
+}
+
 /// Returns the amplitudes of the first sensors: measured, of the model, and their difference.
 pub fn figure(identified: &IdentifiedElements) -> Figure {
     let tests = &identified.summary().tests;

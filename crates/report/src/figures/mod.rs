@@ -2,7 +2,7 @@
 
 mod backbone;
 mod bearing;
-mod elements;
+pub(crate) mod elements;
 mod force;
 mod frf;
 pub mod modal;

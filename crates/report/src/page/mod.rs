@@ -2,6 +2,7 @@
 
 mod alone;
 mod checks;
+mod elements;
 mod figures;
 mod sections;
 mod tables;
@@ -21,6 +22,7 @@ use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
 pub use self::alone::figure_page;
+pub use self::elements::elements_page;
 use self::figures::Drawn;
 use self::tables::Table;
 #[cfg(feature = "parquet")]
@@ -159,30 +161,41 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
         .zip(bodies)
         .filter_map(|((id, name), body)| Some((id, name, body?)))
         .collect();
+    Ok(document(&contents.title, &heading(contents), &present, contents.command))
+}
+
+/// Returns a document with a heading, its sections (identifier, name, body) and the command that
+/// writes it again.
+fn document(
+    title: &str,
+    heading: &Markup,
+    present: &[(&str, &str, Markup)],
+    command: Option<&str>,
+) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            (head(&contents.title))
+            (head(title))
             body {
-                (heading(contents))
+                (heading)
                 nav aria-label="Sections" { ul {
-                    @for (id, name, _) in &present { li { a href={ "#" (id) } { (name) } } }
+                    @for (id, name, _) in present { li { a href={ "#" (id) } { (name) } } }
                     li { a href="#repeat" { "How to repeat it" } }
                 } }
                 main {
-                    @for (id, name, body) in &present {
+                    @for (id, name, body) in present {
                         section id=(id) aria-labelledby={ (id) "-heading" } {
                             h2 id={ (id) "-heading" } { (name) }
                             (body)
                         }
                     }
-                    (repeat(contents))
+                    (repeat(command))
                 }
                 (figure_script())
             }
         }
     };
-    Ok(page.into_string() + "\n")
+    page.into_string() + "\n"
 }
 
 /// Returns a figure with its caption.
@@ -209,14 +222,21 @@ fn heading(contents: &Contents<'_>) -> Markup {
         header {
             h1 { (contents.title) }
             p.subtitle { (files(contents)) " · " (report.estimator) }
-            @if !contents.about.is_empty() {
-                dl.about { @for (name, value) in contents.about { div { dt { (name) } dd { (value) } } } }
-            }
-            (remarks(contents))
+            (about(contents.about))
+            (remarks(&judgement::doubts(contents.review), &judgement::merits(contents.review)))
             (modes(&ShapedMode::rows(&report.modes)))
             @if let Some(part) = report.fit.unexplained_motion {
                 p.note { "Motion left unexplained: " strong { (significant(100.0 * part, 3)) " %" } }
             }
+        }
+    }
+}
+
+/// Returns names and values of further information.
+fn about(about: &[(String, String)]) -> Markup {
+    html! {
+        @if !about.is_empty() {
+            dl.about { @for (name, value) in about { div { dt { (name) } dd { (value) } } } }
         }
     }
 }
@@ -264,29 +284,28 @@ fn files(contents: &Contents<'_>) -> String {
 }
 
 /// Returns the section of warnings, and of the information that supports the numbers.
-fn remarks(contents: &Contents<'_>) -> Markup {
-    let (doubts, merits) = (judgement::doubts(contents.review), judgement::merits(contents.review));
+fn remarks(doubts: &[String], merits: &[String]) -> Markup {
     html! {
         @if !doubts.is_empty() {
             aside.remarks aria-labelledby="doubts-heading" {
                 h2 id="doubts-heading" { "Before you believe the numbers" }
-                ul { @for doubt in &doubts { li { (doubt) } } }
+                ul { @for doubt in doubts { li { (doubt) } } }
             }
         }
         @if !merits.is_empty() {
             aside.remarks.good aria-labelledby="merits-heading" {
                 h2 id="merits-heading" { "What speaks for the numbers" }
-                ul { @for merit in &merits { li { (merit) } } }
+                ul { @for merit in merits { li { (merit) } } }
             }
         }
     }
 }
 
-fn repeat(contents: &Contents<'_>) -> Markup {
+fn repeat(command: Option<&str>) -> Markup {
     html! {
         section id="repeat" aria-labelledby="repeat-heading" {
             h2 id="repeat-heading" { "How to repeat it" }
-            @if let Some(command) = contents.command {
+            @if let Some(command) = command {
                 p { "With mechid " (env!("CARGO_PKG_VERSION")) ", in the folder from which the record is named as above:" }
                 div.scroll role="region" tabindex="0" aria-label="The command" { pre { code { (command) } } }
             } @else {

@@ -30,7 +30,7 @@ fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "–".into())
 }
 
-fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
+pub fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
     vec![name.into(), value.into()]
 }
 
@@ -146,7 +146,7 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
              excitation is the number of parameters that they can tell apart."
         }
-        (checks::list(contents, When::Before))
+        (checks::list(&contents.review.identified.summary().checks, When::Before))
     })
 }
 
@@ -163,7 +163,7 @@ fn excitation_row(e: &Excitation, names: &Channels) -> Vec<String> {
     ]
 }
 
-fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
+pub fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
     let mut row = vec![name];
     row.extend(value.cells());
     row.push(unit.into());
@@ -321,7 +321,7 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     Ok(html! {
         p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
         (records)
-        (checks::list(contents, When::After))
+        (checks::list(&contents.review.identified.summary().checks, When::After))
         @if contents.review.identified.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
                 "p is the share of experiments with nothing but noise left that look as bad, adjusted for the \

@@ -1,0 +1,162 @@
+//! The page of an identified machine of named elements.
+
+use maud::{Markup, html};
+use mechid_analysis::IdentifiedElements;
+use mechid_analysis::elements::{CandidateRow, ElementSummary};
+use mechid_analysis::identify::checks::{CheckRow, When};
+use mechid_analysis::text::{compact, significant};
+use mechid_signal::message;
+
+use super::sections::{pair, percent};
+use super::tables::Table;
+use super::{PageSettings, about, checks, document, figure, figures, modes, remarks};
+use crate::ReportError;
+use crate::figures::elements as sensors;
+
+/// Returns a page with all results of the identification of a machine of named elements, as HTML
+/// that loads no other file and runs only the script of its figures.
+///
+/// # Errors
+/// [`ReportError::Plot`].
+pub fn elements_page(
+    identified: &IdentifiedElements,
+    settings: &PageSettings,
+) -> Result<String, ReportError> {
+    let found = identified.summary();
+    let files: Vec<&str> = found.tests.iter().map(|test| test.file.as_str()).collect();
+    let name = files.first().map_or("", |file| file.rsplit(['/', '\\']).next().unwrap_or(file));
+    let default_title = || format!("Identification of {name}");
+    let title = settings.title.clone().unwrap_or_else(default_title);
+    let mut doubts = conspicuous(found);
+    doubts.extend(found.combinations.iter().map(|row| row.text.clone()));
+    let heading = html! {
+        header {
+            h1 { (title) }
+            p.subtitle { (files.join(", ")) " · maximum likelihood" }
+            (about(&settings.about))
+            (remarks(&doubts, &merits(found)))
+            (modes(&found.modes))
+        }
+    };
+    let sections = [
+        ("data", "Data", data(found)),
+        ("machine", "Machine", machine(identified)),
+        ("response", "Response and fit", response(identified)?),
+        ("residual", "Residual", residual(found)),
+    ];
+    Ok(document(&title, &heading, &sections, settings.command.as_deref()))
+}
+
+/// Returns the checks that speak against the numbers, a sentence each.
+fn conspicuous(found: &ElementSummary) -> Vec<String> {
+    let doubtful = found.checks.iter().filter(|check| check.is_conspicuous());
+    doubtful.map(|check| format!("{}: {}", check.subject, check.sentence())).collect()
+}
+
+fn merits(found: &ElementSummary) -> Vec<String> {
+    let good: Vec<&CheckRow> = found.checks.iter().filter(|c| !c.is_conspicuous()).collect();
+    let mut subjects: Vec<String> = good.iter().map(|check| check.subject.to_string()).collect();
+    subjects.dedup();
+    let (count, all) = (good.len(), found.checks.len());
+    match count {
+        0 => Vec::new(),
+        _ => vec![format!(
+            "{count} of {all} checks of data and fit are good: {}",
+            subjects.join(", ")
+        )],
+    }
+}
+
+fn data(found: &ElementSummary) -> Markup {
+    let [low, high] = found.band_hz.map(|hz| compact(hz, 5));
+    let facts = vec![
+        pair("Degrees of freedom", found.points.join(", ")),
+        pair("Inputs", found.inputs.join(", ")),
+        pair("Lines", format!("{}, from {low} to {high} Hz", found.lines)),
+        pair("Noise", &found.noise),
+    ];
+    let tests = found.tests.iter().map(|test| pair(&test.file, test.words())).collect();
+    html! {
+        div.tables {
+            (Table { caption: "The data", header: &[], numbers_from: 9, rows: facts }.html())
+            (Table { caption: "Tests", header: &["file", "what was used"], numbers_from: 9, rows: tests }.html())
+        }
+        @for hit in found.hits.iter().filter(|hit| !hit.used) { p.note { (hit.record) ", " (hit) "." } }
+        (checks::list(&found.checks, When::Before))
+    }
+}
+
+/// Returns the unknowns, how they were found, what could be added, and the notes.
+fn machine(identified: &IdentifiedElements) -> Markup {
+    let found = identified.summary();
+    let interval = format!("{} % interval", compact(100.0 * found.confidence, 3));
+    let header = ["unknown", "value", "±", &interval, "unit", "from its prior"];
+    let rows = found.parameters.iter().map(|row| {
+        let [value, error, interval] = row.cells();
+        let share = row.estimate.prior.map(|prior| percent(prior.share));
+        let unit = row.unit.to_owned();
+        vec![row.estimate.name.clone(), value, error, interval, unit, share.unwrap_or_default()]
+    });
+    let has_priors = found.parameters.iter().any(|row| row.estimate.prior.is_some());
+    let columns = if has_priors { 6 } else { 5 };
+    let rows: Vec<Vec<String>> = rows.map(|row| row[..columns].to_vec()).collect();
+    let best = found.minima.first().map_or(0, |minimum| minimum.searches);
+    let fit = vec![
+        pair("Searches that ended at the highest likelihood", format!("{best} of {}", found.searches)),
+        pair("Minima found", found.minima.len().to_string()),
+        pair("Logarithm of the likelihood", significant(found.log_likelihood, 6)),
+        pair("Condition number", significant(found.condition_number, 3)),
+        pair("Equations", format!("{} for {}", found.equations, message::count(rows.len(), "unknown"))),
+    ];
+    html! {
+        div.tables {
+            (Table { caption: "Unknowns", header: &header[..columns], numbers_from: 1, rows }.html())
+            (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit }.html())
+        }
+        p.note { "± is one standard error." }
+        (candidates(found))
+        @for note in &found.notes { p.note { (note) "." } }
+    }
+}
+
+fn candidates(found: &ElementSummary) -> Markup {
+    let row = |row: &CandidateRow| {
+        let gain = row.information_gain.map_or("∞".into(), |gain| significant(gain, 3));
+        let reduction = found.reduction(row).map_or("–".into(), |share| significant(share, 3));
+        vec![row.name.clone(), gain, row.newly_determined.to_string(), reduction]
+    };
+    let header = ["to add", "information", "newly determined", "mean reduction of ±, %"];
+    let rows: Vec<Vec<String>> = found.candidates.iter().map(row).collect();
+    html! {
+        @if !rows.is_empty() {
+            (Table { caption: "What could be measured besides", header: &header, numbers_from: 1, rows }.html())
+            p.note {
+                "Information: the logarithm of the factor by which the volume of the confidence region of all \
+                 unknowns shrinks."
+            }
+        }
+    }
+}
+
+fn response(identified: &IdentifiedElements) -> Result<Markup, ReportError> {
+    let caption = "Amplitude of every sensor over frequency: measured, of the identified machine, and of their \
+                   difference; lines of the first test."
+        .to_owned();
+    let drawn = figures::drawn_set("sensors".into(), sensors::set(identified), caption)?;
+    Ok(html! { div.figures { (figure(&drawn)) } })
+}
+
+fn residual(found: &ElementSummary) -> Markup {
+    let row = |sensor: &mechid_analysis::elements::SensorRow| {
+        pair(&sensor.name, percent(sensor.relative_residual))
+    };
+    let rows = found.sensors.iter().map(row).collect();
+    let misfit = found.misfit_ratio.map(|ratio| significant(ratio, 4));
+    html! {
+        (Table { caption: "What is left of the motion", header: &["sensor", "residual, of RMS"], numbers_from: 1, rows }.html())
+        @if let Some(ratio) = misfit {
+            p { "Power of the residual over what the noise explains: " strong { (ratio) } "; 1 is expected." }
+        }
+        (checks::list(&found.checks, When::After))
+    }
+}
