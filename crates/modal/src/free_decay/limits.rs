@@ -82,17 +82,20 @@ pub(crate) const HANKEL_ROWS: usize = 160;
 /// Maximum share of the power above half the decimated sampling rate of the Hankel matrix.
 pub(crate) const INITIAL_ALIASED: f64 = 0.01;
 
-/// Slowest decay of the matched filters over the record, in nepers, and the ratio of each decay to
-/// the one before.
+/// Slowest decay of the matched filters over the record, in nepers.
 pub(crate) const FIRST_DECAY: f64 = 2.0;
+
+/// Ratio of the decay of a matched filter to the one before.
 pub(crate) const INITIAL_FASTER: f64 = 3.0;
 
 /// Growth of the matched filter of a growing response over the record, in nepers.
 pub(crate) const INITIAL_GROWTH: f64 = 6.0;
 
-/// Lowest and highest order of the polynomials of a backbone: the lowest has linear and quadratic
-/// damping; above the highest, the range of one decay does not determine the terms.
+/// Lowest order of the polynomials of a backbone: linear and quadratic damping.
 pub(crate) const LOWEST_ORDER: usize = 2;
+
+/// Highest order of the polynomials of a backbone; above it, the range of one decay does not
+/// determine the terms.
 pub(crate) const HIGHEST_ORDER: usize = 6;
 
 /// Maximum number of Gauss–Newton steps of a backbone.
