@@ -56,7 +56,8 @@ pub fn gain_symmetry(estimate: &Estimate) -> Option<Finding> {
         };
         let (above, below) = (entries[(i, j)], entries[(j, i)]);
         let (p, q) = (index(matrix, i, j)?, index(matrix, j, i)?);
-        let variance = spread.variance_of(p) / above.powi(2) + spread.variance_of(q) / below.powi(2)
+        let variance = spread.variance_of(p) / above.powi(2)
+            + spread.variance_of(q) / below.powi(2)
             - 2.0 * spread.between(p, q) / (above * below);
         let log = (above / below).ln();
         (log.is_finite() && variance > 0.0 && log * log > GAIN_SHOWS.powi(2) * variance)

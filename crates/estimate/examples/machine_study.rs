@@ -26,7 +26,11 @@ use judge::{Judged, judge};
 use mechid_estimate::likelihood::{LikelihoodEstimate, NoiseSource, Settings};
 
 /// Truth by name, and one experiment for each seed.
-type Study = (&'static str, Vec<(String, f64)>, Box<dyn Fn(u64) -> Option<LikelihoodEstimate> + Sync + Send>);
+type Study = (
+    &'static str,
+    Vec<(String, f64)>,
+    Box<dyn Fn(u64) -> Option<LikelihoodEstimate> + Sync + Send>,
+);
 
 fn row(name: &str, seeds: u64, start: Instant, judged: &Judged) {
     println!(

@@ -81,8 +81,11 @@ fn from_record(
     let block = measurement.whole_block()?;
     let signals = Signals::new(&block, how)?;
     let is_periodic = measurement.window_settings().period.is_some();
-    let mut data =
-        if is_periodic { signals.periods(&block, how)? } else { signals.open(&block, TestKind::Open, how)? };
+    let mut data = if is_periodic {
+        signals.periods(&block, how)?
+    } else {
+        signals.open(&block, TestKind::Open, how)?
+    };
     data.remarks = block.unit_notes();
     data.findings = checks::of_sensors(&block).into_iter().map(|finding| (0, finding)).collect();
     Ok(data)

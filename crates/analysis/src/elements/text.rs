@@ -35,7 +35,9 @@ impl ElementSummary {
             Some(window) if !self.hits.is_empty() => {
                 hits::heading(&self.hits, &compact(window.sample_rate_hz, 6))
             }
-            _ => self.tests.iter().map(|test| format!("{}: {}\n", test.file, test.words())).collect(),
+            _ => {
+                self.tests.iter().map(|test| format!("{}: {}\n", test.file, test.words())).collect()
+            }
         };
         let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
         text += &format!(

@@ -99,7 +99,12 @@ struct Printed<'a, R> {
 impl PageArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        self.fit.files().reads(self.elements.inputs()).reads(&self.about).reads(&self.geometry).writes([&self.output])
+        self.fit
+            .files()
+            .reads(self.elements.inputs())
+            .reads(&self.about)
+            .reads(&self.geometry)
+            .writes([&self.output])
     }
 
     /// Reads, identifies, draws and writes; `words` are the arguments of the program.

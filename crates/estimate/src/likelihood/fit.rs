@@ -9,8 +9,8 @@ use super::covariance::Information;
 use super::limits::{
     CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
 };
-use super::parts::{self, ComparedParts};
 use super::multi_start::{self, Minima, starts};
+use super::parts::{self, ComparedParts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum};

@@ -115,9 +115,8 @@ impl<'a> Linear<'a> {
     ) -> Option<Self> {
         let errors = residual.errors(&minimum.parameters)?.errors;
         let outputs = residual.data.outputs();
-        let is_rounding = |at: usize| {
-            errors.column(at).norm() <= ROUNDING_RESIDUAL * outputs.column(at).norm()
-        };
+        let is_rounding =
+            |at: usize| errors.column(at).norm() <= ROUNDING_RESIDUAL * outputs.column(at).norm();
         if (0..outputs.ncols()).any(is_rounding) {
             return None;
         }
@@ -147,7 +146,8 @@ impl<'a> Linear<'a> {
     fn bands(&self) -> Vec<Vec<usize>> {
         let mut rows: Vec<usize> = (0..self.omega.len()).collect();
         rows.sort_by(|a, b| self.omega[*a].total_cmp(&self.omega[*b]));
-        let leverage = |row: usize| self.basis.rows(self.of_line * row, self.of_line).norm_squared();
+        let leverage =
+            |row: usize| self.basis.rows(self.of_line * row, self.of_line).norm_squared();
         let all: f64 = rows.iter().map(|row| leverage(*row)).sum();
         let mut bands: Vec<Vec<usize>> = vec![Vec::new()];
         let (mut sum, mut last) = (0.0, f64::NAN);

@@ -102,11 +102,17 @@ fn machine(identified: &IdentifiedElements) -> Markup {
     let rows: Vec<Vec<String>> = rows.map(|row| row[..columns].to_vec()).collect();
     let best = found.minima.first().map_or(0, |minimum| minimum.searches);
     let fit = vec![
-        pair("Searches that ended at the highest likelihood", format!("{best} of {}", found.searches)),
+        pair(
+            "Searches that ended at the highest likelihood",
+            format!("{best} of {}", found.searches),
+        ),
         pair("Minima found", found.minima.len().to_string()),
         pair("Logarithm of the likelihood", significant(found.log_likelihood, 6)),
         pair("Condition number", significant(found.condition_number, 3)),
-        pair("Equations", format!("{} for {}", found.equations, message::count(rows.len(), "unknown"))),
+        pair(
+            "Equations",
+            format!("{} for {}", found.equations, message::count(rows.len(), "unknown")),
+        ),
     ];
     html! {
         div.tables {

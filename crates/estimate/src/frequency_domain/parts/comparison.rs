@@ -188,9 +188,7 @@ impl PartsOfFit<'_> {
         let cuts = Cuts::new(self, split)?;
         let parts: Vec<Part> = cuts.parts().collect();
         let level = match self.known {
-            Some(known) => {
-                Level::Known { inflation: self.inflation, degrees_of_freedom: known }
-            }
+            Some(known) => Level::Known { inflation: self.inflation, degrees_of_freedom: known },
             None => {
                 let (cost, free) = (self.linear.cost(), self.linear.free());
                 Level::Residual { inflation: self.inflation, cost, free }
