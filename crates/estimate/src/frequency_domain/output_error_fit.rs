@@ -108,8 +108,8 @@ impl EndLoads {
     /// receptance exists.
     ///
     /// # Errors
-    /// As [`EndLoads::without_transients`], and [`NumericsError::Size`] for another number of degrees of
-    /// freedom.
+    /// As [`EndLoads::without_transients`], and [`NumericsError::Size`] for another number of
+    /// degrees of freedom.
     pub fn without_transient_responses(
         &self,
         records: &[FrequencyData],
