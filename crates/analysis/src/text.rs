@@ -52,8 +52,8 @@ pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
 }
 
-/// Formats a number, in any unit, with so many significant digits; scientific where plain notation
-/// would be long.
+/// Formats a number, in any unit, with a number of significant digits; in scientific notation if
+/// plain notation would be long.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -71,8 +71,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Formats a number as [`significant`] does, without zeros at the end: for numbers that were
-/// chosen, not measured, in any unit.
+/// Formats a number like [`significant`], without trailing zeros: for given numbers, not measured
+/// ones, in any unit.
 pub fn compact(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     if text.contains('.') && !text.contains('e') {
@@ -82,14 +82,13 @@ pub fn compact(value: f64, digits: usize) -> String {
     }
 }
 
-/// Lines with an empty one above them; nothing if there is none.
+/// Returns lines after an empty one; an empty text without lines.
 pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
     let lines: String = lines.map(|line| line + "\n").collect();
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
-/// Returns the note on standard errors that are `factor` times those of the noise, for the reasons
-/// that `checks` name.
+/// Returns the note on standard errors that are scaled by `factor`, with the reasons from `checks`.
 pub(crate) fn scaled_errors(factor: f64, checks: &str) -> String {
     format!(
         "standard errors and intervals are {} times those of the noise alone, for model and data disagree beyond the \

@@ -12,14 +12,14 @@ use crate::text::{compact, scaled_errors, significant};
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ElementNote {
-    /// A parameter lies at a bound beyond which the data would have it.
+    /// A bound limits a parameter.
     AtBound {
         /// Name of the parameter.
         parameter: String,
         /// Bound, in the unit of the parameter.
         bound: f64,
     },
-    /// Standard errors and intervals are larger than the noise makes them.
+    /// Standard errors and intervals are scaled by the residual.
     ScaledErrors {
         /// Factor.
         factor: f64,
@@ -40,16 +40,16 @@ pub enum ElementNote {
     },
     /// Structural damping has no place in M, C and K.
     Hysteresis,
-    /// M, C and K are those of the rotor at rest, for each line had a speed of its own.
+    /// M, C and K are those of the rotor at rest, because the speed differs from line to line.
     AtRest,
     /// Too many entries of M, C and K are uncertain for their covariance.
     NoCovariance {
         /// Largest number of entries.
         most: usize,
     },
-    /// Standard errors of M, C and K do not know how far a parameter at its bound could be away.
+    /// Standard errors of M, C and K do not include the uncertainty of a parameter at its bound.
     BoundInSystem,
-    /// Remark on what was read.
+    /// Remark on the data that were read.
     Read {
         /// The remark.
         text: String,

@@ -24,7 +24,7 @@ pub struct IdentifyElements {
     /// Frequencies to use; without, those that the inputs drive.
     #[serde(default)]
     pub band: Option<Band>,
-    /// Frequencies whose lines are left out.
+    /// Frequencies of excluded lines.
     #[serde(default)]
     pub without_hz: Vec<Disturbance>,
     /// Rule by which records of a hammer test are cut into their hits.
@@ -37,13 +37,13 @@ pub struct IdentifyElements {
     /// Noise spectrum by which the lines are weighted.
     #[serde(default)]
     pub noise: Pooling,
-    /// Maximum number of searches: one from the given values, the others from random ones.
+    /// Maximum number of searches: one from the given initial values, the others from random ones.
     #[serde(default = "usual_starts")]
     pub starts: usize,
-    /// Seed of the random first values.
+    /// Seed of the random initial values.
     #[serde(default)]
     pub seed: u64,
-    /// Probability with which the intervals contain the parameters.
+    /// Confidence level of the intervals, a probability.
     #[serde(default = "usual_confidence")]
     pub confidence: f64,
 }

@@ -13,8 +13,7 @@ use super::{ElementData, IdentifyElements};
 use crate::AnalysisError;
 use crate::measurement::Channels;
 
-/// Names of the column of speeds, each with the number of hertz in its unit; `speed` needs a unit
-/// of its own.
+/// Names of the column of speeds, each with its unit in Hz; the column `speed` must state its unit.
 const SPEEDS: [(&str, Option<f64>); 6] = [
     ("speed_rpm", Some(1.0 / 60.0)),
     ("rpm", Some(1.0 / 60.0)),
@@ -25,14 +24,14 @@ const SPEEDS: [(&str, Option<f64>); 6] = [
 ];
 
 impl ElementData {
-    /// Takes tables of synchronous responses: one row per speed of a run, whose amplitudes turn as
-    /// e^{iΩt}.
+    /// Reads tables of synchronous responses: one row per speed of a run, with complex amplitudes
+    /// of e^{iΩt}.
     ///
     /// The speed is in a column `speed_rpm`, `speed_hz`, `speed_rad_s`, or `speed` with a unit.
     /// Each sensor and each input has the columns NAME_real and NAME_imaginary, or NAME_amplitude
     /// and NAME_phase_deg (or NAME_phase_rad), in SI units or those of their headers; an unbalance
-    /// is in kg·m. Beside them may stand NAME_standard_error, of real and imaginary part alike, for
-    /// every sensor.
+    /// is in kg·m. Optional columns NAME_standard_error have the standard error of real and
+    /// imaginary part of a sensor.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] for a machine whose speed is not `synchronous` and for a missing
@@ -102,7 +101,7 @@ fn from_table(table: &Table, how: &IdentifyElements) -> Result<ElementData, Anal
     Ok(ElementData { source, noise: noise.into(), ..data })
 }
 
-/// Speeds, in Hz.
+/// Returns the speeds, in Hz.
 fn speeds_hz(table: &Table) -> Result<Vec<f64>, AnalysisError> {
     let found = SPEEDS.iter().find_map(|(name, hz)| Some((table.find(name).ok()?, *hz)));
     let missing = "it needs a column speed_rpm, speed_hz or speed_rad_s";
@@ -118,7 +117,7 @@ fn speeds_hz(table: &Table) -> Result<Vec<f64>, AnalysisError> {
     }
 }
 
-/// Complex amplitudes of a channel, in SI units.
+/// Returns the complex amplitudes of a channel, in SI units.
 fn amplitudes(
     table: &Table,
     name: &str,

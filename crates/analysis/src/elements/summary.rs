@@ -1,4 +1,4 @@
-//! The result of the identification of a machine: numbers, checks, notes.
+//! Result of the identification of a machine: numbers, checks, notes.
 
 use std::f64::consts::TAU;
 
@@ -22,8 +22,7 @@ use crate::identify::checks::{CheckRow, When};
 use crate::identify::rows::ModeRow;
 use crate::limits::{LISTED_MODES_DOF, PRIOR_SHARE};
 
-/// The identified coefficients of a machine with their uncertainty, and what they were identified
-/// from.
+/// Identified coefficients of a machine with their uncertainty, and the tests.
 #[derive(Debug, Serialize)]
 pub struct ElementSummary {
     /// Tests that were fitted together.
@@ -43,7 +42,7 @@ pub struct ElementSummary {
     pub band_hz: [f64; 2],
     /// Number of real numbers that were fitted.
     pub equations: usize,
-    /// Noise by which the lines were weighted, in words.
+    /// Noise of the weights of the lines, in words.
     pub noise: String,
     /// Level of the intervals, a pure number such as 0.95.
     pub confidence: f64,
@@ -51,24 +50,24 @@ pub struct ElementSummary {
     pub parameters: Vec<ElementRow>,
     /// Covariance of the unknowns, in the products of their units.
     pub parameter_covariance: ParameterCovariance,
-    /// Unknowns of which the data determine combinations only.
+    /// Unknowns with only some combinations determined by the data.
     pub combinations: Vec<CombinationRow>,
     /// Logarithm of the likelihood, a pure number.
     pub log_likelihood: f64,
-    /// Minima found, the lowest first.
+    /// Minima of all searches, the lowest first.
     pub minima: Vec<FoundMinimum>,
     /// Number of searches.
     pub searches: usize,
-    /// Ratio of the power of the residual to its expectation; `None` where the noise comes from the
+    /// Ratio of the power of the residual to its expectation; `None` if the noise comes from the
     /// residual.
     pub misfit_ratio: Option<f64>,
-    /// Probability of a larger misfit if model and noise are right.
+    /// Probability of a larger misfit if model and noise are correct.
     pub misfit_p_value: Option<f64>,
-    /// Factor by which standard errors and intervals are larger than the noise alone makes them.
+    /// Factor on the standard errors and intervals from the noise, a ratio.
     pub error_scale: f64,
-    /// Ratio of the best to the worst determined direction of the scaled parameters.
+    /// Condition number of the Jacobian with columns of unit length, a pure number.
     pub condition_number: f64,
-    /// Measurements that could be added, the best first.
+    /// Additional measurements, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<CandidateRow>,
     /// Modes of small machines, by rising frequency.
@@ -78,9 +77,9 @@ pub struct ElementSummary {
     pub checks: Vec<CheckRow>,
     /// Notes on the numbers.
     pub notes: Vec<ElementNote>,
-    /// M, C (with Ω G) and K; `None` where they make no system.
+    /// M, C (with Ω G) and K; `None` if they do not form a system.
     pub system: Option<SystemMatrices>,
-    /// Covariance of those of their entries that depend on unknowns.
+    /// Covariance of the entries of these matrices that depend on unknowns.
     pub covariance: Option<ParameterCovariance>,
     /// The settings, which repeat the analysis.
     pub analysis: IdentifyElements,
@@ -96,10 +95,10 @@ pub struct ElementRow {
     pub estimate: ParameterEstimate,
 }
 
-/// A sensor, and what the model leaves of it.
+/// A sensor with its residual.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorRow {
-    /// Name, that of the channel.
+    /// Name of the channel.
     pub name: String,
     /// Unit of the quantity.
     pub unit: &'static str,
@@ -107,7 +106,7 @@ pub struct SensorRow {
     pub relative_residual: f64,
 }
 
-/// Unknowns of which the data determine combinations only.
+/// Unknowns with only some combinations determined by the data.
 #[derive(Debug, Clone, Serialize)]
 pub struct CombinationRow {
     /// The combinations, in a sentence.
@@ -117,17 +116,18 @@ pub struct CombinationRow {
     pub combination: Combination,
 }
 
-/// A sensor or a force that could be added.
+/// An additional sensor or force.
 #[derive(Debug, Clone, Serialize)]
 pub struct CandidateRow {
     /// Name of the sensor or the force.
     pub name: String,
-    /// Logarithm of the factor by which the volume of the confidence region shrinks; `None` where a
-    /// combination becomes determined that was not.
+    /// Logarithm of the ratio of the volumes of the confidence region without and with the
+    /// measurement; `None` if a combination becomes determined.
     pub information_gain: Option<f64>,
     /// Number of parameters or combinations that become determined.
     pub newly_determined: usize,
-    /// Standard errors with it, one for each parameter, in its SI unit; `None` of what stays open.
+    /// Standard errors with it, one for each parameter, in its SI unit; `None` if the parameter is
+    /// still not determined.
     pub standard_errors: Vec<Option<f64>>,
 }
 
@@ -216,14 +216,14 @@ fn parameters(estimate: &MachineEstimate) -> Vec<ElementRow> {
     rows.map(|(estimate, p)| ElementRow { unit: p.unit, estimate: estimate.clone() }).collect()
 }
 
-/// Lowest and highest frequency, in Hz.
+/// Returns the lowest and the highest frequency, in Hz.
 fn band_hz(omega: &[f64]) -> [f64; 2] {
     let low = omega.iter().copied().fold(f64::INFINITY, f64::min);
     let high = omega.iter().copied().fold(0.0, f64::max);
     [low / TAU, high / TAU]
 }
 
-/// Covariance of the unknowns; the variance of those that are not determined is infinite.
+/// Returns the covariance of the unknowns; undetermined unknowns have an infinite variance.
 fn parameter_covariance(estimate: &MachineEstimate, equations: usize) -> ParameterCovariance {
     let parameters = &estimate.likelihood.parameters;
     let mut covariance: DMatrix<f64> = estimate.likelihood.covariance.clone();
@@ -255,14 +255,14 @@ fn candidates(
     Ok(gains.into_iter().map(CandidateRow::from).collect())
 }
 
-/// Modes of a small machine whose entries are all determined.
+/// Returns the modes of a small machine if all its entries are determined.
 fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, AnalysisError> {
     let is_small = estimate.assembly.dof() <= LISTED_MODES_DOF;
-    // At a speed of its own on each line a rotor has other modes on each.
+    // A rotor with another speed on each line has other modes on each line.
     if !is_small || estimate.assembly.speed() == Speed::Synchronous {
         return Ok(Vec::new());
     }
-    // What keeps the machine from having modes is a note or a combination of its own.
+    // A note or an undetermined combination states why the machine has no modes.
     let Ok(machine) = machine::machine(estimate, equations) else { return Ok(Vec::new()) };
     ModeRow::all(&machine.modes()?, machine.is_exact())
 }

@@ -1,4 +1,4 @@
-//! The result of the identification of a machine as text.
+//! Result of the identification of a machine as text.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use crate::identify::checks::CheckRow;
 use crate::identify::rows::{ModeRow, Uncertain};
 use crate::text::{compact, paragraph, significant, text_table};
 
-/// Digits of the ends of an interval.
+/// Number of digits of the limits of an interval.
 const INTERVAL_DIGITS: usize = 5;
 
 impl fmt::Display for ElementSummary {
@@ -82,8 +82,8 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Modes up to the highest frequency of the data, with an empty line above; nothing without
-    /// any.
+    /// Returns the modes up to the highest frequency of the data, after an empty line; an empty
+    /// text without modes.
     fn mode_table(&self) -> String {
         let header = ["mode", "value", "±"].map(String::from).to_vec();
         let mut rows = vec![header];
@@ -183,7 +183,7 @@ impl ElementRow {
     }
 }
 
-/// Value, standard error and interval; the error tells how many digits they deserve.
+/// Returns value, standard error and interval, with digits that depend on the error.
 fn cells(estimate: &ParameterEstimate) -> [String; 3] {
     let end = |value: f64| compact(value, INTERVAL_DIGITS);
     let [low, high] = estimate.interval;

@@ -9,13 +9,13 @@ use serde::Serialize;
 
 use crate::extremes::Extremes;
 
-/// Spectral lines told of a channel.
+/// Maximum number of reported spectral lines of a channel.
 const STRONGEST: usize = 3;
 
-/// Weaker lines are not told, as a part of the strongest one.
+/// Minimum ratio of a reported line to the strongest one.
 const FAINTEST: f64 = 0.01;
 
-/// The measures of a channel.
+/// Measures of a channel.
 #[derive(Debug, Serialize)]
 pub struct Channel {
     /// Column.
@@ -42,7 +42,7 @@ pub struct Channel {
     pub spectrum_peaks: Vec<SpectrumPeak>,
     /// Period of the channel; `None` if it does not repeat.
     pub period: Option<Period>,
-    /// `true` if lines and period were looked for.
+    /// `true` if the channel was searched for lines and a period.
     #[serde(skip)]
     pub spectral: bool,
 }
@@ -63,7 +63,7 @@ pub struct SpectrumPeak {
 pub struct Cut {
     /// Amplitude, in the unit of the channel.
     pub level: f64,
-    /// Samples there, in rows of three or more.
+    /// Number of samples at this amplitude, in runs of at least three.
     pub samples: usize,
 }
 
@@ -82,7 +82,7 @@ pub struct Period {
 #[derive(Debug, Default)]
 pub struct Gathered {
     levels: RunningStatistics,
-    /// The first samples, which are looked at together; none where nothing is looked for.
+    /// The first samples, for lines and period; empty without such a search.
     held: Vec<f64>,
     /// Extreme values over time; `None` if no picture is drawn.
     extremes: Option<Extremes>,
@@ -106,7 +106,7 @@ impl Gathered {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }
 
-    /// Takes the next samples; the first `hold` of all are held.
+    /// Adds the next samples and stores the first `hold` of all.
     pub(crate) fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
         if let Some(extremes) = &mut self.extremes {
@@ -119,7 +119,7 @@ impl Gathered {
 }
 
 impl Measured {
-    /// Measures a channel whose step, in s, may be unknown, and of which a period may be `given`.
+    /// Measures a channel; its time step, in s, may be unknown, and its period may be `given`.
     pub(crate) fn of(
         column: usize,
         name: String,
@@ -156,16 +156,16 @@ impl Measured {
     }
 }
 
-/// Amplitudes closer than this, relative to the largest, are one.
+/// Maximum difference of equal amplitudes, relative to the largest.
 const EQUAL: f64 = 1e-9;
 
-/// The spectrum about the mean: of whole periods where the channel repeats or somebody says so,
+/// Spectrum about the mean: of whole periods if the channel is periodic or a period is given,
 /// otherwise of all samples weighted by a Hann window.
 #[derive(Debug)]
 pub struct AmplitudeSpectrum {
     /// Amplitudes of the lines from 0 Hz on.
     amplitude: Vec<f64>,
-    /// That were transformed.
+    /// Number of transformed samples.
     samples: usize,
     period: Option<usize>,
 }
@@ -180,7 +180,7 @@ impl AmplitudeSpectrum {
             return Ok(Self { amplitude: Vec::new(), samples, period });
         }
         for (k, value) in values.iter_mut().enumerate() {
-            // The window's mean is 1, so that a sine keeps its amplitude.
+            // The mean of the window is 1, so that a sine keeps its amplitude.
             let weight = match period {
                 Some(_) => 1.0,
                 None => 1.0 - (TAU * k as f64 / samples as f64).cos(),

@@ -27,7 +27,7 @@ pub use self::window::{Window, Windowed};
 use crate::AnalysisError;
 use crate::limits::{FEW_CHANNELS, PAIR_BYTES, PREDICT_BYTES, check_memory};
 
-/// Number of samples held in memory of a window of which not all samples are needed at once.
+/// Number of samples in memory of a window that is not needed as a whole.
 pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 
 /// Number of samples read at a time from a window that is not held in memory.
@@ -55,7 +55,7 @@ pub struct Measurement {
     window: Window,
 }
 
-/// Samples of the columns used, and what one pass over them tells.
+/// Samples of the used columns, and their statistics from one pass.
 #[derive(Debug)]
 pub(crate) struct RecordSource {
     /// Name for messages.
@@ -73,7 +73,7 @@ pub(crate) struct RecordSource {
     /// Constant to subtract from each column used, in its own unit.
     pub offsets: Vec<f64>,
     pub units: ToSi,
-    /// Memory that work on the record may take, in bytes.
+    /// Maximum memory of an analysis of the record, in bytes.
     memory: usize,
     samples: Samples,
 }
@@ -356,7 +356,7 @@ impl Measurement {
         &self.source
     }
 
-    /// Reads the whole window, with whatever channels are named.
+    /// Reads the whole window with all named channels.
     ///
     /// # Errors
     /// [`AnalysisError::Window`], and if the file cannot be read again.
@@ -526,7 +526,7 @@ impl Block {
         measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()
     }
 
-    /// Returns what is to be said about units: the findings, and the remarks.
+    /// Returns findings and remarks about units.
     pub fn unit_notes(&self) -> Vec<String> {
         let findings = self.unit_findings.iter().map(Finding::to_string);
         findings.chain(self.unit_remarks.iter().cloned()).collect()

@@ -1,13 +1,13 @@
-//! Reconstruction of the unknown force that drove a known machine.
+//! Reconstruction of the unknown force on a known machine.
 //!
 //! | File | What it does |
 //! |---|---|
 //! | `options` | settings, as values |
 //! | `motion` | the measured responses |
-//! | `method` | which method suits a record, and what it finds |
-//! | `chunks` | the same where the record is not held in memory |
+//! | `method` | the choice of the method, and its result |
+//! | `chunks` | the reconstruction of a record that is not in memory |
 //! | `shown` | the band in which responses without a displacement show a force |
-//! | `unexplained`, `periods`, `kinematics` | what speaks against the result |
+//! | `unexplained`, `periods`, `kinematics` | doubts about the result |
 //! | `tally`, `peak_line` | levels and strongest line of the force |
 //! | `summary` | the result: numbers and remarks |
 
@@ -42,9 +42,9 @@ use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::Measurement;
 
-/// The force that drove a machine, and how it was found.
+/// Reconstructed force on a machine, with its method.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]
 pub struct Reconstructed {
     summary: ForceSummary,
@@ -53,12 +53,12 @@ pub struct Reconstructed {
     lines: Option<Vec<usize>>,
 }
 
-/// Consecutive samples of a force, as they are found.
+/// Consecutive samples of a reconstructed force.
 #[derive(Debug)]
 pub struct ForceChunk<'a> {
     /// Time axis of the whole force.
     pub sampling: Sampling,
-    /// The force, of which `samples` are new.
+    /// The force; `samples` are its new samples.
     pub force: &'a IdentifiedForce,
     /// Samples of `force` that follow those of the chunk before.
     pub samples: Range<usize>,
@@ -92,7 +92,7 @@ pub fn numbered(base: &str, dof: usize, dofs: usize) -> String {
     if dofs == 1 { base.into() } else { format!("{base}_{}", dof + 1) }
 }
 
-/// Reconstructs the force that drove a known machine from its measured response.
+/// Reconstructs the force on a known machine from its measured response.
 ///
 /// The window is whole periods if the measurement has a period or `lines` are given (they are
 /// averaged), an open record otherwise. The uncertainty of an identified machine counts in the
@@ -111,10 +111,10 @@ pub fn reconstruct(
     reconstruct_with(run, machine, how, &mut |_| Ok(()))
 }
 
-/// Reconstructs a force as [`reconstruct`] does, and passes the force on to `take`.
+/// Reconstructs a force like [`reconstruct`], and passes the force to `take`.
 ///
 /// # Errors
-/// As [`reconstruct`], and whatever `take` gives.
+/// As [`reconstruct`], and the errors of `take`.
 pub fn reconstruct_with(
     run: &Measurement,
     machine: &Machine,
@@ -128,12 +128,11 @@ pub fn reconstruct_with(
     Ok(Reconstructed { summary, force, forced, lines })
 }
 
-/// Reconstructs the force of a record of any length: passes the force on to `take` as it is found,
-/// chunk
-/// by chunk in order, and holds no more of it than the method needs.
+/// Reconstructs the force of a record of any length: it passes the force to `take` chunk by chunk
+/// in order, and stores no more of it than the method needs.
 ///
 /// # Errors
-/// As [`reconstruct`], and whatever `take` gives.
+/// As [`reconstruct`], and the errors of `take`.
 pub fn reconstruct_in_chunks(
     run: &Measurement,
     machine: &Machine,
@@ -154,12 +153,12 @@ impl Reconstructed {
         &self.force
     }
 
-    /// Returns the degrees of freedom where a force was sought, counted from 0.
+    /// Returns the degrees of freedom with a reconstructed force, counted from 0.
     pub fn forced(&self) -> &[usize] {
         &self.forced
     }
 
-    /// Returns the spectral lines where a force was sought; `None`: all.
+    /// Returns the spectral lines of the reconstructed force; `None`: all.
     pub fn lines(&self) -> Option<&[usize]> {
         self.lines.as_deref()
     }

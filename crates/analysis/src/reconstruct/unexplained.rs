@@ -7,15 +7,15 @@ use super::method::Request;
 use super::motion::Recorded;
 use crate::text::significant;
 
-/// A measured channel, and how much of it the forces found do not explain.
+/// A measured channel with the part that the reconstructed forces do not explain.
 #[derive(Debug, Serialize)]
 pub struct Measured {
     /// Number of the channel, counted from 1.
     pub channel: usize,
     /// Name of the column.
     pub column: String,
-    /// RMS of the unexplained part over the RMS of the response, a ratio; `None` where as many
-    /// forces are sought as channels were measured, or where none was compared.
+    /// Ratio of the RMS of the unexplained part to the RMS of the response; `None` with as many
+    /// forces as measured channels, or without a comparison.
     pub unexplained: Option<f64>,
     /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the
     /// noise is not known apart from the fit.
@@ -26,10 +26,11 @@ pub struct Measured {
 /// its level of one complex line once in e⁹ times, of more lines more rarely.
 const TOO_MUCH: f64 = 3.0;
 
-/// A rest below this share moves no force by more than a machine is ever known to.
+/// Maximum unexplained share whose effect on the force is negligible against the uncertainty of any
+/// machine.
 const LITTLE: f64 = 0.01;
 
-/// A share that a sensor's noise seldom has, where nothing is known of it.
+/// Maximum unexplained share without a remark if the noise of a sensor is unknown.
 const SELDOM_NOISE: f64 = 0.1;
 
 impl Measured {
@@ -58,7 +59,8 @@ impl Measured {
     }
 }
 
-/// Share of the motion that noise and the machine's uncertainty may leave.
+/// Returns the expected unexplained share of the motion due to noise and the uncertainty of the
+/// machine.
 fn expected(unexplained: &Unexplained) -> Option<f64> {
     let level = unexplained.noise?.hypot(unexplained.machine.unwrap_or(0.0));
     (unexplained.motion > 0.0).then_some(level / unexplained.motion)
@@ -74,7 +76,7 @@ fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
-/// Returns a remark where more is left than noise and machine may leave.
+/// Returns a remark if the unexplained part is larger than noise and machine can explain.
 pub fn remark(
     measured: &[Measured],
     unexplained: Option<&[Unexplained]>,
