@@ -7,7 +7,7 @@ use mechid::analysis::AnalysisError;
 use mechid::io::{IoError, output_name};
 use mechid::signal::message;
 
-/// A failure of a subcommand; its message is all the user sees.
+/// Failure of a subcommand; the user sees only its message.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CliError {
@@ -23,7 +23,7 @@ pub enum CliError {
     /// A file cannot be read, understood or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// Shapes that cannot be placed.
+    /// Mode shapes without the geometry to draw them.
     #[error(
         "no mode shapes: they need modes that oscillate, at two channels or more, and a point in --geometry for each of \
          {names}"
@@ -32,20 +32,20 @@ pub enum CliError {
         /// Names of the channels.
         names: String,
     },
-    /// The file about a measurement cannot be read.
+    /// The file with details of a measurement cannot be read.
     #[error("{file}: {source}")]
     About {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// An option without its object.
+    /// An option in the wrong context.
     #[error("{option} {why}")]
     MisplacedOption {
         /// The option.
         option: &'static str,
-        /// Reason why it does not belong there.
+        /// Reason for which it does not belong there.
         why: &'static str,
     },
     /// A time-stepping scheme refuses.
@@ -54,7 +54,7 @@ pub enum CliError {
     /// The simulation failed.
     #[error(transparent)]
     Simulate(#[from] mechid::SimulateError),
-    /// More numbers than can be held.
+    /// A record with too many numbers.
     #[error(
         "a record of {numbers} numbers is too large, {largest} is the limit: fewer --samples, \
          --periods or --inputs"
@@ -65,16 +65,16 @@ pub enum CliError {
         /// The limit.
         largest: usize,
     },
-    /// Two things on one stream.
+    /// Two results for standard output.
     #[error(
         "standard output takes one thing, not {}{}",
         message::count(*files, "file"),
         if *json { " and the report: name files, or leave --json out" } else { ": name the others" }
     )]
     SharedOutput {
-        /// Files that are to go there.
+        /// Number of files for standard output.
         files: usize,
-        /// Whether the report as JSON goes there, too.
+        /// `true` if the report as JSON goes there, too.
         json: bool,
     },
     /// The report cannot be printed.
@@ -103,8 +103,8 @@ impl CliError {
         }
     }
 
-    /// Returns the message of a command that `raises` limits or has no such option; `spelled` writes the settings
-    /// that the analysis names as options.
+    /// Returns the message; `raises` states whether the command has options to raise limits, and
+    /// `spelled` replaces names of settings by options.
     pub fn message(&self, raises: bool, spelled: impl Fn(&str) -> String) -> String {
         match self {
             Self::Io(error @ IoError::TooLarge { file, at, limit })
@@ -119,7 +119,7 @@ impl CliError {
                     (false, _) => format!("{file}, {at}: {limit}, which this command cannot raise"),
                 }
             }
-            // A file's own words stay as they are.
+            // Text from a file is not changed.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),
             Self::Analysis(error) => spelled(&error.to_string()),
             other => other.to_string(),

@@ -1,10 +1,11 @@
-//! The `mechid` program as a library, so that other packages can carry it: the only argument parsing,
-//! and the only printing, of the workspace.
+//! The `mechid` program as a library, for other packages that include it: the only crate of the
+//! workspace that parses arguments and prints.
 //!
 //! A subcommand is one file of `commands`: arguments become settings of an analysis, its result an
-//! `Outcome`. It neither prints nor gives a file its name: that happens in `outcome`, once everything
-//! has succeeded, so that a failure leaves nothing half written. Every failure ends with one message on
-//! the error stream and exit code 2; a run over many records of which some failed with exit code 1.
+//! `Outcome`. Printing and the final names of files happen in `outcome` after everything has
+//! succeeded, so that a failure leaves no incomplete file. Every failure ends with one message on
+//! the error stream and exit code 2; a run over many records with some failures ends with exit code
+//! 1.
 mod args;
 mod commands;
 mod error;
@@ -27,13 +28,13 @@ pub use crate::worker::set_worker_program;
 /// Exit code of every failure; the argument parser uses the same one.
 const FAILURE: u8 = 2;
 
-/// Exit code of a run over many records of which some have no result.
+/// Exit code of a run over many records if some have no result.
 const INCOMPLETE: u8 = 1;
 
-/// Exit code that a shell gives a program which a closed pipe has ended: 128 and SIGPIPE.
+/// Exit code for a program that ends because of a closed pipe: 128 + SIGPIPE.
 const BROKEN_PIPE: u8 = 141;
 
-/// Runs the program with these arguments, the first of which is its name, and returns its exit code.
+/// Runs the program with these arguments, beginning with its name, and returns its exit code.
 ///
 /// ```
 /// use std::process::ExitCode;
@@ -60,10 +61,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match outcome(&cli, arguments.get(1..).unwrap_or_default()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(INCOMPLETE),
-        // The reader has seen enough (`mechid … | head`).
+        // The reader has closed the pipe (`mechid … | head`).
         Err(error) if error.is_closed_output() => ExitCode::from(BROKEN_PIPE),
         Err(error) => {
-            // A message that cannot be told changes nothing: the exit code stays.
+            // The exit code is the same even if the message cannot be printed.
             let command = arguments.get(1).and_then(|word| word.to_str()).unwrap_or_default();
             let raises = options::has(command, "raise-limits");
             let message = error.message(raises, options::spelled);
@@ -73,7 +74,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Runs the command and tells its outcome; returns whether all that was asked for has a result.
+/// Runs the command and delivers its outcome; returns whether everything requested has a result.
 fn outcome(cli: &Cli, words: &[OsString]) -> Result<bool, CliError> {
     cli.command.files().check()?;
     let outcome = match cli.command.waiting() {

@@ -4,8 +4,8 @@ use clap::CommandFactory as _;
 
 use crate::commands::Cli;
 
-/// Returns a message in which the settings between backticks, such as `sample_rate`, are written as the
-/// options of the program, such as --sample-rate. What is no option stays as it is.
+/// Returns a message in which the settings between backticks, such as `sample_rate`, are written as
+/// the options of the program, such as --sample-rate. Other text is not changed.
 pub fn spelled(message: &str) -> String {
     let mut pieces = message.split('`');
     let mut spelled = pieces.next().unwrap_or_default().to_owned();
@@ -21,13 +21,13 @@ pub fn spelled(message: &str) -> String {
     spelled
 }
 
-/// Returns the option of any subcommand that a setting stands for.
+/// Returns the option of any subcommand with the name of a setting.
 fn option(setting: &str) -> Option<String> {
     let name = setting.replace('_', "-");
     Cli::command().get_subcommands().any(|command| takes(command, &name)).then_some(name)
 }
 
-/// Returns whether the subcommand of some name takes an option.
+/// Returns whether a subcommand has an option.
 pub fn has(subcommand: &str, option: &str) -> bool {
     Cli::command().find_subcommand(subcommand).is_some_and(|command| takes(command, option))
 }

@@ -1,4 +1,4 @@
-//! Result of a subcommand, and its way to the user.
+//! Result of a subcommand, and its output.
 
 use std::fmt::Write as _;
 use std::io;
@@ -14,10 +14,10 @@ use serde::Serialize;
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 
-/// Pixels of a PNG file for each px of the drawing.
+/// Number of pixels of a PNG file per px of the drawing.
 const PNG_SCALE: f64 = 2.0;
 
-/// A page of one figure.
+/// Returns a page with one figure.
 fn page(figure: Figure) -> Result<String, CliError> {
     let title = figure.name().to_owned();
     Ok(figure_page(&title, vec![(String::new(), figure)], None)?)
@@ -43,31 +43,31 @@ impl<'a> Files<'a> {
         self
     }
 
-    /// Refuses an output that is an input, by whatever path or link.
+    /// Refuses an output that is an input, through any path or link.
     pub fn check(&self) -> Result<(), CliError> {
         Ok(refuse_replaced_inputs(&self.inputs, &self.outputs)?)
     }
 }
 
-/// The result of a subcommand, complete before anything is written or printed.
+/// Result of a subcommand, complete before anything is written or printed.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Text for a person.
+    /// Text for the user.
     text: String,
     /// `true` if settings in the text are named between backticks.
     names_settings: bool,
-    /// The same for programs.
+    /// Report for programs.
     json: String,
     /// Files to write.
     files: Vec<OutputFile>,
-    /// Files too long to be held, complete but for their names.
+    /// Files too long for the memory, complete except for their final names.
     begun: Vec<BegunFile>,
-    /// `true` if some of what was asked for has no result.
+    /// `true` if a requested result is missing.
     is_incomplete: bool,
 }
 
 impl Outcome {
-    /// An outcome told as `text` to a person and as the fields of `report` to a program.
+    /// Creates an outcome with `text` for the user and the fields of `report` for programs.
     pub fn new(text: String, report: &impl Serialize) -> Result<Self, CliError> {
         let json = serde_json::to_string_pretty(report)? + "\n";
         Ok(Self {
@@ -80,8 +80,8 @@ impl Outcome {
         })
     }
 
-    /// An outcome that is a text and nothing else.
-    pub fn of_text(text: String) -> Self {
+    /// Creates an outcome that is only a text.
+    pub fn from_text(text: String) -> Self {
         Self {
             text,
             names_settings: false,
@@ -92,29 +92,29 @@ impl Outcome {
         }
     }
 
-    /// The same outcome, of which the exit code says that some of what was asked for has no result.
+    /// Marks the outcome as incomplete: the exit code shows that a requested result is missing.
     pub fn incomplete(self) -> Self {
         Self { is_incomplete: true, ..self }
     }
 
-    /// Returns whether all that was asked for has a result.
+    /// Returns whether everything requested has a result.
     pub fn is_complete(&self) -> bool {
         !self.is_incomplete
     }
 
-    /// The same outcome with one more file to write.
+    /// Adds a file to write.
     pub fn with_file(mut self, path: &Path, content: impl Into<Vec<u8>>) -> Self {
         self.files.push(OutputFile { path: path.to_owned(), content: content.into() });
         self
     }
 
-    /// The same outcome with one more file, which only needs its name.
+    /// Adds a complete file that only needs its final name.
     pub fn with_begun(mut self, file: BegunFile) -> Self {
         self.begun.push(file);
         self
     }
 
-    /// The same outcome with the figure that `--plot` asks for, drawn only then.
+    /// Adds the figure for `--plot`, drawn only if requested.
     pub fn with_plot(
         self,
         plot: &PlotArgs,
@@ -131,7 +131,7 @@ impl Outcome {
         Ok(self.with_file(path, content))
     }
 
-    /// The same outcome with the figure or page of a result that `--plot` asks for.
+    /// Adds the figure or page of a result for `--plot`.
     pub fn with_result_plot(
         self,
         plot: &PlotArgs,
@@ -144,10 +144,10 @@ impl Outcome {
         }
     }
 
-    /// Writes the files, all or none, and prints the report: on the error stream where a file goes
-    /// to standard output, for whoever reads on there expects the file and nothing else.
+    /// Writes the files, all or none, and prints the report; on the error stream if a file goes to
+    /// standard output, so that the reader there receives only the file.
     ///
-    /// `spelled` writes the settings that the report names as options.
+    /// `spelled` replaces the names of settings in the report by options.
     pub fn deliver(
         self,
         report: &ReportArgs,
@@ -177,12 +177,12 @@ fn print(mut out: impl io::Write, text: &str) -> io::Result<()> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush())
 }
 
-/// Returns lines of text in which characters that a terminal obeys are written out.
+/// Returns text with the control characters of a terminal escaped.
 pub fn shown(text: &str) -> String {
     text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
 }
 
-/// Returns JSON in which such characters, which can only stand in strings, are escaped as JSON has it.
+/// Returns JSON with such characters, which occur only in strings, escaped by the rules of JSON.
 fn shown_json(json: &str) -> String {
     let mut shown = String::with_capacity(json.len());
     for c in json.chars() {

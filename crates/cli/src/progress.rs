@@ -1,4 +1,4 @@
-//! A sign of life while a subcommand computes.
+//! Progress display while a subcommand computes.
 
 use std::io::{IsTerminal as _, stderr};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -9,16 +9,16 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// Work that is done sooner needs none.
+/// Time before the display appears: shorter work needs none.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Time between two looks at the progress.
+/// Time between two updates of the display.
 const TICK: Duration = Duration::from_millis(100);
 
 static PROGRESS: Progress = Progress { parts: Mutex::new([String::new(), String::new()]) };
 
-/// The progress that the crates of this workspace tell of: a part of the work at [`Level::Debug`], and
-/// how far that part is at [`Level::Trace`].
+/// Progress from the log messages of the crates of this workspace: a part of the work at
+/// [`Level::Debug`], and the progress of this part at [`Level::Trace`].
 struct Progress {
     parts: Mutex<[String; 2]>,
 }
@@ -51,18 +51,18 @@ impl Progress {
     }
 }
 
-/// Shows what is being done, how far it is, how long it has taken, and how it is ended.
+/// Creates a display of the current work, its progress, the elapsed time, and how to end it.
 fn spinner() -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} (Ctrl-C ends it)");
     ProgressBar::new_spinner().with_style(style.expect("the template is written correctly"))
 }
 
-/// Does some work; if it takes long and somebody watches at a terminal, its progress is shown meanwhile.
+/// Does some work, and shows its progress if it takes long and the error stream is a terminal.
 pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     if !stderr().is_terminal() {
         return work();
     }
-    // Another logger stays: who calls the program as a library may have one.
+    // An existing logger is kept: a caller of the library may have set one.
     if log::set_logger(&PROGRESS).is_ok() {
         log::set_max_level(LevelFilter::Trace);
     }
@@ -71,7 +71,7 @@ pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
         scope.spawn(move || {
             let mut spinner = None;
             let mut wait = PATIENCE;
-            // Until the other end is dropped.
+            // The loop ends when the other end of the channel is dropped.
             while end.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
                 let spinner = spinner.get_or_insert_with(self::spinner);
                 spinner.set_message(PROGRESS.after(message));

@@ -1,10 +1,10 @@
-//! The command that writes the report again.
+//! Command line that reproduces a report.
 
 use std::ffi::OsString;
 
 use shlex::Quoter;
 
-/// `mechid` with these arguments, quoted for a POSIX shell.
+/// Returns `mechid` with these arguments, quoted for a POSIX shell.
 pub fn command(arguments: &[OsString]) -> String {
     let quoter = Quoter::new().allow_nul(true);
     let mut command = String::from("mechid");

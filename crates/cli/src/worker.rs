@@ -1,4 +1,4 @@
-//! The program as a process that works for `mechid fleet`.
+//! The program as a worker process of `mechid fleet`.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -8,27 +8,26 @@ use std::sync::OnceLock;
 
 use mechid::analysis::fleet::serve;
 
-/// Word after the name of the program that makes it work for a fleet. It is none of the subcommands: nobody calls
-/// it but the program itself.
+/// First argument of a worker process. It is not a subcommand: only the program itself uses it.
 const WORD: &str = "fleet-worker";
 
-/// The program, and the arguments, that work for a fleet.
+/// Program and arguments of a worker process.
 static PROGRAM: OnceLock<(PathBuf, Vec<OsString>)> = OnceLock::new();
 
-/// Says by which program, with which arguments before the word `fleet-worker`, `mechid fleet` works on its
-/// records: one that calls [`run`](crate::run) with its arguments. Without, it works in its own process, which a record can
-/// end.
+/// Sets the program, and its arguments before the word `fleet-worker`, of the worker processes of
+/// `mechid fleet`: one that calls [`run`](crate::run) with its arguments. If it is not set, the
+/// records are identified in the calling process, which a faulty record can end.
 pub fn set_worker_program(program: impl Into<PathBuf>, arguments: &[&str]) {
     let words = arguments.iter().copied().chain([WORD]).map(OsString::from);
     let _ = PROGRAM.set((program.into(), words.collect()));
 }
 
-/// Returns the program that works for a fleet, and its arguments.
+/// Returns program and arguments of a worker process.
 pub fn worker_program() -> Option<&'static (PathBuf, Vec<OsString>)> {
     PROGRAM.get()
 }
 
-/// Works for a fleet, if the arguments say so.
+/// Runs as a worker process if the arguments ask for one.
 pub fn work(arguments: &[OsString]) -> Option<ExitCode> {
     let [_, word] = arguments else { return None };
     (word == OsStr::new(WORD)).then(|| match serve(io::stdin(), io::stdout()) {

@@ -30,8 +30,8 @@ pub struct ElementArgs {
     #[arg(long, requires = "machine", conflicts_with_all = ["frf_table", "period", "start",
           "sample_rate", "time", "detrend", "noise", "hits"])]
     speed_table: bool,
-    /// Table of frequency responses of a part whose receptance stands for a model of it, free of
-    /// all other parts; may be repeated
+    /// Table of frequency responses of a part, measured free of all other parts; its receptance
+    /// replaces a model of the part; may be repeated
     #[arg(long, value_name = "TABLE", requires = "machine")]
     part: Vec<PathBuf>,
     /// Number of searches at most: one from the first values of the description, the others from
@@ -94,7 +94,7 @@ impl FitArgs {
         Ok(Some(mechid::identify_elements(&data, &how)?))
     }
 
-    /// Returns the result for a person, with every check if asked for.
+    /// Returns the result as text, with every check if requested.
     pub fn text_of_elements(&self, identified: &IdentifiedElements) -> String {
         if !self.verbose {
             return identified.to_string();

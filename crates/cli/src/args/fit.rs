@@ -1,5 +1,5 @@
-//! Arguments of `mechid identify` and `mechid report`: which records, what in them, and how to identify
-//! the machine.
+//! Arguments of `mechid identify` and `mechid report`: which records, what in them, and how to
+//! identify the machine.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -31,8 +31,8 @@ pub struct FitArgs {
     /// More records of the same machine, with the same columns and window: all are fitted together
     #[arg(value_name = "RECORD")]
     pub(super) more: Vec<PathBuf>,
-    /// First samples of more windows of the first record, each as long as that from --start on: all are
-    /// fitted together, as realisations of one excitation
+    /// First samples of more windows of the first record, each as long as that from --start on: all
+    /// are fitted together, as realisations of one excitation
     #[arg(long, value_name = "SAMPLE,…", value_parser = at_least_one, value_delimiter = ',',
           requires = "period", help_heading = "Time and window")]
     more_starts: Vec<usize>,
@@ -43,36 +43,36 @@ pub struct FitArgs {
     domain: Domain,
     #[command(flatten)]
     pub(super) lines: LineArgs,
-    /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise on the
-    /// response biases it), instrumental (one half of the periods against the other; not biased), or
-    /// maximum-likelihood on the response (not biased, of least scatter) [default: maximum-likelihood
-    /// where two periods or more show the noise, where it biases least squares, or with --from-frf;
-    /// otherwise least-squares]
+    /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise
+    /// on the response biases it), instrumental (one half of the periods against the other; not
+    /// biased), or maximum-likelihood on the response (not biased, of least scatter) [default:
+    /// maximum-likelihood where two periods or more show the noise, where it biases least squares,
+    /// or with --from-frf; otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>())]
     method: Option<Method>,
-    /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
-    /// N lines to either side), per-line, or auto, which chooses
+    /// Noise spectrum that weights the lines in maximum likelihood: white, smooth, neighbours:N
+    /// (means over N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
     pub(super) noise: Option<Pooling>,
-    /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one per
-    /// degree of freedom; for open records, which are fitted as such then [default: that above the band
-    /// that the force drives, or between hits]
+    /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one
+    /// per degree of freedom; for open records, which are fitted as such then [default: that above
+    /// the band that the force drives, or between hits]
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
-    /// Extent of the window: open (any part of a response: the unknown loads of its ends are fitted with the
-    /// machine) or period (whole ones: the first sample follows the last again) [default: period with
-    /// --period; otherwise period unless the ends show, and in the time domain open but for spectral
-    /// derivatives]
+    /// Extent of the window: open (any part of a response: the unknown loads of its ends are fitted
+    /// with the machine) or period (whole ones: the first sample follows the last again) [default:
+    /// period with --period; otherwise period unless the ends show, and in the time domain open but
+    /// for spectral derivatives]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
-    /// Assumption on the force between samples: held (as a converter drives a shaker) or linear, exact if it is
-    /// true, of open records, hits and in the time domain; euler, the dissertation's rule, in the time domain, biased in
-    /// proportion to the step [default: band-limited; in the time domain the equation of motion at the samples
-    /// if there is an acceleration, else linear]
+    /// Assumption on the force between samples: held (as a converter drives a shaker) or linear,
+    /// exact if it is true, of open records, hits and in the time domain; euler, the dissertation's
+    /// rule, in the time domain, biased in proportion to the step [default: band-limited; in the
+    /// time domain the equation of motion at the samples if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
     between_samples: Option<Discretisation>,
-    /// Channels behind a first-order high-pass, such as an AC coupled input, each with its corner frequency in
-    /// Hz; of open records and hits
+    /// Channels behind a first-order high-pass, such as an AC coupled input, each with its corner
+    /// frequency in Hz; of open records and hits
     #[arg(long, value_name = "COLUMN=HZ,…", value_delimiter = ',')]
     ac_coupling: Vec<AcCoupling>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
@@ -84,9 +84,9 @@ pub struct FitArgs {
         allow_hyphen_values = true
     )]
     mass: KnownMass,
-    /// What is known of the form of M, C and K: symmetric; chain (masses in a row, with springs and
-    /// dampers to neighbours and to the ground); diagonal-mass; proportional-damping (C = αM + βK); or
-    /// the value of an entry, such as k13=0. Several of them with spaces between, or each by itself
+    /// Known structure of M, C and K: symmetric; chain (masses in a row, with springs and dampers
+    /// to neighbours and to the ground); diagonal-mass; proportional-damping (C = αM + βK); or the
+    /// value of an entry, such as k13=0. Several of them separated by spaces, or one per option
     #[arg(long, value_name = "FORM", value_delimiter = ' ')]
     structure: Vec<Form>,
     #[command(flatten)]
@@ -95,20 +95,20 @@ pub struct FitArgs {
     nonlinear: NonlinearArgs,
     #[command(flatten)]
     time: TimeArgs,
-    /// Fit frequency responses, averaged over segments, with their coherence as weights, estimated by where the
-    /// noise is: h1 on the response, h2 on the force, hv on both
+    /// Fit frequency responses, averaged over segments, with their coherence as weights, estimated
+    /// by where the noise is: h1 on the response, h2 on the force, hv on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<frf::Estimator>(),
           help_heading = "Frequency responses")]
     from_frf: Option<frf::Estimator>,
     #[command(flatten)]
     segments: SegmentArgs,
-    /// Record to predict (same columns), of it COUNT samples from START on: report the percentage of its response
-    /// that the identified system predicts. Without a name, such as :2049:1024, it is the first record
-    /// itself [default: all of it]
+    /// Record to predict (same columns), of it COUNT samples from START on: report the percentage
+    /// of its response that the identified system predicts. Without a name, such as :2049:1024, it
+    /// is the first record itself [default: all of it]
     #[arg(long, value_name = "RECORD:START:COUNT", help_heading = "Validation")]
     validate: Option<Validated>,
-    /// Add every line of the fit to the JSON: force, measured and fitted response with their standard errors,
-    /// and the residual
+    /// Add every line of the fit to the JSON: force, measured and fitted response with their
+    /// standard errors, and the residual
     #[arg(long, help_heading = "Output", requires = "json")]
     fitted_lines: bool,
     /// List every check with its verdict, not only the warnings (--json and the report always do)
@@ -129,7 +129,7 @@ pub struct LineArgs {
     /// Lines to leave out of these, numbers and ranges as for --lines
     #[arg(long, value_name = "LINES")]
     without_lines: Option<LineSpec>,
-    /// Frequencies whose lines are left out, in Hz, such as 50 (mains), 50:0.5 (half a hertz to
+    /// Frequencies whose lines are excluded, in Hz, such as 50 (mains), 50:0.5 (half a hertz to
     /// either side) and 24.5:multiples (rotation)
     #[arg(long, value_name = "HZ,…", value_delimiter = ',')]
     pub(super) without_hz: Vec<Disturbance>,
@@ -139,28 +139,30 @@ pub struct LineArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Nonlinear terms")]
 struct NonlinearArgs {
-    /// Springs and dampers to fit beside mass, damping and stiffness, each `name: law`: powers of x1
-    /// and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and (v1-v2), |v1| v1,
-    /// v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with that clearance (m) on either
-    /// side, tanh(v1/0.01) for friction smoothed below that velocity (m/s), x1^0 for a constant force.
-    /// They are fitted to whole periods or, with --extent open, to any record
+    /// Springs and dampers to fit in addition to mass, damping and stiffness, each `name: law`:
+    /// powers of x1 and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and
+    /// (v1-v2), |v1| v1, v1^3/(1 + (v1/b)^2) with a number for b, gap(x1, 0.001) for a stop with
+    /// that clearance (m) on either side, tanh(v1/0.01) for friction smoothed below that velocity
+    /// (m/s), x1^0 for a constant force. They are fitted to whole periods or, with --extent open,
+    /// to any record
     #[arg(long, value_name = "TERMS")]
     nonlinear: Option<Terms>,
-    /// Terms to try besides, written in the same way: one after the other the most useful is added, as
-    /// long as --criterion finds it worth it
+    /// Further terms to try, written in the same way: the most useful is added, one after the
+    /// other, as long as --criterion accepts it
     #[arg(long, value_name = "TERMS")]
     candidates: Option<Terms>,
-    /// Criterion by which a candidate is added: information (extended Bayesian, and a coefficient that differs
-    /// from zero) or held-out (misfit of each record, predicted by the fit to the others: three
-    /// records or windows at least) [default: information]
+    /// Criterion for the addition of a candidate: information (extended Bayesian, and a coefficient
+    /// that differs from zero) or held-out (misfit of each record, predicted by the fit to the
+    /// others: three records or windows at least) [default: information]
     #[arg(long, value_name = "CRITERION", value_parser = word::<Criterion>())]
     criterion: Option<Criterion>,
-    /// Constants to search for besides: laws (those inside the laws, from the values given), delay (of the force),
-    /// phase (that all channels have in common, as of equal filters)
+    /// Constants to estimate, too: laws (those inside the laws, from the values given), delay (of
+    /// the force), phase (that all channels have in common, as of equal filters)
     #[arg(long, value_name = "WHAT,…", value_parser = word::<Constant>(), value_delimiter = ',')]
     search: Vec<Constant>,
-    /// Weighting of the lines, by where the equation error is equally large on all of them: white-force,
-    /// response, or smooth-spectrum (the residual's own); automatic: the likeliest [default: automatic]
+    /// Weighting of the lines, by where the equation error is equally large on all of them:
+    /// white-force, response, or smooth-spectrum (the residual's own); automatic: the likeliest
+    /// [default: automatic]
     #[arg(long, value_name = "WEIGHTING", value_parser = word::<Weighting>())]
     weighting: Option<Weighting>,
 }
@@ -174,8 +176,8 @@ struct TimeArgs {
     /// through a sliding WINDOW of samples (odd)
     #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
     derivatives: Option<Derivatives>,
-    /// Put FACTOR steps into every interval, which makes the error of --between-samples smaller, with samples
-    /// between by linear, spline or band-limited interpolation
+    /// Put FACTOR steps into every interval, which makes the error of --between-samples smaller,
+    /// with samples between by linear, spline or band-limited interpolation
     #[arg(long, value_name = "FACTOR:INTERPOLATION", requires = "between_samples")]
     refine: Option<Refinement>,
 }
@@ -184,10 +186,11 @@ struct TimeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Samples of a segment, for a random excitation; the part that the next one repeats, in per cent (50); and the
-    /// window that weights its samples: hann, hamming (a narrower peak, more leakage from far away),
-    /// blackman (the least leakage, a wider peak) or rectangular (for bursts that begin and end at rest)
-    /// [default: the periods are the segments; of records without --period, chosen by the coherence]
+    /// Samples of a segment, for a random excitation; the part that the next one repeats, in per
+    /// cent (50); and the window that weights its samples: hann, hamming (a narrower peak, more
+    /// leakage from far away), blackman (the least leakage, a wider peak) or rectangular (for
+    /// bursts that begin and end at rest) [default: the periods are the segments; of records
+    /// without --period, chosen by the coherence]
     #[arg(long, value_name = "SAMPLES:OVERLAP:WINDOW")]
     segment: Option<Segmentation>,
 }
@@ -206,8 +209,8 @@ pub struct TableArgs {
     /// Measured quantity of the responses per force, where the table does not state it
     #[arg(long, value_name = "QUANTITY", value_parser = word::<ResponseQuantity>(), requires = "frf_table")]
     quantity: Option<ResponseQuantity>,
-    /// Number of independent averages behind the coherence, from which standard errors follow; not
-    /// needed where the table has standard errors
+    /// Number of independent averages of the coherence, for the standard errors; not needed if the
+    /// table has standard errors
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
     averages: Option<usize>,
     /// Points to use, one per degree of freedom, as the table names them [default: all]
@@ -222,10 +225,10 @@ impl TableArgs {
     }
 }
 
-/// A record to predict, written `RECORD:START:COUNT`.
+/// Record to predict, written `RECORD:START:COUNT`.
 #[derive(Debug, Clone)]
 struct Validated {
-    /// The record; `None`: the first of those that are fitted.
+    /// Record; `None` for the first fitted record.
     record: Option<PathBuf>,
     window: ValidationWindow,
 }
@@ -233,7 +236,7 @@ struct Validated {
 impl FromStr for Validated {
     type Err = String;
 
-    /// Reads up to two numbers at the end, so that a name may have colons.
+    /// Reads at most two numbers at the end, so that a name may contain colons.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |part: &str| part.parse::<usize>().ok();
         let (name, numbers) = match text.rsplit_once(':') {
@@ -303,16 +306,16 @@ impl FitArgs {
             identified.add_fitted_lines()?;
         }
         let Some(Validated { record, window }) = &self.validate else { return Ok(identified) };
-        let other = match record {
+        let validation = match record {
             Some(record) => self.input.open_other(record, &channels[0], Window::default())?,
             None => records.swap_remove(0),
         };
-        let other = identified.validation_window(other, window)?;
-        identified.add_validation(&other)?;
+        let validation = identified.validation_window(validation, window)?;
+        identified.add_validation(&validation)?;
         Ok(identified)
     }
 
-    /// Identifies the machine from tables of frequency responses, if the files are such.
+    /// Identifies the machine from tables of frequency responses, if the files are tables.
     pub fn identify_tables(
         &self,
         table: &TableArgs,
@@ -352,15 +355,16 @@ impl FitArgs {
             .reads(self.validate.iter().filter_map(|validated| validated.record.as_ref()))
     }
 
-    /// Returns the result as text, with every check if asked for.
+    /// Returns the result as text, with every check if requested.
     pub fn text(&self, identified: &Identified) -> String {
-        match self.verbose {
-            true => format!("{identified}\nchecks:\n{}", identified.summary().all_checks()),
-            false => identified.to_string(),
+        if self.verbose {
+            format!("{identified}\nchecks:\n{}", identified.summary().all_checks())
+        } else {
+            identified.to_string()
         }
     }
 
-    /// Returns what is known of the form of M, C and K.
+    /// Returns the known structure of M, C and K.
     fn structure(&self) -> Structure {
         Structure { forms: self.structure.clone() }
     }

@@ -6,17 +6,18 @@ use mechid::analysis::{Channels, HitRule};
 use super::at_least_one;
 use crate::error::CliError;
 
-/// Rule by which hits of a hammer are found.
+/// Rule for the detection of hammer hits.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Hammer tests")]
 pub struct HitRuleArgs {
-    /// The records are hammer tests: the hits are found in the force, and bad ones (double hits, overloads, weak
-    /// hits, too little room) are left out. --hits=trigger=0.5,double=5,… changes the rule: trigger (force
-    /// that begins a hit, in per cent of the largest of the record; 0.5), double (least second peak of a
-    /// double hit, in per cent of the first; 5), weak (least peak, in per cent of the median of all peaks
-    /// of a tenth of the largest or more; 25), bounce (time after the trigger within which a force belongs
-    /// to the same hit, in s; 0.1), before (samples before the pulse; twice those of the pulse), samples
-    /// (those of a hit, the ones before it included; up to the next hit)
+    /// The records are hammer tests: the hits are found in the force, and bad ones (double hits,
+    /// overloads, weak hits, too little room) are excluded. --hits=trigger=0.5,double=5,… changes
+    /// the rule: trigger (force that begins a hit, in per cent of the largest of the record; 0.5),
+    /// double (least second peak of a double hit, in per cent of the first; 5), weak (least peak,
+    /// in per cent of the median of all peaks of a tenth of the largest or more; 25), bounce (time
+    /// after the trigger within which a force belongs to the same hit, in s; 0.1), before (samples
+    /// before the pulse; twice those of the pulse), samples (length of a hit, including the samples
+    /// before it; up to the next hit)
     #[arg(long, value_name = "RULE", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     hits: Option<HitRule>,
 }
@@ -27,40 +28,41 @@ pub struct HitRuleArgs {
 pub struct HitArgs {
     #[command(flatten)]
     rule: HitRuleArgs,
-    /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
-    /// them all
+    /// Degree of freedom that is struck in each record, counted from 1, where one --force column
+    /// serves them all
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     struck: Vec<usize>,
 }
 
 impl HitArgs {
-    /// Returns the columns of each of some records, with the force where it is struck.
+    /// Returns the columns of each record, with the force at the struck degree of freedom.
     pub fn channels_of(
         &self,
         channels: &Channels,
         records: usize,
     ) -> Result<Vec<Channels>, CliError> {
-        let of_records = match self.struck.is_empty() {
-            true => vec![channels.clone(); records],
-            false => channels.struck(&self.struck, records)?,
+        let of_records = if self.struck.is_empty() {
+            vec![channels.clone(); records]
+        } else {
+            channels.struck(&self.struck, records)?
         };
         of_records.iter().try_for_each(Channels::check_pairs)?;
         Ok(of_records)
     }
 
-    /// Returns whether the hammer struck another point in each record.
+    /// Returns whether each record has a different struck point.
     pub fn is_struck(&self) -> bool {
         !self.struck.is_empty()
     }
 
-    /// Returns the rule by which hits are found, if the records are hammer tests.
+    /// Returns the rule for the detection of hits, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
         self.rule.rule()
     }
 }
 
 impl HitRuleArgs {
-    /// Returns the rule by which hits are found, if the records are hammer tests.
+    /// Returns the rule for the detection of hits, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
         self.hits.clone()
     }

@@ -1,4 +1,4 @@
-//! Arguments that several subcommands share, and what they mean to the analysis.
+//! Arguments that several subcommands share, and their settings of the analysis.
 
 pub mod channels;
 pub mod elements;
@@ -27,7 +27,7 @@ pub struct ReportArgs {
     /// Print the report as JSON, for programs
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Print nothing on success
+    /// Print no report on success
     #[arg(long, short, help_heading = "Output", conflicts_with = "json")]
     pub quiet: bool,
 }
@@ -42,7 +42,7 @@ pub struct PlotArgs {
 }
 
 impl PlotArgs {
-    /// Returns whether a page is asked for.
+    /// Returns whether a page is requested.
     pub fn is_page(&self) -> bool {
         let ending = self.plot.as_ref().and_then(|path| path.extension());
         ending.is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
@@ -53,11 +53,13 @@ impl PlotArgs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Mode shapes")]
 pub struct ShapeArgs {
-    /// Places of the channels: a universal file (datasets 15 or 2411, and 82), or a table with rows name,x,y,z in m
-    /// and line,name,name [default: a row, or a grid, by names such as 1+Z and 1.2+Z]
+    /// Places of the channels: a universal file (datasets 15 or 2411, and 82), or a table with rows
+    /// name,x,y,z in m and line,name,name [default: a row, or a grid, by names such as 1+Z and
+    /// 1.2+Z]
     #[arg(long, value_name = "FILE")]
     geometry: Option<PathBuf>,
-    /// Write geometry and complex shapes into this universal file (datasets 164, 15, 82, 55; SI units)
+    /// Write geometry and complex shapes into this universal file (datasets 164, 15, 82, 55; SI
+    /// units)
     #[arg(long, value_name = "FILE.unv")]
     shapes: Option<PathBuf>,
 }
@@ -68,8 +70,8 @@ impl ShapeArgs {
         files.reads(&self.geometry).writes(&self.shapes)
     }
 
-    /// Returns the shapes of modes whose entries have these names; `None` where there is nothing to draw.
-    pub fn of(
+    /// Returns the shapes of modes whose entries have these names; `None` if no shape can be drawn.
+    pub fn mode_shapes(
         &self,
         modes: &[ShapedMode],
         names: &[String],
@@ -82,7 +84,7 @@ impl ShapeArgs {
         Ok(shapes)
     }
 
-    /// Returns the outcome with the file of shapes, if it is asked for.
+    /// Returns the outcome with the file of shapes, if requested.
     pub fn with_shapes(&self, outcome: Outcome, shapes: Option<&ModeShapes>) -> Outcome {
         match (&self.shapes, shapes) {
             (Some(path), Some(shapes)) => {
@@ -101,20 +103,20 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// A record, and the window of it to use.
+/// Record, and its window.
 #[allow(rustdoc::broken_intra_doc_links, reason = "brackets of a help text")]
 #[derive(Debug, Clone, Args)]
 pub struct RecordArgs {
     /// The record: text with one row per sample, MATLAB .mat, HDF5, universal file (dataset 58), or
     /// Parquet; also in gzip; - is standard input
     ///
-    /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
-    /// found too, the header also in a comment (#, %, !) or of LabVIEW (.lvm). MATLAB: a vector is a
-    /// column, of a matrix those called name[1], name[2] …, of a struct name.field. HDF5: a data set
-    /// is a column called by its path, such as run/force. Universal file: a function of time
-    /// is a column called after its node and direction, such as 12+Z, and brings its time axis. Parquet:
-    /// instants are read as seconds from the first one on; units and sample_rate_hz may stand among the
-    /// keys of the file.
+    /// The format is detected. Text: delimiter (comma, semicolon, tab, blanks) and header are found
+    /// too, the header also in a comment (#, %, !) or of LabVIEW (.lvm). MATLAB: a vector is a
+    /// column, of a matrix those called name[1], name[2] …, of a struct name.field. HDF5: a data
+    /// set is a column called by its path, such as run/force. Universal file: a function of time is
+    /// a column called after its node and direction, such as 12+Z, and brings its time axis.
+    /// Parquet: instants are read as seconds from the first one on; units and sample_rate_hz may be
+    /// among the keys of the file.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
     /// Number of header lines to skip above the table
@@ -126,12 +128,12 @@ pub struct RecordArgs {
     /// Record to read of such a file, by its value in that column [default: the only one]
     #[arg(long, value_name = "ID", requires = "record_column")]
     pub record_id: Option<String>,
-    /// Factor by which to raise all limits on a file: 4 MiB a row of text, 4 KiB a name, 65536 columns,
-    /// 1 GiB of a compressed file, 2^28 numbers held, and memory (--memory-gb)
+    /// Factor that raises all limits on a file: 4 MiB a row of text, 4 KiB a name, 65536 columns, 1
+    /// GiB of a compressed file, 2^28 numbers held, and memory (--memory-gb)
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
     pub raise_limits: Option<usize>,
-    /// Memory that the numbers of a file and the work on them may take, in GB [default: 0.27 GB, and 512
-    /// bytes for each byte of the file; 8.6 GB at most]
+    /// Memory that the numbers of a file and the work on them may take, in GB [default: 0.27 GB,
+    /// and 512 bytes for each byte of the file; 8.6 GB at most]
     #[arg(long, value_name = "GB", value_parser = positive)]
     pub memory_gb: Option<f64>,
     /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
@@ -148,11 +150,11 @@ pub struct RecordArgs {
         help_heading = "Time and window"
     )]
     pub sample_rate: Option<f64>,
-    /// Unit of a column, whatever its header says: acc=g, Force=lbf, time=ms; may be repeated
+    /// Unit of a column, with priority over its header: acc=g, Force=lbf, time=ms; may be repeated
     #[arg(long = "unit", value_name = "COLUMN=UNIT", value_parser = column_and_text, help_heading = "Units")]
     pub units: Vec<(String, String)>,
-    /// Factor that takes a column to SI units, such as that of a sensor: Force=0.0893 for 11.2 mV/N and numbers
-    /// in mV; may be repeated
+    /// Factor that converts a column to SI units, for example of a sensor: Force=0.0893 for 11.2
+    /// mV/N and numbers in mV; may be repeated
     #[arg(long = "scale", value_name = "COLUMN=FACTOR", value_parser = column_and_factor,
           help_heading = "Units")]
     pub scales: Vec<(String, f64)>,
@@ -167,7 +169,8 @@ pub struct RecordArgs {
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "period",
           help_heading = "Time and window")]
     pub periods: Option<usize>,
-    /// Constant to subtract from every channel: the mean of the whole record, not only of the window
+    /// Constant to subtract from every channel: the mean of the whole record, not only of the
+    /// window
     #[arg(long, value_name = "WHAT", value_parser = word::<Detrend>(), help_heading = "Time and window")]
     pub detrend: Option<Detrend>,
 }

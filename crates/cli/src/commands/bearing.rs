@@ -17,11 +17,11 @@ use crate::outcome::{Files, Outcome};
 
 /// Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests
 ///
-/// The housing floats on the film of a rotating shaft in rigid supports; shakers in x and y excite it
-/// in one test each, or on alternate lines of one. --force names the forces of the shakers,
-/// --acceleration the housing's, --displacement that of the housing relative to the shaft, x before
-/// y. Of the window, which must hold whole periods, lines at multiples of --rotation-hz are left out.
-/// Baseline tests (no film, shaft at rest) are subtracted with their uncertainty.
+/// The housing floats on the film of a rotating shaft in rigid supports; shakers in x and y excite
+/// it in one test each, or on alternate lines of one. --force names the forces of the shakers,
+/// --acceleration those of the housing, --displacement the motion of the housing relative to the
+/// shaft, x before y. The window must hold whole periods; lines at multiples of --rotation-hz are
+/// excluded. Baseline tests (no film, shaft at rest) are subtracted with their uncertainty.
 ///
 /// With --frf-table the files are frequency responses instead, two for each test: first the
 /// displacement, then the acceleration per shaker force.
@@ -57,14 +57,15 @@ pub struct BearingArgs {
     /// Mass of the housing with all that moves with it, in kg
     #[arg(long, value_name = "KG", required_unless_present = "campaign")]
     stator_mass: Option<f64>,
-    /// Speed of rotation, in Hz; its lines and multiples are left out [default: the shaft is at rest]
+    /// Speed of rotation, in Hz; its line and multiples are excluded [default: the shaft is at
+    /// rest]
     #[arg(long, value_name = "HZ")]
     rotation_hz: Option<f64>,
     /// Static load, in N, for dimensionless coefficients
     #[arg(long, value_name = "N")]
     load: Option<f64>,
-    /// Coefficients to identify: eight of stiffness and damping, twelve with the mass of the fluid, or automatic,
-    /// which takes twelve if a likelihood-ratio test at 5 % finds inertia
+    /// Coefficients to identify: eight of stiffness and damping, twelve with the mass of the fluid,
+    /// or automatic, which takes twelve if a likelihood-ratio test at 5 % finds inertia
     #[arg(long, value_name = "WHICH", value_parser = word::<Coefficients>(), default_value = "automatic")]
     coefficients: Coefficients,
     #[command(flatten)]
@@ -77,8 +78,8 @@ pub struct BearingArgs {
     /// myy, and their standard errors, one row per speed and load
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Write the coefficients into this file (-: to standard output) in the axes of ROSS, whose load acts along −y:
-    /// speed in rad/s, kxx … myy, one row per speed and load
+    /// Write the coefficients into this file (-: to standard output) in the axes of ROSS, whose
+    /// load acts along −y: speed in rad/s, kxx … myy, one row per speed and load
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     ross: Option<PathBuf>,
     #[command(flatten)]
@@ -91,14 +92,14 @@ pub struct BearingArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Tables of frequency responses")]
 struct TableArgs {
-    /// The files are tables of frequency responses, of displacement and of acceleration by turns: text
-    /// with columns h_1_1_real, h_1_1_imaginary … as `mechid frf --output` writes it, or universal
-    /// files (datasets 58 of types 4 and 6)
+    /// The files are tables of frequency responses, of displacement and of acceleration by turns:
+    /// text with columns h_1_1_real, h_1_1_imaginary … as `mechid frf --output` writes it, or
+    /// universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["force", "displacement", "acceleration", "velocity",
           "sample_rate", "time", "period", "detrend", "lines", "without_lines"])]
     frf_table: bool,
-    /// Number of independent averages behind the coherence, from which standard errors follow; not
-    /// needed where the tables have standard errors
+    /// Number of independent averages of the coherence, for the standard errors; not needed if the
+    /// tables have standard errors
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
     averages: Option<usize>,
     /// Two points to use, x before y, as the tables name them [default: all]
@@ -159,10 +160,8 @@ impl BearingArgs {
             Ok(BearingData::of_records(&tests, &how)?)
         };
         let tests = data(&mut [&self.input.record].into_iter().chain(&self.more))?;
-        let baseline = match self.baseline.is_empty() {
-            true => None,
-            false => Some(data(&mut self.baseline.iter())?),
-        };
+        let baseline =
+            if self.baseline.is_empty() { None } else { Some(data(&mut self.baseline.iter())?) };
         let identified = identify_bearing(&tests, baseline.as_ref(), &how)?;
         let outcome = Outcome::new(identified.to_string(), &identified)?.with_result_plot(
             &self.plot,

@@ -18,7 +18,7 @@ pub struct CompletionsArgs {
     /// The shell
     #[arg(value_name = "SHELL", value_enum)]
     shell: Shell,
-    /// There is nothing to report but the script itself.
+    /// Unused: the script is the only output.
     #[arg(skip)]
     pub report: ReportArgs,
 }
@@ -28,6 +28,6 @@ impl CompletionsArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "mechid", &mut script);
-        Ok(Outcome::of_text(String::from_utf8_lossy(&script).into_owned()))
+        Ok(Outcome::from_text(String::from_utf8_lossy(&script).into_owned()))
     }
 }

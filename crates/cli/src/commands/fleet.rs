@@ -19,15 +19,15 @@ use crate::worker::worker_program;
 
 /// Identify many records by one saved analysis, into a folder of Parquet files
 ///
-/// Every record becomes one row: parameters, standard errors, covariance, modes, findings, warnings, notes,
-/// or the error of a record that cannot be identified. The records are divided into parts of so many
-/// records, by rising path; a part is one file of the folder, complete or not there. Run again, the
-/// command computes what is missing: the parts that were not finished, and those in which a record,
-/// the analysis or the version of the program is another one.
+/// Every record becomes one row: parameters, standard errors, covariance, modes, findings,
+/// warnings, notes, or the error of a record that cannot be identified. The records are divided
+/// into parts of --part-records records, by rising path; a part is one file of the folder, complete
+/// or not there. Run again, the command computes what is missing: the parts that were not finished,
+/// and those in which a record, the analysis or the version of the program is another one.
 ///
-/// Records are worked on in processes of their own. A record that takes too much memory or time, or that
-/// ends its process, becomes a row with its error, and the others go on. Named pipes, sockets and
-/// devices are left out.
+/// Records are worked on in processes of their own. A record that takes too much memory or time, or
+/// that ends its process, becomes a row with its error, and the others go on. Named pipes, sockets
+/// and devices are ignored.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Exit code 1 says that all records were gone through and some have no result.
@@ -37,7 +37,7 @@ Examples:
   mechid fleet a.csv b.mat c.parquet --analysis analysis.json --output results --workers 2 --json"
 )]
 pub struct FleetArgs {
-    /// The records, of any format; a folder stands for the files in it
+    /// The records, of any format; a folder means all files in it
     #[arg(value_name = "RECORD", required = true)]
     records: Vec<PathBuf>,
     /// The analysis: channels, reading, window and identify, as JSON
@@ -64,7 +64,7 @@ pub struct FleetArgs {
 }
 
 impl FleetArgs {
-    /// Returns the files that the arguments name; the results have names of their own.
+    /// Returns the files that the arguments name; the fleet names its results.
     pub fn files(&self) -> Files<'_> {
         Files::default().reads([&self.analysis]).reads(&self.records)
     }
@@ -77,16 +77,17 @@ impl FleetArgs {
         }
     }
 
-    /// Computes the parts that are missing, and tells what there is.
+    /// Computes the missing parts, and summarises all of them.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let analysis = SavedAnalysis::read(&self.analysis)?;
         let fleet = Fleet::new(analysis, &self.records, &self.output, self.part_records)?;
         let workers =
             self.workers.unwrap_or_else(|| available_parallelism().map_or(1, NonZero::get));
-        let bar = match self.report.quiet {
-            true => ProgressBar::hidden(),
-            // Hides itself where nobody watches.
-            false => ProgressBar::new(fleet.record_count() as u64),
+        let bar = if self.report.quiet {
+            ProgressBar::hidden()
+        } else {
+            // The bar is hidden unless the error stream is a terminal.
+            ProgressBar::new(fleet.record_count() as u64)
         };
         let style = "{wide_bar} {pos} of {len} records, {elapsed}, {eta} left (Ctrl-C ends it)";
         bar.set_style(

@@ -25,8 +25,8 @@ use crate::outcome::{Files, Outcome};
 /// velocity and acceleration of every degree of freedom.
 ///
 /// A long text is read a stretch at a time. The methods continuous and discretised hold no open
-/// record either; any other method, --spectrum and --plot hold all of it, of the columns used alone.
-/// Of whole periods only their mean is held.
+/// record either; any other method, --spectrum and --plot hold all of it, of the columns used
+/// alone. Of whole periods only their mean is held.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement --json > machine.json
@@ -44,18 +44,19 @@ pub struct ForceArgs {
     /// Degrees of freedom on which a force acts, counted from 1 [default: all]
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
     forced: Vec<usize>,
-    /// Method: auto (the one that suits the record); continuous (equation of motion at the samples: displacement,
-    /// velocity and acceleration of everything); discretised (from sample to sample, the force linear
-    /// between them: displacement and velocity); frequency-domain (dynamic stiffness: whole periods);
-    /// shrinkage (posterior mean), tikhonov or truncated-svd (whole periods, or a short record); kalman
-    /// (filter and smoother: an open record of any length)
+    /// Method: auto (the one that suits the record); continuous (equation of motion at the samples:
+    /// displacement, velocity and acceleration of everything); discretised (from sample to sample,
+    /// the force linear between them: displacement and velocity); frequency-domain (dynamic
+    /// stiffness: whole periods); shrinkage (posterior mean), tikhonov or truncated-svd (whole
+    /// periods, or a short record); kalman (filter and smoother: an open record of any length)
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>(), default_value = "auto")]
     method: Method,
     /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
     #[arg(long, value_name = "LINES")]
     lines: Option<LineSpec>,
-    /// Seek the force between two frequencies only, in Hz; force and standard error are then those of
-    /// this band [default: all, or without a displacement those at which the responses show a force]
+    /// Seek the force between two frequencies only, in Hz; force and standard error are then those
+    /// of this band [default: all, or without a displacement those at which the responses show a
+    /// force]
     #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
     band_hz: Option<Band>,
     /// An open record begins at rest
@@ -65,8 +66,8 @@ pub struct ForceArgs {
     /// averaged [default: estimated]
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
-    /// Rule that chooses the regularisation parameter: likelihood (nearest to the posterior mean of the force), gcv
-    /// (generalised cross-validation) or l-curve (its corner)
+    /// Rule that chooses the regularisation parameter: likelihood (nearest to the posterior mean of
+    /// the force), gcv (generalised cross-validation) or l-curve (its corner)
     #[arg(long, value_name = "RULE", value_parser = one_of::<ParameterRule>(&["likelihood", "gcv", "l-curve"]),
           default_value = "likelihood")]
     rule: ParameterRule,
@@ -130,7 +131,7 @@ impl ForceArgs {
     }
 }
 
-/// The table of the force, written as its samples are found.
+/// Table of the force, written while its samples are computed.
 struct ForceRows<'a> {
     path: Option<&'a Path>,
     rows: Option<CsvFile>,

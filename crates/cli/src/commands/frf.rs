@@ -15,9 +15,9 @@ use crate::outcome::{Files, Outcome};
 
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
-/// With a periodic excitation the periods are the segments that are averaged (--period says how long
-/// one is). With a random excitation say --segment: segments overlap under a window. Of a hammer test
-/// the good --hits are averaged. A long text is read a stretch at a time and not held.
+/// With a periodic excitation the periods are the segments that are averaged (--period says how
+/// long one is). With a random excitation say --segment: segments overlap under a window. Of a
+/// hammer test the good --hits are averaged. A long text is read a stretch at a time and not held.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
@@ -30,13 +30,14 @@ use crate::outcome::{Files, Outcome};
 pub struct FrfArgs {
     #[command(flatten)]
     input: RecordArgs,
-    /// More records of the same machine, with the same columns and window: the segments of all are averaged
-    /// together
+    /// More records of the same machine, with the same columns and window: the segments of all are
+    /// averaged together
     #[arg(value_name = "RECORD")]
     more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Frequency response estimator, by where the noise is: h1 on the response, h2 on the force, hv on both
+    /// Frequency response estimator, by where the noise is: h1 on the response, h2 on the force, hv
+    /// on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "h1")]
     estimator: Estimator,
     #[command(flatten)]
@@ -45,8 +46,8 @@ pub struct FrfArgs {
     segments: SegmentArgs,
     #[command(flatten)]
     hits: HitArgs,
-    /// Exponential window on force and response: its weight at the end of a hit, in per cent of that at
-    /// the beginning [default: no window]
+    /// Exponential window on force and response: its weight at the end of a hit, in per cent of
+    /// that at the beginning [default: no window]
     #[arg(
         long,
         value_name = "PERCENT",
@@ -112,9 +113,10 @@ impl FrfArgs {
             let universal = path.extension().is_some_and(|ending| {
                 ["unv", "uff"].iter().any(|known| ending.eq_ignore_ascii_case(known))
             });
-            let content = match universal {
-                true => table.to_responses(&self.points)?.to_universal_file()?,
-                false => table.csv(),
+            let content = if universal {
+                table.to_responses(&self.points)?.to_universal_file()?
+            } else {
+                table.csv()
             };
             outcome = outcome.with_file(path, content);
         }

@@ -12,22 +12,21 @@ use crate::outcome::{Files, Outcome};
 ///
 /// In the frequency domain (the default) the window must hold whole periods of a periodic
 /// excitation, and one kind of motion is enough; the periods are averaged. Of a random excitation,
-/// or any record that is no period, the ends are fitted with the machine; of a hammer test those of each
-/// of the good --hits. In the time domain any
-/// record will do: displacement, velocity and acceleration for the equation of motion itself, or
-/// displacement and velocity with an assumption on the force between the samples; what was not
-/// measured, --derivatives finds.
+/// or any record that is no period, the ends are fitted with the machine; of a hammer test those of
+/// each of the good --hits. In the time domain any record will do: displacement, velocity and
+/// acceleration for the equation of motion itself, or displacement and velocity with an assumption
+/// on the force between the samples; what was not measured, --derivatives finds.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
 ///
-/// With --machine, of a machine that is described by its elements, the unknown coefficients are found
-/// from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on a shake
-/// table.
+/// With --machine, of a machine that is described by its elements, the unknown coefficients are
+/// found from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on
+/// a shake table.
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
-/// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
-/// are windows for spectral --derivatives, and for a --refine by a spline or band-limited, one
-/// long period, and what --validate predicts as a steady state.
+/// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held
+/// whole are windows for spectral --derivatives, and for a --refine by a spline or band-limited,
+/// one long period, and what --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement

@@ -12,12 +12,12 @@ use crate::outcome::{Files, Outcome};
 ///
 /// For every channel: mean, RMS and peak value in its own unit, the crest factor, the strongest
 /// lines of its spectrum with their amplitudes, and the period, in samples, if it repeats. The
-/// spectrum is that of whole periods where the channel repeats or --period says so, otherwise of the
-/// window weighted by a Hann window. Of a text of more than 262144 rows, only the levels are those
-/// of all samples of the window: lines and period are those of its first 262144 samples.
+/// spectrum covers whole periods if the channel repeats or --period is given, otherwise the window,
+/// weighted by a Hann window. In a text of more than 262144 rows, the levels cover all samples of
+/// the window, lines and period its first 262144 samples.
 ///
-/// The picture shows columns over time, all of the window, beside their spectra, of the mean period
-/// where there is one: the first eight. The column of time has a spectrum only if --columns asks for
+/// The picture shows the first eight columns over time, all of the window, and their spectra, of
+/// the mean period if there is one. The column of time has a spectrum only if --columns asks for
 /// it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:

@@ -29,7 +29,7 @@ use crate::args::ReportArgs;
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
-/// From a measured force and response to the machine behind it.
+/// Identify machines from measured forces and responses.
 #[derive(Debug, Parser)]
 #[command(
     name = "mechid",
@@ -68,8 +68,8 @@ pub enum Command {
 }
 
 impl Command {
-    /// Runs the command and returns its result; nothing is printed or written yet. `words` are the
-    /// arguments that name it, for a report that tells how it is made again.
+    /// Runs the command and returns its result, before anything is printed or written. `words` are
+    /// the arguments of the program, for a report that names the command to reproduce it.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match self {
             Command::Bearing(args) => args.run(),
@@ -111,8 +111,8 @@ impl Command {
         }
     }
 
-    /// Returns the message shown during a long computation; `None` if the subcommand shows one itself, or
-    /// must not.
+    /// Returns the message shown during a long computation; `None` if the subcommand shows one
+    /// itself, or must not show one.
     pub fn waiting(&self) -> Option<&'static str> {
         match self {
             Command::Fleet(_) | Command::Sweep(_) => None,

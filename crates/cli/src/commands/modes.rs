@@ -1,4 +1,4 @@
-//! `mechid modes`: natural frequencies, damping ratios and shapes, of whatever tells them.
+//! `mechid modes`: natural frequencies, damping ratios and shapes, from any kind of data.
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -27,19 +27,19 @@ use crate::outcome::{Files, Outcome};
 ///
 /// With --force, any number of forces and of responses: shakers, a hammer (--hits leaves bad hits
 /// out), a hammer that roves from point to point (a record for each, --force-at). Frequencies,
-/// damping ratios and shapes are those of maximum likelihood on the spectral lines of the whole
-/// records, without windows; the number of modes is found, too. Without --force the record is taken
-/// for a free decay, or with --ambient for the response to forces that nobody measured.
+/// damping ratios and shapes are estimated by maximum likelihood on the spectral lines of the whole
+/// records, without windows; the number of modes is chosen, too. Without --force the record is
+/// taken for a free decay, or with --ambient for the response to forces that nobody measured.
 ///
-/// Without any column the file is a table of frequency responses: a universal file (datasets 58), or
-/// a table with the columns that `mechid frf --output` writes. A file in JSON is the description of a
-/// machine, or what `mechid identify --json` printed.
+/// Without any column the file is a table of frequency responses: a universal file (datasets 58),
+/// or a table with the columns that `mechid frf --output` writes. A file in JSON is the description
+/// of a machine, or what `mechid identify --json` printed.
 ///
-/// --compare sets the modes beside those of another result, or of a finite-element model (datasets 55
-/// of a universal file): pairs by frequency and shape, with differences over their standard errors.
+/// --compare compares the modes with another result, or with a finite-element model (datasets 55 of
+/// a universal file): pairs by frequency and shape, with differences over their standard errors.
 ///
-/// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes
-/// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency.
+/// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes to
+/// compute all: --modes takes the lowest frequencies, --near-hz the frequencies around a given one.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid modes beam.csv --force hammer --acceleration a1 --band-hz 5:1200
@@ -56,16 +56,18 @@ use crate::outcome::{Files, Outcome};
 pub struct ModesArgs {
     #[command(flatten)]
     input: RecordArgs,
-    /// More records of the same structure, with the same columns and window: all are fitted together
+    /// More records of the same structure, with the same columns and window: all are fitted
+    /// together
     #[arg(value_name = "RECORD")]
     more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Place of each force column, such as 3 or 12+Z; where one column of several records is that of a
-    /// hammer, the place that it strikes in each of them
+    /// Point of each force column, such as 3 or 12+Z; for one hammer column in several records, the
+    /// struck point of each record
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     force_at: Vec<String>,
-    /// Place of each response column; where a force acts at the place of a response, modal masses follow
+    /// Place of each response column; where a force acts at the place of a response, modal masses
+    /// follow
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
     /// Frequencies to use, in Hz [default: those that the forces drive]
@@ -77,7 +79,7 @@ pub struct ModesArgs {
     /// Largest number of modes to look for
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
-    /// Frequencies, in Hz, near which a mode is looked for whatever the start shows; of a machine with
+    /// Frequencies, in Hz, near which a mode is estimated even if it is weak; of a machine with
     /// --modes, the frequency that the modes are nearest to
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
@@ -95,8 +97,8 @@ pub struct ModesArgs {
     hits: HitRuleArgs,
     #[command(flatten)]
     unmeasured: UnmeasuredArgs,
-    /// Compare with these modes: a result of `mechid modes --json`, a machine, or a universal file with
-    /// datasets 55
+    /// Compare with these modes: a result of `mechid modes --json`, a machine, or a universal file
+    /// with datasets 55
     #[arg(long, value_name = "FILE", conflicts_with_all = ["plot", "shapes", "geometry", "synthesis"])]
     compare: Option<PathBuf>,
     /// Add the stabilisation diagram and the mode indicator to the JSON
@@ -122,7 +124,7 @@ struct UnmeasuredArgs {
     /// Forces act that are not measured, such as wind or traffic
     #[arg(long, conflicts_with_all = ["force", "from", "to", "no_offset"])]
     ambient: bool,
-    /// Frequencies of machines nearby, in Hz, whose lines are left out
+    /// Frequencies of machines nearby, in Hz, whose lines are excluded
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           requires = "ambient", allow_negative_numbers = true)]
     without_hz: Vec<f64>,
@@ -141,7 +143,7 @@ struct UnmeasuredArgs {
     no_offset: bool,
 }
 
-/// Adds what `--plot` asks for: the figure of a result, or a page of it with the shapes of its modes.
+/// Adds the figure of a result for `--plot`, or a page of it with the shapes of its modes.
 pub fn draw(
     outcome: Outcome,
     plot: &PlotArgs,
@@ -168,7 +170,7 @@ impl ModesArgs {
         self.shapes.add_files(files.writes(&self.plot.plot))
     }
 
-    /// Reads what there is, finds the modes, and reports.
+    /// Reads the data, identifies the modes, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let channels = self.channels.channels();
         let path = &self.input.record;
@@ -181,14 +183,14 @@ impl ModesArgs {
             if is_json || path == Path::new("-") {
                 return match &self.compare {
                     Some(_) => self.compared(&ModeSet::read(path)?),
-                    None => self.of_machine(path),
+                    None => self.machine_modes(path),
                 };
             }
-            return self.of_tables();
+            return self.table_modes();
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         if channels.force.is_empty() && !self.unmeasured.ambient {
-            self.refuse("a free decay", &self.of_forces())?;
+            self.refuse("a free decay", &self.force_options())?;
             let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
             let summary = decayed.summary();
             let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
@@ -211,11 +213,11 @@ impl ModesArgs {
                 self.input.window(),
             )?])?;
         }
-        self.of_test(modes)
+        self.test_outcome(modes)
     }
 
-    fn of_tables(&self) -> Result<Outcome, CliError> {
-        self.refuse("a table of frequency responses", &self.of_records())?;
+    fn table_modes(&self) -> Result<Outcome, CliError> {
+        self.refuse("a table of frequency responses", &self.record_options())?;
         let files = std::iter::once(&self.input.record).chain(&self.more);
         let read = |file: &PathBuf| {
             FrequencyResponses::read(file).map_err(|error| match error {
@@ -226,11 +228,11 @@ impl ModesArgs {
             })
         };
         let tables = files.map(read).collect::<Result<Vec<_>, _>>()?;
-        self.of_test(mechid::modes_of_responses(&tables, &self.settings())?)
+        self.test_outcome(mechid::modes_of_responses(&tables, &self.settings())?)
     }
 
     /// Reports the modes of a test, or compares them.
-    fn of_test(&self, mut modes: Modes) -> Result<Outcome, CliError> {
+    fn test_outcome(&self, mut modes: Modes) -> Result<Outcome, CliError> {
         if self.compare.is_some() {
             return self.compared(&ModeSet::from_summary(modes.summary())?);
         }
@@ -252,7 +254,7 @@ impl ModesArgs {
         self.drawn(outcome, &modes, &shaped, &names)
     }
 
-    /// Compares modes with those of `--compare`.
+    /// Compares modes with `--compare`.
     fn compared(&self, first: &ModeSet) -> Result<Outcome, CliError> {
         let second = self.compare.as_ref().map(ModeSet::read).transpose()?;
         let second = second.as_ref().unwrap_or(first);
@@ -260,7 +262,7 @@ impl ModesArgs {
         Outcome::new(comparison.to_string(), &comparison)
     }
 
-    /// Adds the pictures and the files of shapes that are asked for.
+    /// Adds the requested pictures and files of shapes.
     fn drawn(
         &self,
         outcome: Outcome,
@@ -268,20 +270,20 @@ impl ModesArgs {
         modes: &[ShapedMode],
         names: &[String],
     ) -> Result<Outcome, CliError> {
-        let shapes = self.shapes.of(modes, names)?;
+        let shapes = self.shapes.mode_shapes(modes, names)?;
         let outcome = self.shapes.with_shapes(outcome, shapes.as_ref());
         draw(outcome, &self.plot, shapes.as_ref(), result, self.style.style())
     }
 
-    /// Refuses the first of some options that was given.
+    /// Refuses the first given option among some.
     fn refuse(&self, what: &str, options: &[(&'static str, bool)]) -> Result<(), CliError> {
         let Some(&(setting, _)) = options.iter().find(|(_, given)| *given) else { return Ok(()) };
         let why = format!("it means nothing to {what}");
         Err(AnalysisError::Setting { setting, why }.into())
     }
 
-    /// Options of records with forces, and whether they were given.
-    fn of_records(&self) -> Vec<(&'static str, bool)> {
+    /// Returns the options of records with forces, and whether each was given.
+    fn record_options(&self) -> Vec<(&'static str, bool)> {
         vec![
             ("force_at", !self.force_at.is_empty()),
             ("response_at", !self.response_at.is_empty()),
@@ -292,9 +294,9 @@ impl ModesArgs {
         ]
     }
 
-    /// Options of tests with forces, and whether they were given.
-    fn of_forces(&self) -> Vec<(&'static str, bool)> {
-        let mut options = self.of_records();
+    /// Returns the options of tests with forces, and whether each was given.
+    fn force_options(&self) -> Vec<(&'static str, bool)> {
+        let mut options = self.record_options();
         options.extend([
             ("band_hz", self.band_hz.is_some()),
             ("near_hz", !self.near_hz.is_empty()),
@@ -305,10 +307,10 @@ impl ModesArgs {
         options
     }
 
-    fn of_machine(&self, path: &Path) -> Result<Outcome, CliError> {
-        let mut of_forces = self.of_forces();
-        of_forces.retain(|(name, _)| *name != "near_hz");
-        self.refuse("a machine", &of_forces)?;
+    fn machine_modes(&self, path: &Path) -> Result<Outcome, CliError> {
+        let mut refused = self.force_options();
+        refused.retain(|(name, _)| *name != "near_hz");
+        self.refuse("a machine", &refused)?;
         if self.modes.is_none() && !self.near_hz.is_empty() {
             let why = "of a machine it needs `modes`, the number to find".into();
             return Err(AnalysisError::Setting { setting: "near_hz", why }.into());

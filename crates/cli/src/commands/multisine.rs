@@ -73,7 +73,7 @@ pub struct MultisineArgs {
     /// Starting points of the search for a low crest factor
     #[arg(long, value_name = "COUNT", default_value_t = 16, value_parser = at_least_one)]
     starts: usize,
-    /// Inputs of the test, each with a column of its own
+    /// Inputs of the test, one column each
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Several inputs")]
     inputs: usize,
@@ -110,10 +110,10 @@ enum PhaseLaw {
     LowCrest,
 }
 
-/// Ways to tell several inputs apart.
+/// Ways to separate several inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum Uncorrelated {
-    /// Each input has lines of its own, dealt out in turn: one experiment
+    /// Interleaved lines, each excited by one input: one experiment
     #[default]
     Interleaved,
     /// All inputs share all lines, orthogonal by a DFT matrix: as many experiments as inputs
@@ -122,7 +122,7 @@ enum Uncorrelated {
     Hadamard,
 }
 
-/// Numbers in the largest record that is written: about 2 GB of text.
+/// Maximum count of numbers in a written record: about 2 GB of text.
 const LARGEST: usize = 100_000_000;
 
 impl MultisineArgs {

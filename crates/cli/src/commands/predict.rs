@@ -13,10 +13,10 @@ use crate::outcome::{Files, Outcome};
 
 /// Predict the response of an identified machine, linear or not, to a measured force
 ///
-/// With --period the steady state under the mean of the periods, otherwise the whole window from its
-/// first sample on, at rest before it or from the state that --settle fits. Between the samples the
-/// force is band-limited. Response columns are compared with the prediction. The window is held in
-/// memory.
+/// With --period the steady state under the mean of the periods, otherwise the whole window from
+/// its first sample on, at rest before it or from the state that --settle fits. Between the samples
+/// the force is band-limited. Response columns are compared with the prediction. The window is held
+/// in memory.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rig.csv --force f --displacement x --period 1024 --nonlinear 'k3: x1^3' --json \\

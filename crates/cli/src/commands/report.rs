@@ -1,4 +1,4 @@
-//! `mechid report`: one HTML file with everything an identification has to show.
+//! `mechid report`: one HTML file with all results of an identification.
 
 use std::ffi::OsString;
 use std::fs;
@@ -18,12 +18,12 @@ use crate::{options, repeat};
 
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
 ///
-/// Takes the options of `mechid identify`. The file needs nothing else: it can be sent, printed and
-/// kept; its figures zoom and have a cursor. It ends with the command that writes it again.
+/// Takes the options of `mechid identify`. The file is self-contained: it can be sent, printed and
+/// archived; its figures zoom and have a cursor. It ends with the command that writes it again.
 ///
 /// A long text is gone through a stretch at a time and held as by `mechid identify`: levels, time
-/// histories and mean periods are those of all samples; the residual in time and, of an open record,
-/// its spectrum and the force found are those of the first 262144 samples, and the page says so.
+/// histories and mean periods cover all samples; the residual in time and, for an open record, its
+/// spectrum and the reconstructed force cover the first 262144 samples, and the page says so.
 ///
 /// With --machine the page is that of a machine of named elements.
 #[derive(Debug, Args)]
@@ -51,12 +51,13 @@ pub struct PageArgs {
     /// Heading of the report [default: the name of the record]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     title: Option<String>,
-    /// File with more to stand on the page, one `name: value` per line, such as sensors, operator, date, place
-    /// and comment
+    /// File with further details for the page, one `name: value` per line, such as sensors,
+    /// operator, date, place and comment
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     about: Option<PathBuf>,
-    /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and 82), or a table with
-    /// rows name,x,y,z in m and line,name,name [default: a row, by the names of the channels]
+    /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411,
+    /// and 82), or a table with rows name,x,y,z in m and line,name,name [default: a row, by the
+    /// names of the channels]
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "machine")]
     geometry: Option<PathBuf>,
     #[command(flatten)]
@@ -88,7 +89,7 @@ pub fn html_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// The identification, and where the page is.
+/// Identification, and path of the page.
 #[derive(Serialize)]
 struct Printed<'a, R> {
     #[serde(flatten)]

@@ -75,7 +75,7 @@ pub struct SimulateArgs {
     /// a Parquet file, its name ending in .parquet
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
-    /// Number of runs, each with noise of its own: the seed counts up from the one described
+    /// Number of runs with different noise: the seed counts up from the one described
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot",
           help_heading = "Many runs")]
     runs: Option<usize>,
@@ -104,7 +104,7 @@ impl SimulateArgs {
         files.writes([&self.output]).writes(&self.plot.plot)
     }
 
-    /// Simulates and hands over the record, or those of all runs.
+    /// Simulates one record, or the records of all runs.
     pub fn run(&self) -> Result<Outcome, CliError> {
         match (self.runs, &self.study) {
             (None, None) => self.one(),

@@ -1,4 +1,4 @@
-//! `mechid stability`: what a time step does to a free motion, scheme by scheme.
+//! `mechid stability`: effect of the time step on a free motion, scheme by scheme.
 
 use std::path::PathBuf;
 
@@ -52,8 +52,8 @@ pub struct StabilityArgs {
     /// θ of Wilson's scheme
     #[arg(long, default_value_t = 1.4, allow_negative_numbers = true, help_heading = "Schemes")]
     theta: f64,
-    /// ρ∞ of the generalised-α schemes and of ρ∞-Bathe, the spectral radius at very large steps; HHT-α is shown from
-    /// 0.5 on
+    /// ρ∞ of the generalised-α schemes and of ρ∞-Bathe, the spectral radius at very large steps;
+    /// HHT-α is shown from 0.5 on
     #[arg(
         long = "rho-infinity",
         value_name = "RADIUS",
@@ -107,9 +107,10 @@ impl StabilityArgs {
         let rho = self.rho_infinity;
         let (alpha, wbz) =
             (GeneralisedAlpha::new(rho)?, GeneralisedAlpha::wood_bossak_zienkiewicz(rho)?);
-        let of_newmark = match newmark == Newmark::AVERAGE_ACCELERATION {
-            true => "Newmark".into(),
-            false => format!("Newmark {} {}", compact(self.beta, 4), compact(self.gamma, 4)),
+        let of_newmark = if newmark == Newmark::AVERAGE_ACCELERATION {
+            "Newmark".into()
+        } else {
+            format!("Newmark {} {}", compact(self.beta, 4), compact(self.gamma, 4))
         };
         let of_wilson = format!("Wilson θ = {}", compact(self.theta, 6));
         let with_radius = |name: &str| format!("{name} {}", compact(rho, 6));

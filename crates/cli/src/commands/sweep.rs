@@ -18,14 +18,14 @@ use crate::outcome::{Files, Outcome};
 
 /// Identify a machine at many sampling steps, and find the step that suits the estimator best
 ///
-/// From the description of an experiment (SYSTEM.json, as "mechid simulate" takes it) each setting is
-/// simulated: NPI or a rate replaces the sampling rate and the number of samples in a period stays.
-/// With NPI a period holds that many cycles of the natural frequency, so that the step is
-/// 2π NPI / (samples · ωn). The machine described is the truth that errors are measured against.
+/// From the description of an experiment (SYSTEM.json, as "mechid simulate" takes it) each setting
+/// is simulated: NPI or a rate replaces the sampling rate and the number of samples in a period
+/// stays. With NPI a period holds that many cycles of the natural frequency, so that the step is 2π
+/// NPI / (samples · ωn). The machine described is the truth that errors are measured against.
 ///
-/// Of a measured record every n-th sample is taken, with nothing filtered; columns and window are
-/// chosen as in "mechid identify". Without --reference the standard errors are compared, which know
-/// nothing of bias. A long text is gone through once for all settings, a stretch at a time, and not
+/// Every n-th sample of a measured record is taken, without a filter; columns and window are chosen
+/// as in "mechid identify". Without --reference the standard errors are compared, which do not
+/// include bias. A long text is gone through once for all settings, a stretch at a time, and not
 /// held; of spectra one long period is, and the lines that are driven are found in the first 262144
 /// samples.
 #[derive(Debug, Args)]
@@ -45,9 +45,9 @@ pub struct SweepArgs {
     /// Natural frequency that NPI counts, in Hz [default: the lowest of the machine]
     #[arg(long, value_name = "HZ")]
     natural_frequency_hz: Option<f64>,
-    /// Estimator: from sample to sample by Euler's rule (the dissertation's; biased in proportion to the step), with the
-    /// force held or linear between samples; the equation of motion at the samples, with the acceleration;
-    /// or least squares or maximum likelihood on the spectra
+    /// Estimator: from sample to sample by Euler's rule (the dissertation's; biased in proportion
+    /// to the step), with the force held or linear between samples; the equation of motion at the
+    /// samples, with the acceleration; or least squares or maximum likelihood on the spectra
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "linear")]
     estimator: Estimator,
     /// Find the mass of a described machine, too; without this it is taken from the description
@@ -90,7 +90,7 @@ struct SettingArgs {
 }
 
 impl SettingArgs {
-    /// Returns the settings given, of which the parser demands one kind.
+    /// Returns the given settings; the parser demands exactly one kind.
     fn chosen(&self) -> (Kind, Settings) {
         match (&self.npi, &self.rate_hz, &self.decimate) {
             (_, Some(rates), _) => (Kind::RateHz, rates.clone()),
@@ -110,15 +110,13 @@ impl SweepArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         let described = |ending: &std::ffi::OsStr| ending.eq_ignore_ascii_case("json");
         let (kind, settings) = self.settings.chosen();
-        let bar = match self.report.quiet {
-            true => ProgressBar::hidden(),
-            // Hides itself where nobody watches.
-            false => ProgressBar::new(settings.0.len() as u64),
+        let bar = if self.report.quiet {
+            ProgressBar::hidden()
+        } else {
+            // The bar is hidden unless the error stream is a terminal.
+            ProgressBar::new(settings.0.len() as u64)
         };
-        let mass = match self.unknown_mass {
-            true => Some(KnownMass::default()),
-            false => self.mass.clone(),
-        };
+        let mass = if self.unknown_mass { Some(KnownMass::default()) } else { self.mass.clone() };
         let how = SweepSettings {
             kind,
             settings,
@@ -126,9 +124,10 @@ impl SweepArgs {
             mass,
             natural_frequency_hz: self.natural_frequency_hz,
         };
-        let swept = match self.input.record.extension().is_some_and(described) {
-            true => self.over_experiment(&how, &bar),
-            false => self.over_record(&how, &bar),
+        let swept = if self.input.record.extension().is_some_and(described) {
+            self.over_experiment(&how, &bar)
+        } else {
+            self.over_record(&how, &bar)
         };
         bar.finish_and_clear();
         let swept = swept?;

@@ -12,11 +12,12 @@ use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
-/// Show the results of `mechid fleet` side by side: parameters and modes over the records, outliers, failures
+/// Show the results of `mechid fleet` side by side: parameters and modes over the records,
+/// outliers, failures
 ///
-/// Steps and drifts are found by the ranks of the values, with the record where they begin and a p-value.
-/// An outlier is farther from the level of its records than 3.5 standard deviations, those of the series (a
-/// robust estimate) and of the value together.
+/// Steps and drifts are found by the ranks of the values, with the record where they begin and a
+/// p-value. An outlier is farther from the level of its records than 3.5 standard deviations, those
+/// of the series (a robust estimate) and of the value together.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid trends results --output trends.html
@@ -35,8 +36,8 @@ pub struct TrendsArgs {
     /// Heading of the page [default: the folder]
     #[arg(long, value_name = "TEXT", requires = "output", help_heading = "Output")]
     title: Option<String>,
-    /// File for a table with one row per value: quantity, record, value, standard error, outlier, and the
-    /// change that begins there
+    /// File for a table with one row per value: quantity, record, value, standard error, outlier,
+    /// and the change that begins there
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     table: Option<PathBuf>,
     #[command(flatten)]
