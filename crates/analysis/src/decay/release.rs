@@ -50,10 +50,10 @@ pub(super) fn release(record: &Record) -> usize {
 fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
     let spectrum = Spectrum::of(&part.without_mean());
+    let crests: Vec<f64> = (0..record.channels()).map(|c| part.column(c).amax()).collect();
     let power = |line: usize| -> f64 {
-        let powers = (0..record.channels()).map(|channel| {
-            let largest = part.column(channel).amax();
-            if largest > 0.0 { (spectrum.line(line, channel) / largest).norm_sqr() } else { 0.0 }
+        let powers = crests.iter().enumerate().map(|(channel, largest)| {
+            if *largest > 0.0 { (spectrum.line(line, channel) / *largest).norm_sqr() } else { 0.0 }
         });
         powers.sum()
     };

@@ -77,6 +77,9 @@ impl Data {
 
     /// Returns the triangular factor of \[linear columns | columns of poles times k/N | channels\]
     /// after whitening.
+    ///
+    /// Modes that have died away before a chunk have no columns there: most modes of a long record
+    /// take a small part of it.
     fn triangle(
         &self,
         poles: &[Pole],
@@ -85,26 +88,60 @@ impl Data {
     ) -> Option<DMatrix<f64>> {
         let width = linear_columns(poles, self.constant) + 2 * poles.len() + channels.len();
         let mut factor = TriangularFactor::new(width);
+        let mut few: Option<FewColumns> = None;
         for first in (0..self.len()).step_by(POLE_CHUNK) {
-            let end = self.len().min(first + POLE_CHUNK);
             let before = noise.order().min(first);
-            let basis = columns(poles, self.constant, first - before, end, self.len());
-            let rows = first - before..end;
-            let samples =
-                channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
-            let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
-            parts.extend(samples);
-            let white: Vec<DMatrix<f64>>;
-            if noise.order() > 0 {
-                white =
-                    parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();
-                parts = white.iter().map(DMatrix::as_view).collect();
+            let alive: Vec<usize> =
+                (0..poles.len()).filter(|at| poles[*at].is_alive(first - before)).collect();
+            if alive.len() == poles.len() {
+                if !self.push_chunk(&mut factor, poles, noise, channels, first) {
+                    return None;
+                }
+                continue;
             }
-            if !factor.push(&parts) {
+            let mut columns = match few.take() {
+                Some(columns) if columns.alive == alive => columns,
+                other => {
+                    if !other.is_none_or(|columns| columns.merge_into(&mut factor)) {
+                        return None;
+                    }
+                    FewColumns::new(poles, alive, self.constant, channels.len())
+                }
+            };
+            if !self.push_chunk(&mut columns.factor, &columns.poles, noise, channels, first) {
                 return None;
             }
+            few = Some(columns);
+        }
+        if !few.is_none_or(|columns| columns.merge_into(&mut factor)) {
+            return None;
         }
         Some(factor.r().clone())
+    }
+
+    /// Adds the rows from sample `first` on to the triangle of these poles and channels; returns
+    /// `false` if a value overflows.
+    fn push_chunk(
+        &self,
+        factor: &mut TriangularFactor,
+        poles: &[Pole],
+        noise: &Autoregression,
+        channels: &[usize],
+        first: usize,
+    ) -> bool {
+        let end = self.len().min(first + POLE_CHUNK);
+        let before = noise.order().min(first);
+        let basis = columns(poles, self.constant, first - before, end, self.len());
+        let rows = first - before..end;
+        let own = channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
+        let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
+        parts.extend(own);
+        let white: Vec<DMatrix<f64>>;
+        if noise.order() > 0 {
+            white = parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();
+            parts = white.iter().map(DMatrix::as_view).collect();
+        }
+        factor.push(&parts)
     }
 
     /// Solves for the linear unknowns; `None` if the poles are impossible or too close to one
@@ -218,6 +255,42 @@ impl Fit {
             side.rows_mut(at * columns, columns).copy_from(&(&of.side / deviation));
         }
         (jacobian, side)
+    }
+}
+
+/// Triangle of the rows in which only some of the poles have not died away.
+struct FewColumns {
+    /// Indices of these poles among all.
+    alive: Vec<usize>,
+    poles: Vec<Pole>,
+    /// Indices of the columns among those of all poles.
+    columns: Vec<usize>,
+    width: usize,
+    factor: TriangularFactor,
+}
+
+impl FewColumns {
+    fn new(all: &[Pole], alive: Vec<usize>, constant: bool, channels: usize) -> Self {
+        let linear = linear_columns(all, constant);
+        let both = |at: &usize| [2 * at, 2 * at + 1];
+        let mut columns: Vec<usize> = alive.iter().flat_map(both).collect();
+        columns.extend(2 * all.len()..linear);
+        columns.extend(alive.iter().flat_map(both).map(|column| linear + column));
+        let width = linear + 2 * all.len() + channels;
+        columns.extend(width - channels..width);
+        let factor = TriangularFactor::new(columns.len());
+        let poles = alive.iter().map(|at| all[*at]).collect();
+        Self { alive, poles, columns, width, factor }
+    }
+
+    /// Adds the rows to the triangle of all poles; returns `false` if a square overflows.
+    fn merge_into(self, whole: &mut TriangularFactor) -> bool {
+        let r = self.factor.r();
+        let mut rows = DMatrix::zeros(r.nrows(), self.width);
+        for (column, &at) in r.column_iter().zip(&self.columns) {
+            rows.column_mut(at).copy_from(&column);
+        }
+        whole.push(&[rows.as_view()])
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Complex, DMatrix};
 
 use super::limits::{
-    FASTEST_DECAY, FROM_THE_END, MOST_DAMPING, MOST_GROWTH, POLE_AFRESH, POLE_HIGHEST,
+    DEAD, FASTEST_DECAY, FROM_THE_END, MOST_DAMPING, MOST_GROWTH, POLE_AFRESH, POLE_HIGHEST,
 };
 
 /// Pole λ = `growth` + i `turn` of the response exp(λ k) at sample k.
@@ -39,6 +39,11 @@ impl Pole {
         let most_decay = turn * MOST_DAMPING / (1.0 - MOST_DAMPING * MOST_DAMPING).sqrt();
         let least = -FASTEST_DECAY.min(0.999 * most_decay);
         Self { growth: self.growth.clamp(least, MOST_GROWTH / len as f64), turn }
+    }
+
+    /// Returns whether more than rounding remains of it at a sample.
+    pub(super) fn is_alive(&self, sample: usize) -> bool {
+        self.growth * sample as f64 >= -DEAD
     }
 
     /// Returns the sample to which its amplitude refers.
