@@ -21,6 +21,10 @@ const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
 /// matrices.
 const DENSE_DOF: usize = 64;
 
+/// Maximum share of entries that are not zero of full matrices that are stored as sparse ones; with more,
+/// the factors of an irregular pattern may have all entries.
+const SPARSE_SHARE: f64 = 0.1;
+
 /// Maximum number of degrees of freedom of such a machine for computations that need full matrices:
 /// above it, all modes or the response at every line would take minutes.
 const ALL_ENTRIES_DOF: usize = 300;
@@ -62,6 +66,7 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
             let [m, c, k] = Matrix::ALL.map(|which| DMatrix::from(sparse.matrix(which)));
             SecondOrderSystem::new(m, c, k).map_err(|source| IoError::Model { file, source })
         }
+        Some(_) if described.system.lists_rows() => described.system.system(&file),
         Some(sparse) => Err(too_many(&file, sparse.dof())),
     }
 }
@@ -198,7 +203,7 @@ impl SystemDescription {
                 sparse.push(matrix.nrows());
             }
         }
-        if sparse.iter().all(|size| *size <= DENSE_DOF) {
+        if sparse.iter().all(|size| *size <= DENSE_DOF) && !self.is_mostly_zero() {
             return Ok(None);
         }
         let (Some(damping), Some(stiffness)) = (&self.damping, &self.stiffness) else {
@@ -216,6 +221,27 @@ impl SystemDescription {
                 return Err(IoError::Description { file: file.into(), what });
             }
         }))
+    }
+
+    /// Returns whether all matrices are lists of rows.
+    pub(crate) fn lists_rows(&self) -> bool {
+        let all = [Some(&self.mass), self.damping.as_ref(), self.stiffness.as_ref()];
+        all.iter().all(|entries| matches!(entries, Some(Entries::Rows(_))))
+    }
+
+    /// Returns whether full matrices of a large machine have so few entries that are not zero that
+    /// the steps of sparse ones take less time.
+    fn is_mostly_zero(&self) -> bool {
+        let few = |entries: &Entries| match entries {
+            Entries::Rows(rows) => {
+                let filled = rows.iter().flatten().filter(|value| **value != 0.0).count();
+                rows.len() > DENSE_DOF
+                    && filled as f64 <= SPARSE_SHARE * (rows.len() * rows.len()) as f64
+            }
+            _ => false,
+        };
+        let others = [&self.damping, &self.stiffness];
+        few(&self.mass) && others.iter().all(|entries| entries.as_ref().is_some_and(few))
     }
 
     pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {

@@ -47,7 +47,7 @@ pub struct Experiment {
     #[serde(skip)]
     file: String,
     system: SystemDescription,
-    /// The machine, if Matrix Market files describe a large one.
+    /// The machine in sparse matrices, if it is a large one.
     #[serde(skip)]
     sparse: Option<SparseSystem>,
     #[serde(default)]
@@ -144,12 +144,14 @@ impl Experiment {
     pub fn system(&self) -> Result<SecondOrderSystem, IoError> {
         match &self.sparse {
             None => self.system.system(&self.file),
+            Some(_) if self.system.lists_rows() => self.system.system(&self.file),
             Some(sparse) => Err(too_many(&self.file, sparse.dof())),
         }
     }
 
-    /// Returns the system, if Matrix Market files describe one with more than 64 degrees of
-    /// freedom.
+    /// Returns the system in sparse matrices, if it has more than 64 degrees of freedom and Matrix
+    /// Market files or lists of entries describe it, or full matrices of which at most a tenth of the
+    /// entries are not zero.
     pub fn sparse_system(&self) -> Option<&SparseSystem> {
         self.sparse.as_ref()
     }
@@ -181,7 +183,7 @@ impl Experiment {
                 )));
             }
         }
-        if self.sparse.is_none() {
+        if self.sparse.is_none() || self.system.lists_rows() {
             return Ok((0..dof).collect());
         }
         let driven: BTreeSet<usize> =
