@@ -1,16 +1,20 @@
 //! Progress display while a subcommand computes.
 
-use std::io::{IsTerminal as _, stderr};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::io::{IsTerminal as _, Write, stderr};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
 /// Time before the display appears: shorter work needs none.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Time between two lines of progress if standard error is no terminal, such as the log of a batch
+/// job: often enough to show that the work goes on, seldom enough not to fill the log.
+const LINE: Duration = Duration::from_secs(30);
 
 /// Time between two updates of the display.
 const TICK: Duration = Duration::from_millis(100);
@@ -57,11 +61,9 @@ fn spinner() -> ProgressBar {
     ProgressBar::new_spinner().with_style(style.expect("the template is written correctly"))
 }
 
-/// Does some work, and shows its progress if it takes long and the error stream is a terminal.
+/// Does some work and shows its progress if it takes long: on one line that changes at a terminal,
+/// as a line every [`LINE`] elsewhere.
 pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
-    if !stderr().is_terminal() {
-        return work();
-    }
     // An existing logger is kept: a caller of the library may have set one.
     if log::set_logger(&PROGRESS).is_ok() {
         log::set_max_level(LevelFilter::Trace);
@@ -69,17 +71,10 @@ pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     thread::scope(|scope| {
         let (done, end) = channel::<()>();
         scope.spawn(move || {
-            let mut spinner = None;
-            let mut wait = PATIENCE;
-            // The loop ends when the other end of the channel is dropped.
-            while end.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
-                let spinner = spinner.get_or_insert_with(self::spinner);
-                spinner.set_message(PROGRESS.after(message));
-                spinner.tick();
-                wait = TICK;
-            }
-            if let Some(spinner) = spinner {
-                spinner.finish_and_clear();
+            if stderr().is_terminal() {
+                spin(message, &end);
+            } else {
+                write_lines(message, LINE, &end, &mut stderr());
             }
         });
         let result = work();
@@ -88,11 +83,52 @@ pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     })
 }
 
+/// Shows the progress at a terminal until the other end of the channel is dropped.
+fn spin(message: &str, end: &Receiver<()>) {
+    let mut spinner = None;
+    let mut wait = PATIENCE;
+    while end.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+        let spinner = spinner.get_or_insert_with(self::spinner);
+        spinner.set_message(PROGRESS.after(message));
+        spinner.tick();
+        wait = TICK;
+    }
+    if let Some(spinner) = spinner {
+        spinner.finish_and_clear();
+    }
+}
+
+/// Writes a line of progress at equal times until the other end of the channel is dropped.
+fn write_lines(message: &str, every: Duration, end: &Receiver<()>, to: &mut impl Write) {
+    let begin = Instant::now();
+    while end.recv_timeout(every) == Err(RecvTimeoutError::Timeout) {
+        let seconds = begin.elapsed().as_secs();
+        // A line that nobody can read changes nothing.
+        let _ = writeln!(to, "{}, {seconds} s so far", PROGRESS.after(message));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use mechid::signal::{CrestSearch, Multisine, Phases, lines};
 
     use super::*;
+
+    #[test]
+    fn lines_are_written_until_the_work_ends() {
+        let (done, end) = channel::<()>();
+        let writer = thread::spawn(move || {
+            let mut text = Vec::new();
+            write_lines("identifying", Duration::from_millis(20), &end, &mut text);
+            String::from_utf8(text).unwrap()
+        });
+        thread::sleep(Duration::from_millis(150));
+        drop(done);
+        let text = writer.join().unwrap();
+        assert!(text.lines().count() >= 1, "{text}");
+        let is_line = |line: &str| line.starts_with("identifying") && line.ends_with(" s so far");
+        assert!(text.lines().all(is_line), "{text}");
+    }
 
     #[test]
     fn the_progress_of_a_search_follows_the_message() {
