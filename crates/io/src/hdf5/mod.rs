@@ -5,6 +5,7 @@
 //! MathWorks, *MAT-File Versions*, for the attributes and the order of dimensions of version 7.3.
 
 mod attributes;
+mod objects;
 mod values;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,6 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use hdf5_pure::{Dataset, File, Group, Object};
 
 use self::attributes::Attributes;
+use self::objects::Objects;
 use self::values::{Array, Content};
 use crate::IoError;
 use crate::contents::{Axis, Column, ComplexArray, Contents, Fault, Place};
@@ -56,6 +58,8 @@ struct Reader {
     len: u64,
     /// Number of groups so far.
     groups: usize,
+    /// Objects of a MATLAB file.
+    objects: Option<Objects>,
 }
 
 impl Reader {
@@ -64,7 +68,10 @@ impl Reader {
         let file = File::from_bytes(bytes).map_err(damaged)?;
         let format = if is_matlab { "MATLAB 7.3 (HDF5)" } else { "HDF5" };
         let contents = Contents { format: format.into(), ..Contents::default() };
-        let mut reader = Self { contents, budget, is_matlab, len, groups: 0 };
+        let mut reader = Self { contents, budget, is_matlab, len, groups: 0, objects: None };
+        if is_matlab {
+            reader.objects = Objects::read(&file.root(), len, &mut reader.budget)?;
+        }
         reader.add_group(&file.root(), "", 0)?;
         Ok(reader.contents)
     }
@@ -132,6 +139,9 @@ impl Reader {
         depth: usize,
     ) -> Result<(), Fault> {
         let attributes = Attributes::from_dataset(dataset);
+        if attributes.has("MATLAB_object_decode") && self.add_timetable(dataset, &path, depth)? {
+            return Ok(());
+        }
         match values::read(dataset, &attributes, self.len, &mut self.budget) {
             Ok(Content::Numbers(array)) => self.add_numbers(array, path, &attributes, of_group)?,
             Ok(Content::Complex { lengths, values }) => {

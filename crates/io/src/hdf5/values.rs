@@ -203,7 +203,11 @@ fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, 
 }
 
 /// Returns the objects to which a data set of references refers.
-fn references(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
+pub(super) fn references(
+    dataset: &Dataset,
+    len: u64,
+    budget: &mut Budget,
+) -> Result<Content, Trouble> {
     // An open object needs far more memory than a number.
     let lengths = lengths(dataset, OBJECT_NUMBERS, len, budget)?;
     for _ in 0..lengths.iter().product() {

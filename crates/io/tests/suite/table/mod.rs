@@ -10,6 +10,8 @@ mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod stretches;
+#[cfg(feature = "hdf5")]
+mod timetables;
 mod universal;
 
 use mechid_io::{IoError, Quantity, ReadOptions, Table, TimeAxis, csv_text};
