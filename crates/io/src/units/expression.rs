@@ -129,7 +129,7 @@ impl Parser<'_> {
             self.rest = rest;
             return Some(Power { base: Expression::ONE, power: sign });
         }
-        let is_letter = |c: char| c.is_alphabetic() && !"²³⁻".contains(c) || "°'_".contains(c);
+        let is_letter = |c: char| c.is_alphabetic() && !"²³⁻".contains(c) || "°'\"″_".contains(c);
         let end = self.rest.find(|c| !is_letter(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest;

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::expression::Expression;
 use super::vocabulary::{Dimension, G};
-use super::words::{is_ambiguous, is_label, is_quantity_word, quantity_word, split_words};
+use super::words::{
+    is_ambiguous, is_label, is_prefix, is_quantity_word, quantity_word, split_words,
+};
 use super::{Quantity, Unit};
 
 /// Maximum number of words of a text for a unit; a longer one that is not a unit is a description.
@@ -251,7 +253,9 @@ fn unit_in_notes(notes: &[&str], wanted: Option<Quantity>) -> Option<StatedUnit>
 
 /// Returns a note without brackets around all of it and without the word `unit`.
 fn bare_note(note: &str) -> &str {
-    let mut note = note.trim().trim_matches('"').trim();
+    let unquoted = note.trim().trim_matches('"').trim();
+    // The quotation mark alone is that of inches.
+    let mut note = if unquoted.is_empty() { note.trim() } else { unquoted };
     for (open, close) in [('[', ']'), ('{', '}'), ('<', '>'), ('(', ')')] {
         let inner = note.strip_prefix(open).and_then(|inner| inner.strip_suffix(close));
         // The brackets of `(m/s²)·(s)` do not enclose all of it.
@@ -408,6 +412,10 @@ fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWords> {
             if quantity.is_some_and(|quantity| unit.quantity != quantity) {
                 continue;
             }
+            // The words of `milli-g` are one unit.
+            if is_prefix(text_of(&words[first - 1])) {
+                continue;
+            }
             let is_short = parts.len() == 1 && is_ambiguous(parts[0]);
             let named =
                 words[..first].iter().any(|word| is_quantity_word(text_of(word), unit.quantity));
@@ -424,11 +432,36 @@ fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWords> {
             return Some(UnitWords { span, text, unit: Some(unit), evidence });
         }
     }
-    wanted.and_then(|wanted| glued(name, &words, wanted).or_else(|| electric(name, &words)))
+    wanted.and_then(|wanted| {
+        leading_unit(name, &words, wanted)
+            .or_else(|| glued(name, &words, wanted))
+            .or_else(|| electric(name, &words))
+    })
+}
+
+/// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. It is used if it has no other meaning and the name
+/// is that of its quantity.
+fn leading_unit(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWords> {
+    let text_of = |span: &Range<usize>| &name[span.clone()];
+    (1..words.len().min(4)).rev().find_map(|count| {
+        let parts: Vec<&str> = words[..count].iter().map(text_of).collect();
+        let unit =
+            joined_unit(&parts).filter(|unit| unit.quantity == wanted && unit.in_si != 1.0)?;
+        let named = words[count..].iter().any(|word| is_quantity_word(text_of(word), wanted));
+        let is_clear = named && !is_ambiguous(parts[0]);
+        let evidence = if is_clear { Evidence::Stated } else { Evidence::Unused };
+        let span = words[0].start..words[count - 1].end;
+        Some(UnitWords { text: text_of(&span).into(), span, unit: Some(unit), evidence })
+    })
 }
 
 /// Reads words as a unit: `mm`, `m_s2`, `mm_per_s`.
 fn joined_unit(words: &[&str]) -> Option<Unit> {
+    if let [prefix, unit] = words
+        && is_prefix(prefix)
+    {
+        return Unit::parse(&format!("{prefix}{unit}"));
+    }
     match words {
         [one] => Unit::parse(one),
         [length, "per", time] => Unit::parse(&format!("{length}/{time}")),
@@ -436,6 +469,9 @@ fn joined_unit(words: &[&str]) -> Option<Unit> {
         ["rad" | "radians", "s" | "sec"] => Unit::parse("rad/s"),
         [length, time @ ("s" | "sec" | "s2" | "sec2" | "s^2" | "s²")] => {
             Unit::parse(&format!("{length}/{time}"))
+        }
+        [length, time @ ("s-1" | "s^-1" | "s⁻¹" | "s-2" | "s^-2" | "s⁻²")] => {
+            Unit::parse(&format!("{length} {time}"))
         }
         [length, time @ ("s" | "sec"), "2"] => Unit::parse(&format!("{length}/{time}^2")),
         _ => None,

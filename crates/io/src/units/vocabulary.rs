@@ -95,7 +95,7 @@ pub(super) const VOCABULARY: &[Entry] = &[
         1e-6,
     ),
     entry(&["nm", "nanometer", "nanometers", "nanometre"], D::LENGTH, 1e-9),
-    entry(&["in", "inch", "inches", "ins"], D::LENGTH, INCH),
+    entry(&["in", "inch", "inches", "ins", "\"", "″"], D::LENGTH, INCH),
     entry(&["ft", "foot", "feet"], D::LENGTH, 12.0 * INCH),
     entry(&["mil", "mils", "thou", "thous"], D::LENGTH, 1e-3 * INCH),
     entry(&["µin", "uin", "microinch", "microinches"], D::LENGTH, 1e-6 * INCH),

@@ -69,6 +69,9 @@ const FREQUENCY: &[&str] = &["frequency", "freq", "omega", "w", "f", "frequenz",
 const AMBIGUOUS: &[&str] =
     &["g", "gs", "in", "ins", "m", "n", "s", "h", "d", "c", "v", "foot", "feet", "min"];
 
+/// Words that multiply the unit after them.
+const PREFIXES: [&str; 7] = ["nano", "micro", "milli", "centi", "deci", "kilo", "mega"];
+
 /// Words in brackets that name a place, a direction, a channel or a treatment of the signal rather
 /// than a unit.
 const LABELS: &[&str] = &[
@@ -213,6 +216,11 @@ pub(super) fn is_quantity_word(word: &str, quantity: Quantity) -> bool {
 /// Returns whether a unit is also a word or a symbol of something else.
 pub(super) fn is_ambiguous(unit: &str) -> bool {
     AMBIGUOUS.contains(&unit.to_lowercase().as_str())
+}
+
+/// Returns whether a word multiplies the unit after it, as `milli` does in `milli-g`.
+pub(super) fn is_prefix(word: &str) -> bool {
+    PREFIXES.contains(&word.to_lowercase().as_str())
 }
 
 /// Returns whether a text names places, directions or channels: `left`, `+Z`, `AI0`, `shaker 1`,

@@ -255,3 +255,28 @@ fn a_unit_or_a_factor_may_be_stated() {
     assert!(table.set_scale("acc", 0.0).is_err());
     assert!(Unit::parse("furlong").is_none());
 }
+
+/// Judge: the definitions of the units.
+#[test]
+fn a_unit_may_stand_before_the_name_or_be_a_sign() {
+    let lbf = 0.45359237 * G;
+    for (name, quantity, factor, evidence) in [
+        ("lbf: Hammer", Quantity::Force, lbf, Evidence::Stated),
+        ("kN Force", Quantity::Force, 1e3, Evidence::Stated),
+        ("mm/s: vel", Quantity::VELOCITY, 1e-3, Evidence::Stated),
+        ("kip: rig", Quantity::Force, 1e3 * lbf, Evidence::Unused),
+        ("g: Acceleration", Quantity::ACCELERATION, G, Evidence::Unused),
+        ("um probe 1", Quantity::DISPLACEMENT, 1e-6, Evidence::Unused),
+        ("Disp (\")", Quantity::DISPLACEMENT, 0.0254, Evidence::Stated),
+        ("Acceleration_milli-g", Quantity::ACCELERATION, 1e-3 * G, Evidence::Stated),
+        ("vel - mm s-1", Quantity::VELOCITY, 1e-3, Evidence::Stated),
+        ("load kilo newton", Quantity::Force, 1e3, Evidence::Stated),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, evidence, "{name}");
+        let unit = stated.unit.unwrap_or_else(|| panic!("{name}"));
+        assert!((unit.in_si / factor - 1.0).abs() < 1e-12, "{name}: {}", unit.in_si);
+    }
+    // A unit of the SI before a name changes nothing.
+    assert_eq!(stated_unit("N 12 left", "", Some(Quantity::Force)), None);
+}
