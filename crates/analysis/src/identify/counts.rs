@@ -24,8 +24,12 @@ pub(super) fn check(
         _ => record.samples(),
     };
     let rows: usize = records.iter().map(samples).sum();
-    // Each equation of motion has at least as many unknowns of its own.
-    let needed = unknowns.independent() / unknowns.dof().max(1);
+    let terms = match &how.source {
+        Source::Terms(fit) => fit.terms.terms.len(),
+        _ => 0,
+    };
+    // Each equation of motion, or one of them, has at least as many unknowns of its own.
+    let needed = (unknowns.independent() + terms).div_euclid(unknowns.dof().max(1));
     if rows < needed {
         return Err(NumericsError::TooFewRows { rows, unknowns: needed }.into());
     }

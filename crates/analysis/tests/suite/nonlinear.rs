@@ -534,3 +534,15 @@ fn terms_are_found_in_open_records() {
     let how = Identify::nonlinear("k3: x1^3".parse().unwrap());
     assert!(refused(how).contains("unless `extent` is open"));
 }
+
+/// A million terms beside 256 samples: neither read nor refused in a time that grows with their square.
+#[test]
+fn a_million_terms_are_refused_before_any_work() {
+    let (force, x) = steady_state();
+    let test = test_of(&force, &x).period(PERIOD).unwrap();
+    let text: Vec<String> = (0..1_000_000).map(|at| format!("k{at}: x1^3")).collect();
+    let terms: Nonlinear = text.join(", ").parse().unwrap();
+    let refused = identify(std::slice::from_ref(&test), &Identify::nonlinear(terms)).unwrap_err();
+    let told = refused.to_string();
+    assert!(told.contains("256 equations do not determine 1000003 unknowns"), "{told}");
+}

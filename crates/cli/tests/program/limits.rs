@@ -158,3 +158,20 @@ fn a_text_that_repeats_itself_in_gzip_is_refused() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("the compressed data are longer than"), "{message}");
 }
+
+/// As many as one argument of a command line takes: a description of 120 kB.
+#[test]
+fn many_nonlinear_terms_are_refused_before_any_work() {
+    let home = tempfile::tempdir().unwrap();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    fs::copy(example, home.path().join("a.csv")).unwrap();
+    let terms: Vec<String> = (0..8000).map(|at| format!("k{at}:x1^3")).collect();
+    let begun = Instant::now();
+    let line = "identify a.csv --force force --displacement displacement";
+    let output =
+        limited(home.path(), &format!("{line} --period 256 --nonlinear {}", terms.join(",")));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("equations do not determine 8003 unknowns"), "{message}");
+    assert!(begun.elapsed() < PATIENCE);
+}

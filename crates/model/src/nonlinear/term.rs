@@ -1,5 +1,6 @@
 //! Nonlinear terms: a named coefficient, a force law, and its coordinate.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;
 
@@ -201,10 +202,9 @@ impl Terms {
     /// # Errors
     /// [`ModelError::RepeatedTerm`] if two have the same name.
     pub fn new(terms: Vec<Term>) -> Result<Self, ModelError> {
-        for (at, term) in terms.iter().enumerate() {
-            if terms[..at].iter().any(|other| other.name == term.name) {
-                return Err(ModelError::RepeatedTerm { name: term.name.clone() });
-            }
+        let mut names = HashSet::with_capacity(terms.len());
+        if let Some(repeated) = terms.iter().find(|term| !names.insert(term.name.as_str())) {
+            return Err(ModelError::RepeatedTerm { name: repeated.name.clone() });
         }
         Ok(Self(terms))
     }
