@@ -133,6 +133,8 @@ pub(crate) struct Cut {
     /// Noise of the force of each of these hits.
     pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
+    /// Number of good hits of each record; records in memory all have the same name.
+    pub used: Vec<usize>,
     pub remarks: Vec<String>,
 }
 
@@ -198,13 +200,6 @@ pub(crate) struct HitNoise {
     pub pulse: Range<usize>,
 }
 
-impl Cut {
-    /// Returns the number of hits of a record that are used.
-    pub fn used_of(&self, record: &str) -> usize {
-        self.rows.iter().filter(|row| row.used && row.record == record).count()
-    }
-}
-
 /// Cuts records that are held as a whole into their hits.
 ///
 /// # Errors
@@ -229,6 +224,7 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
         let rows = found.all.iter().enumerate();
         let rows: Vec<HitRow> =
             rows.map(|(at, hit)| HitRow::new(record, at + 1, dof, hit)).collect();
+        all.used.push(rows.iter().filter(|row| row.used).count());
         if rows.iter().all(|row| !row.used) {
             let reasons = match rows.is_empty() {
                 true => "the force does not rise above its noise".into(),

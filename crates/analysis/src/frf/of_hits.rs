@@ -137,7 +137,7 @@ pub(super) fn responses_of_hits(
             significant(rate / std::f64::consts::TAU, 4)
         ));
     }
-    let counts = records.iter().map(|record| cut.used_of(&record.held.file)).collect();
+    let counts = cut.used.clone();
     let (idle, following) = (Vec::new(), Vec::new());
     let responses = Responses { frf, lines, driven, idle, following, segments, counts };
     Ok(OfHits { responses, cut, added_decay, remarks })

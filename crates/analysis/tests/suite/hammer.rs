@@ -392,3 +392,16 @@ fn what_hits_cannot_be_found_in_is_refused() {
     }
     assert!(Channels::new("f,g", ACCELERATION, "x1,x2").struck(&[1], 1).is_err());
 }
+
+/// Records in memory all have the same name.
+#[test]
+fn hits_of_records_with_one_name_are_counted_once() {
+    let rig = rig(ACCELERATION);
+    let records: Vec<Measurement> =
+        (1..4).map(|seed| hammer(&rig, 0, seed).named("the record")).collect();
+    let how = FrfSettings { hits: Some(HitRule::default()), ..FrfSettings::default() };
+    let table = frf_of_records(&records, &how).unwrap();
+    let used = table.hits.iter().filter(|hit| hit.used).count();
+    assert_eq!((table.segments.count, used), (used, 9));
+    assert_eq!(table.records.iter().map(|record| record.segments).collect::<Vec<_>>(), [3; 3]);
+}
