@@ -155,7 +155,12 @@ pub(super) fn fit(
         finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
     };
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
-    let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
+    let is_left = |finding: &Finding| finding.verdict() > Verdict::Good;
+    let pulses = matches!(excitation, Excitation::Hits(_));
+    // Of hits each delay is tried, which takes a while: where something is left alone.
+    let late = (!pulses || residuals.iter().any(|left| left.findings().iter().any(is_left)))
+        .then(|| delay_of_open_records(&data, dt, unknowns, &fit, is_explained, pulses))
+        .flatten();
     let parts = if residuals.iter().any(SpectralResidual::is_rounding) {
         None
     } else {
