@@ -1,7 +1,7 @@
 //! Errors between a record and the result.
 
 use mechid_estimate::EstimateError;
-use mechid_io::escaped;
+use mechid_io::{Quantity, escaped};
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
@@ -104,7 +104,7 @@ pub enum AnalysisError {
     /// A table of frequency responses has not all that its forces and points need.
     #[error(
         "{file} has no response at {response} to a force at {force}: every point needs one to every \
-         force, and every force one at its own point (choose `points`)"
+         force, and every force one at its own point (choose `points`){advice}"
     )]
     NoResponse {
         /// The table.
@@ -113,6 +113,8 @@ pub enum AnalysisError {
         response: String,
         /// Point of the force.
         force: String,
+        /// What else may be done, beginning with its punctuation; empty if there is nothing.
+        advice: &'static str,
     },
     /// A file is neither a record with named columns nor a table of frequency responses.
     #[error(
@@ -240,7 +242,8 @@ pub enum AnalysisError {
     },
     /// A column is in a unit of another quantity than it is used for.
     #[error(
-        "{file}: column {column} is in {unit}, a unit of {measures}; `{setting}` takes columns of {wanted}"
+        "{file}: column {column} is in {unit}, a unit of {measures}; `{setting}` takes columns of {wanted}{}",
+        of_support(*measures, *wanted)
     )]
     Unit {
         /// The record.
@@ -250,11 +253,11 @@ pub enum AnalysisError {
         /// Unit that its name or the line of units says.
         unit: String,
         /// Quantity of that unit.
-        measures: mechid_io::Quantity,
+        measures: Quantity,
         /// Setting that names the column.
         setting: &'static str,
         /// Quantity that it must hold.
-        wanted: mechid_io::Quantity,
+        wanted: Quantity,
     },
     /// The number of response columns is not that of the degrees of freedom of the system.
     #[error(
@@ -691,4 +694,12 @@ fn unclear_time(unclear: Option<&(String, String)>) -> String {
              to take it as seconds)"
         )
     })
+}
+
+/// Returns what to do with a motion among the forces.
+fn of_support(measures: Quantity, wanted: Quantity) -> &'static str {
+    if wanted == Quantity::Force && matches!(measures, Quantity::Response(_)) {
+        return "; the motion of a support is an input of a machine of named elements (`machine`)";
+    }
+    ""
 }

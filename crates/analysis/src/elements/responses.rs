@@ -112,6 +112,7 @@ fn response<'a>(
         file: table.file.clone(),
         response: sensor.name.clone(),
         force: input.into(),
+        advice: "",
     })?;
     match function.quantity.filter(|quantity| *quantity != sensor.quantity) {
         None => Ok(function),
@@ -201,6 +202,7 @@ fn between<'a>(
             file: part.file.clone(),
             response: response.into(),
             force: force.into(),
+            advice: "",
         }
     })
 }

@@ -3,10 +3,12 @@
 use std::str::FromStr;
 
 use mechid_io::LineSpec;
+use mechid_signal::message::count;
 use mechid_signal::{Record, driven_lines, lines};
 use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
+use crate::measurement::Windowed;
 
 /// Spectral lines to identify from.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -87,6 +89,27 @@ pub fn choose_lines(
         return Err(AnalysisError::EmptyBand { low_hz, high_hz, first_hz, last_hz });
     }
     Ok(chosen)
+}
+
+/// Returns how few lines of the records the forces drive, and what to do; `None` for lines that were chosen, or
+/// where there are not more.
+pub(super) fn few(records: &[Windowed], choice: &LineChoice) -> Option<String> {
+    if *choice != LineChoice::Driven {
+        return None;
+    }
+    let (mut driven, mut all) = (0, 0);
+    for record in records {
+        let period = record.held.period;
+        driven += driven_lines(&record.held.force, period).ok()?.len();
+        all += period.div_ceil(2).saturating_sub(1);
+    }
+    (driven < all).then(|| {
+        format!(
+            "the forces drive {driven} of {}, as a single sine or a step does: drive more of them (a multisine, \
+             a sweep, noise), or take all (`lines` all)",
+            count(all, "line")
+        )
+    })
 }
 
 #[cfg(test)]

@@ -62,10 +62,11 @@ pub mod validation;
 use std::fmt;
 
 use mechid_checks::Subject;
-use mechid_estimate::{Estimate, Unknowns};
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::NonlinearEstimate;
+use mechid_numerics::NumericsError;
 use mechid_spectra::Pooling;
 use serde::{Serialize, Serializer};
 
@@ -142,7 +143,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let is_linear = !matches!(how.source, Source::Terms(_));
     let (mut fitted, unscaled) = fitted.map_err(|error| {
         let surplus = if is_linear { resonances::surplus(measurements) } else { None };
-        with_surplus(explained(error, &records), surplus)
+        with_surplus(with_few_lines(explained(error, &records), &records, how), surplus)
     })?;
     let mut summary = IdentificationSummary::new(&records, &mut fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
@@ -176,6 +177,28 @@ fn with_surplus(failure: AnalysisError, surplus: Option<String>) -> AnalysisErro
         }
         (AnalysisError::Estimate(error), Some(reasons)) => AnalysisError::Unfit { error, reasons },
         (failure, _) => failure,
+    }
+}
+
+/// Returns the failure of a fit that lacks equations with the number of lines that the force drives as a reason.
+fn with_few_lines(failure: AnalysisError, records: &[Windowed], how: &Identify) -> AnalysisError {
+    let (error, reasons) = match failure {
+        AnalysisError::Estimate(error) => (error, None),
+        AnalysisError::Unfit { error, reasons } => (error, Some(reasons)),
+        other => return other,
+    };
+    let is_short = matches!(error, EstimateError::Numerics(NumericsError::TooFewRows { .. }));
+    let few = how
+        .source
+        .lines()
+        .filter(|_| is_short)
+        .and_then(|lines| lines::few(records, &lines.choice));
+    match (reasons, few) {
+        (None, None) => AnalysisError::Estimate(error),
+        (Some(one), None) | (None, Some(one)) => AnalysisError::Unfit { error, reasons: one },
+        (Some(reasons), Some(few)) => {
+            AnalysisError::Unfit { error, reasons: format!("{reasons}; {few}") }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use mechid_checks::{Finding, after_response_fit, after_table_fit, coherence, leakage};
 use mechid_estimate::Estimate;
-use mechid_io::{FrequencyResponses, ResponseFunction};
+use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;
 use mechid_spectra::frf::{Frf, Segments};
@@ -14,6 +14,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::checks::When;
 use super::response_settings::IdentifyResponses;
+use super::structure::Form;
 use super::{Band, added_decay};
 use crate::AnalysisError;
 use crate::limits::COHERENCE_OF_ONE;
@@ -63,6 +64,7 @@ impl<'a> Layout<'a> {
             file: table.file.clone(),
             response: response.into(),
             force: force.into(),
+            advice: reciprocity(table, force),
         };
         let place = |force: &String| {
             let at = points.iter().position(|point| point == force);
@@ -82,6 +84,69 @@ impl<'a> Layout<'a> {
         }
         Ok(Self { points, forces, driven, functions })
     }
+}
+
+/// Returns advice for a force at a point where no response was measured, as of a hammer that roves.
+fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
+    if table.functions.iter().any(|f| f.response == force) {
+        return "";
+    }
+    "; by reciprocity a row of responses is a column: `structure` symmetric"
+}
+
+/// Returns a table in which the responses to a force stand for those that reciprocity makes equal to them, with a
+/// remark; the table itself if a force has all of its responses, or none has them by reciprocity either.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (the receptance of symmetric matrices is symmetric).
+fn with_reciprocal<'a>(
+    table: Cow<'a, FrequencyResponses>,
+    how: &IdentifyResponses,
+) -> (Cow<'a, FrequencyResponses>, Option<String>) {
+    let functions = &table.functions;
+    let is_there = |all: &[ResponseFunction], response: &String, reference: &String| {
+        all.iter().any(|f| f.response == *response && f.reference == *reference)
+    };
+    let responses = distinct(functions.iter().map(|f| &f.response));
+    let is_whole = |force: &&String| {
+        responses.contains(force) && responses.iter().all(|p| is_there(functions, p, force))
+    };
+    let is_symmetric = how.structure.forms.contains(&Form::Symmetric);
+    let forces = distinct(functions.iter().map(|f| &f.reference));
+    if !is_symmetric || !how.points.is_empty() || forces.iter().any(|force| is_whole(&force)) {
+        return (table, None);
+    }
+    let mut all = functions.clone();
+    for function in functions {
+        if !is_there(&all, &function.reference, &function.response) {
+            let mut reciprocal = function.clone();
+            std::mem::swap(&mut reciprocal.response, &mut reciprocal.reference);
+            all.push(reciprocal);
+        }
+    }
+    let points = distinct(all.iter().map(|f| &f.response));
+    let is_whole = |force: &String| points.iter().all(|point| is_there(&all, point, force));
+    let whole: Vec<String> = forces.into_iter().filter(is_whole).collect();
+    if whole.is_empty() {
+        return (table, None);
+    }
+    all.retain(|f| whole.contains(&f.reference));
+    let remark = format!(
+        "{}: by reciprocity the responses at {} to forces at other points are those at these points to a force there",
+        table.file,
+        whole.join(", ")
+    );
+    let mut reciprocal = table.into_owned();
+    for coherence in &mut reciprocal.coherence {
+        let CoherenceFunction { response, reference: Some(reference), .. } = coherence else {
+            continue;
+        };
+        if whole.contains(response) && !whole.contains(reference) {
+            std::mem::swap(response, reference);
+        }
+    }
+    reciprocal.functions = all;
+    (Cow::Owned(reciprocal), Some(remark))
 }
 
 /// A table as the estimators take it.
@@ -107,7 +172,9 @@ impl Tabulated {
         how: &IdentifyResponses,
     ) -> Result<Self, AnalysisError> {
         let measured = quantity(table, how)?;
-        let table: &FrequencyResponses = &with_positive_directions(table, &how.points);
+        let table = with_positive_directions(table, &how.points);
+        let (table, by_reciprocity) = with_reciprocal(table, how);
+        let table: &FrequencyResponses = &table;
         let table = &match table.added_decay {
             Some(rate) => Cow::Owned(added_decay::as_derivatives(table, measured, rate)),
             None => Cow::Borrowed(table),
@@ -127,7 +194,7 @@ impl Tabulated {
         let unused = |why: &str| {
             format!("{}: {why}: what a window blunts stays in the responses", table.file)
         };
-        let mut remarks = Vec::new();
+        let mut remarks = Vec::from_iter(by_reciprocity);
         if table.segments.is_some() && averaged.is_none() {
             remarks.push(unused("its frequencies are not those of the segments that it states"));
         }
@@ -445,9 +512,8 @@ impl Columns<'_> {
     ) -> Result<Option<Coherent>, AnalysisError> {
         let Self { points, forces, rows, .. } = *self;
         let of = |point: &String, force: Option<&String>| {
-            let fits = |c: &&mechid_io::CoherenceFunction| {
-                c.response == *point && c.reference.as_ref() == force
-            };
+            let fits =
+                |c: &&CoherenceFunction| c.response == *point && c.reference.as_ref() == force;
             table.coherence.iter().find(fits).map(|c| &c.values)
         };
         let columns = |force: Option<&String>| -> Option<DMatrix<f64>> {
