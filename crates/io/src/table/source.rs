@@ -24,6 +24,10 @@ pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Number of first bytes that are used to detect the format.
 const HEAD: u64 = 512;
 
+/// Place and bytes of the version of a MATLAB 7.3 file, which is little-endian as every one is.
+const VERSION: std::ops::Range<usize> = 124..128;
+const VERSION_73: [u8; 4] = *b"\x00\x02IM";
+
 /// Counter of the stored bytes of a file that were read.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Stored(Arc<AtomicUsize>);
@@ -157,9 +161,14 @@ impl<'a> Source<'a> {
     /// Returns the format of the file.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
-        if head.starts_with(b"MATLAB 5.0 MAT-file") {
+        // Programs other than MATLAB write its version 7.3 with the words of level 5: the number says so.
+        let is_version_73 = head.get(VERSION) == Some(&VERSION_73);
+        if head.starts_with(b"MATLAB 5.0 MAT-file") && !is_version_73 {
             Kind::Mat5
-        } else if head.starts_with(b"MATLAB 7.3 MAT-file") || head.starts_with(b"\x89HDF\r\n") {
+        } else if head.starts_with(b"MATLAB 5.0 MAT-file")
+            || head.starts_with(b"MATLAB 7.3 MAT-file")
+            || head.starts_with(b"\x89HDF\r\n")
+        {
             Kind::Hdf5
         } else if is_parquet(head) {
             Kind::Parquet
