@@ -1,6 +1,12 @@
 //! The `mechid` program.
 
+use std::io::Write as _;
+
 fn main() -> std::process::ExitCode {
+    // Without a backtrace: for lack of memory in it the program would wait for itself.
+    std::panic::set_hook(Box::new(|panic| {
+        let _ = writeln!(std::io::stderr(), "{panic}");
+    }));
     #[cfg(unix)]
     signals::watch();
     if let Ok(program) = std::env::current_exe() {

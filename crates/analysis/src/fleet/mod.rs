@@ -200,14 +200,16 @@ impl Fleet {
             }
             Ok(())
         };
+        let fail = |error: AnalysisError| {
+            next.store(self.parts.len(), Ordering::Relaxed);
+            *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        };
+        let run = || work().unwrap_or_else(fail);
         std::thread::scope(|scope| {
             for _ in 0..workers.clamp(1, self.parts.len()) {
-                scope.spawn(|| {
-                    if let Err(error) = work() {
-                        next.store(self.parts.len(), Ordering::Relaxed);
-                        *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                    }
-                });
+                if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, run) {
+                    fail(AnalysisError::Setting { setting: "workers", why: error.to_string() });
+                }
             }
         });
         if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {

@@ -189,6 +189,8 @@ impl Worker {
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         // Every arena of the allocator would reserve addresses, which count as memory.
         command.env("MALLOC_ARENA_MAX", "2");
+        // A backtrace needs memory, which a process that fails for lack of it waits for without end.
+        command.env("RUST_BACKTRACE", "0");
         #[cfg(unix)]
         {
             use std::os::unix::process::CommandExt as _;
@@ -202,20 +204,25 @@ impl Worker {
             return Err(failed(io::ErrorKind::BrokenPipe.into()));
         };
         let (sender, rows) = channel();
-        thread::spawn(move || {
+        let reader = thread::Builder::new().spawn(move || {
             while let Ok(Some(row)) = frames::read(&mut output) {
                 if sender.send(row).is_err() {
                     return;
                 }
             }
         });
-        let said = thread::spawn(move || {
+        let listener = thread::Builder::new().spawn(move || {
             let (mut said, mut errors) = (Vec::new(), errors);
             let _ = errors.by_ref().take(LONGEST_MESSAGE).read_to_end(&mut said);
             // The rest is read, too, for a full pipe would stop the process.
             let _ = io::copy(&mut errors, &mut io::sink());
             String::from_utf8_lossy(&said).into_owned()
         });
+        let said = reader.and(listener).map_err(|error| {
+            let _ = child.kill();
+            let _ = child.wait();
+            failed(error)
+        })?;
         // Saturates where no address space is as large.
         let memory_bytes = Some((record_memory_gb * 1e9) as u64);
         let task = Task { analysis: self.analysis.clone(), memory_bytes };
