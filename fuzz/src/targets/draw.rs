@@ -7,6 +7,8 @@ use mechid_model::{InitialState, ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::{DMatrix, DVector};
 
+use crate::depth::{Depth, reached};
+
 /// Longest message of an error, in bytes.
 const LONGEST_MESSAGE: usize = 2_000;
 
@@ -208,9 +210,13 @@ impl<'a> Draw<'a> {
 /// Passes a value on, and looks at the message of an error.
 pub fn passed<T, E: Display>(result: Result<T, E>) -> Result<Option<T>, String> {
     let error = match result {
-        Ok(value) => return Ok(Some(value)),
+        Ok(value) => {
+            reached(Depth::Fitted);
+            return Ok(Some(value));
+        }
         Err(error) => error.to_string(),
     };
+    reached(Depth::Reached);
     if error.is_empty() || error.contains(char::is_control) || error.len() > LONGEST_MESSAGE {
         return Err(format!("an error has no good message: {error:?}"));
     }
