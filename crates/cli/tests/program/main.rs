@@ -15,6 +15,7 @@ mod modal;
 mod modes;
 mod pictures;
 mod public;
+mod public_cases;
 mod records;
 mod reference;
 mod silverbox;

@@ -197,6 +197,13 @@ fn a_full_stream_is_told_by_the_exit_code() {
         ("mechid info nowhere.csv 2> /dev/full".to_owned(), 2),
         ("mechid info --nonsense 2> /dev/full".to_owned(), 2),
         ("mechid info nowhere.csv 2>&-".to_owned(), 2),
+        // The null device stands in the place of a stream that is closed at the start: SECURITY.md.
+        (format!("{info} >&-"), 0),
+        (
+            "mechid multisine --samples 8 --rate 8 --amplitude 1 -o a.csv >&- && test -s a.csv"
+                .to_owned(),
+            0,
+        ),
         (format!("{info} | true; exit ${{PIPESTATUS[0]}}"), 141),
     ] {
         let run = shell(folder.path(), &line);
