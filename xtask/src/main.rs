@@ -52,6 +52,9 @@ enum Task {
         /// Seconds for each point.
         #[arg(long, default_value_t = 0.5)]
         seconds: f64,
+        /// Only the tests of a laboratory, by the program of the same build.
+        #[arg(long)]
+        lab: bool,
     },
 }
 
@@ -62,7 +65,8 @@ fn main() -> ExitCode {
         Task::Conformance { out, .. } => {
             conformance::write(root, out.as_deref()).map(|rows| println!("{rows} rows written"))
         }
-        Task::MeasureCost { seconds } => cost::write(root, seconds),
+        Task::MeasureCost { lab: true, .. } => cost::write_lab(root),
+        Task::MeasureCost { seconds, .. } => cost::write(root, seconds),
         Task::ReproduceThesis { only, check, bless, out } => {
             reproduce_thesis(root, only.as_deref(), check, bless, out)
         }

@@ -2,6 +2,7 @@
 //! into the book.
 
 mod identification;
+mod lab;
 mod measure;
 mod page;
 mod samples;
@@ -43,13 +44,27 @@ pub fn write(root: &Path, seconds: f64) -> Result<(), String> {
             growths: samples::measured(seconds)?,
         },
     ];
+    let lab = lab::table(&lab::program()?)?;
     let folder = root.join("docs/book/src/choose");
     let svg = figure(&groups).to_svg().map_err(|e| e.to_string())?;
-    for (name, text) in [("cost.svg", svg), ("cost.md", page::text(&groups))] {
+    for (name, text) in [("cost.svg", svg), ("cost.md", page::text(&groups, &lab))] {
         let path = folder.join(name);
         std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     Ok(())
+}
+
+/// Measures the tests of a laboratory alone, and writes their table into the page of the book.
+///
+/// # Errors
+/// As [`write`], and a page without such a table.
+pub fn write_lab(root: &Path) -> Result<(), String> {
+    let path = root.join("docs/book/src/choose/cost.md");
+    let failed = |e: std::io::Error| format!("{}: {e}", path.display());
+    let page = std::fs::read_to_string(&path).map_err(failed)?;
+    let table = lab::table(&lab::program()?)?;
+    let page = page::with_lab(&page, &table).ok_or("the page has no table of tests")?;
+    std::fs::write(&path, page).map_err(failed)
 }
 
 fn figure(groups: &[Group]) -> Figure {

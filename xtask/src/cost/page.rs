@@ -39,7 +39,25 @@ fn load() -> String {
     })
 }
 
-pub fn text(groups: &[Group]) -> String {
+/// Heading of the tests of a laboratory, up to their table.
+const LAB: &str = "## Tests of a laboratory
+
+The program as it is called with its defaults, on records that it makes itself; `measure-cost --lab` \
+measures these alone.
+
+";
+
+/// Heading after them.
+const AFTER_LAB: &str = "## What the numbers follow from\n\n";
+
+/// Returns the page with another table of the tests of a laboratory; `None` if it has none.
+pub fn with_lab(page: &str, table: &str) -> Option<String> {
+    let (before, others) = page.split_once(LAB)?;
+    let (_, after) = others.split_once(AFTER_LAB)?;
+    Some(format!("{before}{LAB}{table}\n{AFTER_LAB}{after}"))
+}
+
+pub fn text(groups: &[Group], lab: &str) -> String {
     let mut text = BEGIN.to_owned() + &load();
     for group in groups {
         let _ = writeln!(text, "| {} | n from | to | time at the last | grows as |", group.title);
@@ -49,8 +67,7 @@ pub fn text(groups: &[Group]) -> String {
         }
         text.push('\n');
     }
-    text.push_str(END);
-    text
+    text + LAB + lab + "\n" + AFTER_LAB + END
 }
 
 fn row(growth: &Growth) -> String {
@@ -88,6 +105,14 @@ fn grouped(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_takes_the_place_of_the_one_before() {
+        let page = text(&[], "old\n");
+        let changed = with_lab(&page, "new\n").unwrap();
+        assert_eq!(changed, page.replace("old", "new"));
+        assert_eq!(with_lab("no table", "new"), None);
+    }
 
     #[test]
     fn numbers_are_told_shortly() {
