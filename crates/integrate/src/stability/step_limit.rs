@@ -175,7 +175,7 @@ impl Examined<'_> {
         if let Some(limit) = along {
             let [below, above] = [-1.0, 1.0].map(|s| limit * (1.0 + s * limits::LIMIT_PRECISION));
             if radius(below)?.is_none() && radius(above)?.is_some() {
-                return Ok(Some(limit));
+                return Ok(Some(below));
             }
         }
         let factor = match self.stable_steps {

@@ -182,6 +182,28 @@ fn sparse_matrices_stand_in_the_description() {
 }
 
 #[test]
+fn full_matrices_that_are_mostly_zero_are_stored_as_sparse_ones() {
+    let described = |size: usize, filled: f64| {
+        let rows = |diagonal: f64, other: f64| -> Vec<Vec<f64>> {
+            let entry = |i: usize, j: usize| if i == j { diagonal } else { other };
+            (0..size).map(|i| (0..size).map(|j| entry(i, j)).collect()).collect()
+        };
+        let system = serde_json::json!({
+            "mass": rows(1.0, 0.0), "damping": rows(0.5, 0.0), "stiffness": rows(9.0, filled)
+        });
+        parse(&description(&system.to_string(), FORCE, "")).unwrap()
+    };
+    assert!(described(64, 0.0).sparse_system().is_none());
+    assert!(described(65, 1e-3).sparse_system().is_none());
+    let many = described(65, 0.0);
+    let stiffness = many.sparse_system().unwrap().matrix(mechid_model::Matrix::Stiffness).nnz();
+    assert_eq!(stiffness, 65);
+    // All forces and responses are recorded, and what needs all entries has them.
+    assert_eq!((many.forced().unwrap().len(), many.outputs().unwrap().len()), (65, 65));
+    assert_eq!(many.system().unwrap().stiffness()[(64, 64)], 9.0);
+}
+
+#[test]
 fn wrong_sparse_matrices_say_what_is_wrong() {
     let good = listed(2, &[(1, 1, 1.0), (2, 2, 1.0)]);
     let wrong = |field: &str, value: serde_json::Value| {
