@@ -129,6 +129,8 @@ findings! {
     Gain in gain,
     /// Residual power compared with the noise power.
     Misfit in misfit,
+    /// Term that the model leaves out and that the residual shows.
+    TermLeftOut in omitted,
     /// Agreement between parts of the data.
     PartsAgreement in parts,
     /// Agreement of the prior of a parameter with its estimate from the data.

@@ -287,3 +287,6 @@ pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 /// Step of the corner frequency, relative to the lowest line, in the derivative of the effect of a
 /// high-pass.
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;
+
+/// Changes by a term left out that its sentence tells at most.
+pub(crate) const CHANGES_TOLD: usize = 3;

@@ -1,8 +1,8 @@
 //! Correlation of a residual with powers of displacement and velocity.
 
-use std::fmt::{self, Display, Formatter};
+use std::fmt::{self, Formatter};
 
-use mechid_estimate::frequency_domain::Whitened;
+use mechid_estimate::frequency_domain::{Power, Whitened};
 use mechid_estimate::{Estimate, EstimateError, predict_periodic};
 use mechid_model::{Response, ResponseQuantity};
 use mechid_numerics::check_size;
@@ -16,9 +16,6 @@ use super::finding::{Check, Finding, Names};
 use super::limits::{LINEARITY_NEIGHBOURS, LINEARITY_SENSITIVITIES};
 use super::p_value::PValue;
 use super::{Subject, Verdict};
-
-/// Tested powers of a motion.
-const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Power::VelocitySign];
 
 /// Tests whether the residual response (samples × degrees of freedom) of an identified system under
 /// a random force (N) is correlated with the square or the cube of its displacement, or with the
@@ -171,9 +168,9 @@ impl Tested {
         // Errors of the estimate also cause a residual that follows the force: this part is
         // projected out.
         let explained = self.explained(&sizes);
-        let mut least = (1.0, POWERS[0], 0);
+        let mut least = (1.0, Power::ALL[0], 0);
         for dof in 0..n {
-            for power in POWERS {
+            for power in Power::ALL {
                 let forces = Spectrum::of(&without_linear_part(&predicted, dof, power)?);
                 let response =
                     |at: usize| self.receptances[at].column(dof) * forces.line(lines[at], 0);
@@ -190,7 +187,7 @@ impl Tested {
         }
         // Bonferroni: the smallest of all tests.
         let (p_value, power, dof) = least;
-        let p_value = PValue::of(((n * POWERS.len()) as f64 * p_value).min(1.0));
+        let p_value = PValue::of(((n * Power::ALL.len()) as f64 * p_value).min(1.0));
         Ok(Finding::Linearity(Linearity { power, dof, p_value }))
     }
 }
@@ -337,20 +334,6 @@ pub struct Linearity {
     pub p_value: PValue,
 }
 
-/// Power of a motion that may act as a force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
-pub enum Power {
-    /// x².
-    Square,
-    /// x³.
-    Cube,
-    /// ẋ³.
-    VelocityCube,
-    /// Sign of ẋ: dry friction.
-    VelocitySign,
-}
-
 impl Check for Linearity {
     fn subject(&self) -> Subject {
         Subject::Linearity
@@ -383,16 +366,5 @@ impl Check for Linearity {
             "the residual is correlated with the {power} {displacement} as a force ({p_value}): \
              the machine is nonlinear at this level of the force, to which its parameters belong"
         )
-    }
-}
-
-impl Display for Power {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Power::Square => "square of",
-            Power::Cube => "cube of",
-            Power::VelocityCube => "cube of the velocity of",
-            Power::VelocitySign => "sign (dry friction) of the velocity of",
-        })
     }
 }

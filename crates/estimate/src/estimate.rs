@@ -258,6 +258,17 @@ impl Estimate {
         self
     }
 
+    /// Returns the same estimate with a mean square error of the model added to its covariance, in
+    /// the products of the units of two parameters.
+    ///
+    /// # Errors
+    /// [`NumericsError::Size`] for another number of parameters.
+    pub fn with_mean_square(mut self, beside: &DMatrix<f64>) -> Result<Self, EstimateError> {
+        check_size("parameters", self.parameters.len(), beside.nrows())?;
+        self.covariance = (self.covariance.full() + beside).into();
+        Ok(self)
+    }
+
     /// Returns one estimated entry by its name, such as `"k12"`.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_signal::{Record, message};
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
+use nalgebra::DMatrix;
 
 use super::checks::CheckRow;
 use super::coherence::ResponseCoherence;
@@ -38,6 +39,8 @@ pub struct Fitted {
     pub nonlinear: Option<WithTerms>,
     /// Factor by which the standard errors of `estimate` are larger than those of the noise.
     pub error_scale: f64,
+    /// Mean square that a term left out adds to the covariance of the parameters, if there is such a term.
+    pub omitted: Option<DMatrix<f64>>,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
@@ -147,6 +150,7 @@ impl Fitted {
             estimate,
             nonlinear: None,
             error_scale: 1.0,
+            omitted: None,
             equations: 0,
             frequency: None,
             scattered: None,
@@ -189,7 +193,22 @@ impl Fitted {
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle Physics*, introduction.
-    pub(super) fn scale_errors(&mut self, checks: &[CheckRow]) {
+    ///
+    /// What a term left out would change comes to that.
+    pub(super) fn scale_errors(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
+        self.scale_by_parts(checks);
+        let is_left_out = |check: &CheckRow| {
+            check.is_conspicuous() && matches!(check.finding, Finding::TermLeftOut(_))
+        };
+        let beside = self.omitted.take().filter(|_| checks.iter().any(is_left_out));
+        if let Some(beside) = beside.filter(|_| self.nonlinear.is_none()) {
+            self.estimate = self.estimate.clone().with_mean_square(&beside)?;
+            self.omitted = Some(beside);
+        }
+        Ok(())
+    }
+
+    fn scale_by_parts(&mut self, checks: &[CheckRow]) {
         let spare = self.estimate.degrees_of_freedom();
         let of_check = |check: &CheckRow| match &check.finding {
             Finding::PartsAgreement(parts) => Some((parts.scatter, parts.degrees_of_freedom)),
@@ -213,6 +232,14 @@ impl Fitted {
         let mut names: Vec<String> = scaling.map(|check| check.subject.to_string()).collect();
         names.dedup();
         (self.error_scale > 1.0).then(|| scaled_errors(self.error_scale, &names.join(", ")))
+    }
+
+    /// Returns a remark on standard errors that count a term left out.
+    pub(super) fn counted_term(&self) -> Option<String> {
+        self.omitted.as_ref().map(|_| {
+            "standard errors and intervals count what the term that the model leaves out would change (see alternative)"
+                .to_owned()
+        })
     }
 
     /// Returns the system that was fitted, which has the responses to the forces that acted.

@@ -28,6 +28,7 @@ pub mod acquisition;
 pub(crate) mod added_decay;
 pub mod checks;
 mod coherence;
+mod compared;
 mod counts;
 mod derivatives;
 mod determined;

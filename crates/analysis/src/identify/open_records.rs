@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use mechid_checks::{
     AfterSpectralFit, Finding, RowParts, SpectralResidual, Subject, Verdict, after_spectral_fit,
-    agreement_of_parts, before_spectral_fit, delay_of_lines, delay_of_open_records,
-    fault_of_acquisition, fitted_band, linearity_of_open_record,
+    before_spectral_fit, delay_of_lines, delay_of_open_records, fault_of_acquisition, fitted_band,
+    linearity_of_open_record,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, OutputErrorFit, PartsOfFit, Split, output_error_pooling,
+    EndLoads, OutputErrorFit, PartsOfFit, SampledRows, Split, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
@@ -16,6 +16,7 @@ use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Lines};
 
 use super::acquisition::Acquisition;
+use super::compared::Compared;
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;
 use super::keywords::Domain;
@@ -157,12 +158,12 @@ pub(super) fn fit(
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
     let is_left = |finding: &Finding| finding.verdict() > Verdict::Good;
     let pulses = matches!(excitation, Excitation::Hits(_));
-    // Of hits each delay is tried, which takes a while: where something is left alone.
+    // The search tries each delay of hits, which is slow: it runs if a residual is left.
     let late = (!pulses || residuals.iter().any(|left| left.findings().iter().any(is_left)))
         .then(|| delay_of_open_records(&data, dt, unknowns, &fit, is_explained, pulses))
         .flatten();
-    let parts = if residuals.iter().any(SpectralResidual::is_rounding) {
-        None
+    let Compared { parts, omitted } = if residuals.iter().any(SpectralResidual::is_rounding) {
+        Compared::default()
     } else {
         agreement(&data, &fit, excitation)?
     };
@@ -188,6 +189,7 @@ pub(super) fn fit(
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
         after_all: bias.into_iter().chain(likelier(late, fault)).chain(parts).collect(),
+        omitted,
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
@@ -204,12 +206,13 @@ pub(super) fn fit(
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
 }
 
-/// Compares the records or, of one alone, its stretches of time, and the bands of lines.
+/// Compares the records or, of one alone, its stretches of time, and the bands of lines. Looks for terms that the model
+/// leaves out.
 fn agreement(
     data: &[FrequencyData],
     fit: &OutputErrorFit,
     excitation: Excitation<'_>,
-) -> Result<Option<Finding>, AnalysisError> {
+) -> Result<Compared, AnalysisError> {
     let all = joined(data)?;
     let parts = PartsOfFit::new(&all, &fit.estimate, fit.ends.as_ref(), Some(&fit.spectrum));
     let first = match (data, excitation) {
@@ -219,7 +222,16 @@ fn agreement(
     };
     let splits: Vec<(Split, RowParts)> =
         first.into_iter().chain([Split::Bands]).map(|split| (split, RowParts::Records)).collect();
-    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
+    let sampled: Vec<SampledRows> = rows_of(data)
+        .into_iter()
+        .flatten()
+        .zip(data)
+        .filter_map(|(rows, data)| {
+            Some(SampledRows { rows, sampling: data.open_record(0)?.sampling })
+        })
+        .collect();
+    Ok(parts
+        .map_or_else(Compared::default, |of| Compared::new(&of, &splits, &sampled, &fit.estimate)))
 }
 
 /// Rows of each record among those of all.

@@ -1,8 +1,8 @@
 //! Fits frequency responses.
 
 use mechid_checks::{
-    Finding, RowParts, Subject, after_response_fit, agreement_of_parts, before_spectral_fit,
-    claimed_period, coherence, delay_of_lines, leakage, linearity,
+    Finding, RowParts, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
+    delay_of_lines, leakage, linearity,
 };
 use mechid_estimate::frequency_domain::{PartsOfFit, Split, equation_error};
 use mechid_estimate::{
@@ -14,6 +14,7 @@ use mechid_spectra::frf::Frf;
 use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
+use super::compared::Compared;
 use super::fitted::{Fitted, Misfit};
 use super::keywords::Domain;
 use super::open_records::rows_of;
@@ -73,8 +74,8 @@ pub fn fit(
         before.push(checks);
         after.push(looked);
     }
-    let parts = match *method {
-        Some(Method::LeastSquares) => None,
+    let Compared { parts, omitted } = match *method {
+        Some(Method::LeastSquares) => Compared::default(),
         _ => agreement(&responses, &data, &estimate)?,
     };
     let of_motion = one_motion_of(&records[0].held).into_iter();
@@ -95,7 +96,8 @@ pub fn fit(
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,
-        after_all: parts.into_iter().collect(),
+        after_all: parts,
+        omitted,
         misfit,
         drawn: Some(measured),
         remarks,
@@ -103,12 +105,12 @@ pub fn fit(
     })
 }
 
-/// Compares the bands of lines and, of several, the records.
+/// Compares the bands of lines and, of several, the records. Looks for terms that the model leaves out.
 fn agreement(
     responses: &[Responses],
     data: &FrequencyData,
     estimate: &Estimate,
-) -> Result<Option<Finding>, AnalysisError> {
+) -> Result<Compared, AnalysisError> {
     let records: Vec<(Frf, Vec<usize>)> =
         responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
     let mut splits = vec![(Split::Bands, RowParts::Records)];
@@ -118,7 +120,7 @@ fn agreement(
         splits.push((Split::Rows(rows_of(&each)), RowParts::Records));
     }
     let parts = PartsOfFit::from_responses(data, &records, estimate);
-    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
+    Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, &[], estimate)))
 }
 
 /// Returns remarks on the averages of several records, and on their channels.

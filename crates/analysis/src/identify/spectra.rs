@@ -4,11 +4,10 @@ use std::ops::Range;
 
 use mechid_checks::{
     AfterSpectralFit, Finding, RowParts, SpectralResidual, Subject, Verdict, after_spectral_fit,
-    agreement_of_parts, before_spectral_fit, delay_of_lines, distortion_of_periods, fitted_band,
-    steady_periods,
+    before_spectral_fit, delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
-    PartsOfFit, Split, equation_error, instrumental_variables, output_error_pooling,
+    PartsOfFit, SampledRows, Split, equation_error, instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
@@ -17,6 +16,7 @@ use mechid_spectra::{
     FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, SpectraError,
 };
 
+use super::compared::Compared;
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
@@ -79,8 +79,8 @@ pub(super) fn fit(
     misfit = misfit.filter(|_| repeats);
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
-    let parts = if residuals.iter().any(SpectralResidual::is_rounding) {
-        None
+    let Compared { parts, omitted } = if residuals.iter().any(SpectralResidual::is_rounding) {
+        Compared::default()
     } else {
         agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?
     };
@@ -99,6 +99,7 @@ pub(super) fn fit(
         before,
         after,
         after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
+        omitted,
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         misfit,
         noise: models,
@@ -152,19 +153,23 @@ impl Looked {
 }
 
 /// Compares the records, the halves of their periods and the bands of lines; where a record shows no noise, there are no
-/// halves, and the noise has the form of `spectrum`.
+/// halves, and the noise has the form of `spectrum`. Looks for terms that the model leaves out.
 fn agreement(
     spectra: &[Spectra],
     weighted: &[FrequencyData],
     estimate: &Estimate,
     spectrum: Option<&NoiseSpectrum>,
-) -> Result<Option<Finding>, AnalysisError> {
+) -> Result<Compared, AnalysisError> {
     let mut records = Vec::new();
+    let mut sampled = Vec::new();
     let mut halves: Vec<Vec<Range<usize>>> = vec![Vec::new(); 2];
     let is_stated = weighted.iter().all(|data| data.noise().is_some());
     let mut row = 0;
-    for ((periods, _), data) in spectra.iter().zip(weighted) {
+    for ((periods, lines), data) in spectra.iter().zip(weighted) {
+        let sampling = lines.sampling();
         let Some(noise) = data.noise().filter(|_| is_stated) else {
+            sampled.push(SampledRows { rows: row..row + data.len(), sampling });
+            row += data.len();
             records.push(data.clone());
             continue;
         };
@@ -174,6 +179,7 @@ fn agreement(
         let record = first.with_noise(noise.clone())?.and(&second.with_noise(noise)?)?;
         for half in &mut halves {
             half.push(row..row + data.len());
+            sampled.push(SampledRows { rows: row..row + data.len(), sampling });
             row += data.len();
         }
         records.push(record);
@@ -187,7 +193,7 @@ fn agreement(
         splits.push((Split::Rows(halves), RowParts::Halves));
     }
     let parts = PartsOfFit::new(&all, estimate, None, spectrum);
-    Ok(parts.and_then(|parts| agreement_of_parts(&parts, &splits)))
+    Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, &sampled, estimate)))
 }
 
 /// Returns the periods of each record, on the lines found in its force.

@@ -156,7 +156,7 @@ impl IdentificationSummary {
         let modes = fitted.estimate.modes()?;
         let checks = checks::rows(fitted, &modes, &records, scope)?;
         determined::check(how, fitted, &modes, &checks)?;
-        fitted.scale_errors(&checks);
+        fitted.scale_errors(&checks)?;
         let (fitted, estimate) = (&*fitted, &fitted.estimate);
         let (modes, carried) = (estimate.modes()?, rows::carries_covariance(estimate));
         let mut summary = Self {
@@ -211,6 +211,7 @@ impl IdentificationSummary {
             .chain(looked_at)
             .chain(fitted.few_equations())
             .chain(fitted.scaled_errors(&self.checks))
+            .chain(fitted.counted_term())
             .chain(determined::modes_alone(fitted, modes))
             .chain(self.doubts())
             .chain(of_least_squares(fitted, &self.checks))

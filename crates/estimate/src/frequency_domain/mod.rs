@@ -72,7 +72,10 @@ pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use output_error::in_units_of_noise;
 pub use output_error::{output_error, output_error_near, output_error_pooling};
 pub use output_error_fit::{EndLoads, OutputErrorFit};
-pub use parts::{Difference, Part, PartsComparison, PartsOfFit, Split};
+pub use parts::{
+    Difference, OmittedTerm, OmittedTerms, Part, PartsComparison, PartsOfFit, Power, SampledRows,
+    Split,
+};
 pub(crate) use parts::{Level, PartDifference, ScoreComparison, Scores};
 pub use sampled_force::equivalent_force;
 pub use structural_damping::{StructuralDamping, structural_damping};

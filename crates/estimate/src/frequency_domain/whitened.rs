@@ -57,6 +57,21 @@ impl Whitened {
         Self::sensitive_to(&[], data, unknowns, values, covariance)
     }
 
+    /// Returns the displacement G F̂ (rows × n, in m) under the most likely force, given its noise and
+    /// the displacement; `None` as for [`Whitened::new`].
+    pub(super) fn likely_displacement<'a>(
+        data: &FrequencyData,
+        system: &SecondOrderSystem,
+        covariance: impl Fn(usize) -> &'a ComplexMatrix,
+    ) -> Option<ComplexMatrix> {
+        let mut likely = ComplexMatrix::zeros(data.len(), data.dof());
+        for row in 0..data.len() {
+            let line = Line::new(system, data, row, covariance(row))?;
+            likely.row_mut(row).copy_from(&line.likely_displacement.transpose());
+        }
+        Some(likely)
+    }
+
     fn sensitive_to(
         parameters: &[Parameter],
         data: &FrequencyData,

@@ -67,6 +67,21 @@ pub(crate) enum Level {
     Residual { inflation: f64, cost: f64, free: f64 },
 }
 
+impl Level {
+    /// Returns the variance and its degrees of freedom, after a statistic of this rank has explained
+    /// some `squares` of the residual; `None` if no residual remains.
+    fn without(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
+        let (level, of_level) = match *self {
+            Self::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),
+            Self::Residual { inflation, cost, free } => {
+                let free = free - rank as f64;
+                (inflation * (cost - squares) / free, free)
+            }
+        };
+        (rank > 0 && of_level >= 1.0 && level > 0.0).then_some((level, of_level))
+    }
+}
+
 /// Result of [`Scores::compare`], with parts and parameters by their index.
 pub(crate) struct ScoreComparison {
     pub(crate) ratio: f64,
@@ -102,16 +117,7 @@ impl Scores<'_> {
     pub(crate) fn compare(&self, level: &Level) -> Option<ScoreComparison> {
         let (squares, rank) = whitened_square(&self.covariance, &self.scores)?;
         let degrees = rank as f64;
-        let (level, of_level) = match *level {
-            Level::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),
-            Level::Residual { inflation, cost, free } => {
-                let free = free - degrees;
-                (inflation * (cost - squares) / free, free)
-            }
-        };
-        if rank == 0 || of_level < 1.0 || level.is_nan() || level <= 0.0 {
-            return None;
-        }
+        let (level, of_level) = level.without(squares, rank)?;
         let ratio = squares / (degrees * level);
         let law = FisherSnedecor::new(degrees, of_level).ok()?;
         let of_one = self.largest_scatter(level).unwrap_or(0.0);
@@ -187,14 +193,7 @@ impl PartsOfFit<'_> {
     pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
         let cuts = Cuts::new(self, split)?;
         let parts: Vec<Part> = cuts.parts().collect();
-        let level = match self.known {
-            Some(known) => Level::Known { inflation: self.inflation, degrees_of_freedom: known },
-            None => {
-                let (cost, free) = (self.linear.cost(), self.linear.free());
-                Level::Residual { inflation: self.inflation, cost, free }
-            }
-        };
-        let found = self.scores(&cuts).compare(&level)?;
+        let found = self.scores(&cuts).compare(&self.noise_level())?;
         let largest = found.largest.map(|largest| Difference {
             part: parts[largest.part],
             parameter: self.parameters[largest.parameter],
@@ -210,6 +209,22 @@ impl PartsOfFit<'_> {
             error_scale: found.error_scale,
             largest,
         })
+    }
+
+    /// Returns how the variance of the residual is known.
+    fn noise_level(&self) -> Level {
+        match self.known {
+            Some(known) => Level::Known { inflation: self.inflation, degrees_of_freedom: known },
+            None => {
+                let (cost, free) = (self.linear.cost(), self.linear.free());
+                Level::Residual { inflation: self.inflation, cost, free }
+            }
+        }
+    }
+
+    /// Returns the level of the noise as [`Level::without`].
+    pub(super) fn level(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
+        self.noise_level().without(squares, rank)
     }
 
     fn scores(&self, cuts: &Cuts) -> Scores<'_> {
@@ -239,7 +254,7 @@ impl PartsOfFit<'_> {
 }
 
 /// Returns the inverse of a covariance on the directions that it has, and their number.
-fn pseudo_inverse(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
+pub(super) fn pseudo_inverse(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
     let eigen = hermitian_eigen(covariance.clone()).ok()?;
     let least = PART_INFORMS * eigen.eigenvalues.max();
     let inverse = eigen.eigenvalues.map(|l| if l > least { l.recip() } else { 0.0 });

@@ -103,7 +103,7 @@ impl Linearised {
 }
 
 /// Removes the components that the transients explain from columns over all residuals.
-fn remove(transients: &[(Range<usize>, DMatrix<f64>)], columns: &mut DMatrix<f64>) {
+pub(super) fn remove(transients: &[(Range<usize>, DMatrix<f64>)], columns: &mut DMatrix<f64>) {
     for (rows, transient) in transients {
         let mut part = columns.rows_mut(rows.start, rows.len());
         let explained = transient.tr_mul(&part);

@@ -2,7 +2,9 @@
 
 mod comparison;
 mod linearised;
+mod omitted;
 mod split;
+mod terms;
 
 use std::borrow::Cow;
 
@@ -13,14 +15,16 @@ use nalgebra::DVector;
 
 use super::output_error_fit::{EndLoads, sampled_weight_inflation};
 use super::unknown_noise::white_noise_at;
-use crate::Estimate;
 use crate::limits::{MAX_SENSITIVITIES, PARTS, SHARPENING_ROUNDS, SHARPENING_SETTLED};
 use crate::relations::Relations;
+use crate::{Estimate, Unknowns};
 use linearised::Linearised;
 
 pub use comparison::{Difference, PartsComparison};
 pub(crate) use comparison::{Level, PartDifference, ScoreComparison, Scores};
+pub use omitted::OmittedTerms;
 pub use split::{Part, Split};
+pub use terms::{OmittedTerm, Power, SampledRows};
 
 /// A fit, linearised at its minimum, for a comparison of parts of its data.
 ///
@@ -30,6 +34,10 @@ pub use split::{Part, Split};
 /// parts differ by noise alone, the covariance of (I − QQᵀ) D_p Q.
 pub struct PartsOfFit<'a> {
     data: &'a FrequencyData,
+    /// The same without the loads of the ends of open records.
+    closed: Cow<'a, FrequencyData>,
+    noise: Cow<'a, NoiseSpectrum>,
+    unknowns: Unknowns,
     parameters: Vec<Parameter>,
     /// Most likely values, in the order of the parameters.
     values: DVector<f64>,
@@ -103,9 +111,13 @@ impl<'a> PartsOfFit<'a> {
             responses: None,
             inflation: sampled_weight_inflation(nu, data.dof()).ok()?,
             known: data.noise().map(|noise| noise.total_degrees_of_freedom() as f64),
+            unknowns: unknowns.clone(),
+            closed,
+            noise,
             data,
         })
     }
+
     /// Linearises a fit of averaged responses, each with the degrees of freedom of its forces,
     /// counted from 0; `data` has all of them. `None` as for [`PartsOfFit::new`], and if the error
     /// covariance of a response is unknown.

@@ -1,0 +1,146 @@
+//! Terms that a model leaves out, and what they would change.
+
+use std::fmt::{self, Formatter};
+
+use mechid_estimate::Estimate;
+use mechid_estimate::frequency_domain::{OmittedTerm, OmittedTerms, PartsOfFit, SampledRows};
+use mechid_model::{Parameter, ResponseQuantity};
+
+use super::digits::three_digits;
+use super::finding::{Check, Finding, Names};
+use super::limits::CHANGES_TOLD;
+use super::p_value::PValue;
+use super::{Subject, Verdict};
+
+/// Term that the model leaves out and that the residual shows.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct TermLeftOut {
+    /// The most likely term.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub term: OmittedTerm,
+    /// Part of the power that the model leaves, a ratio.
+    pub explained: f64,
+    /// Probability that noise alone makes one of the terms explain as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+    /// What the term changes, parameter by parameter.
+    pub changes: Vec<ChangeByTerm>,
+}
+
+/// Change of a parameter by a term beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ChangeByTerm {
+    /// The parameter.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
+    pub parameter: Parameter,
+    /// Change, to first order (unit of the parameter).
+    pub by: f64,
+    /// Standard error of the change (unit of the parameter).
+    pub standard_error: f64,
+    /// Change over the standard error of the parameter without the term (pure number).
+    pub in_errors: f64,
+}
+
+/// Looks for terms that the model of a fit leaves out ([`Finding::TermLeftOut`]); `None` where noise explains the
+/// residual as well. `records` as in [`PartsOfFit::omitted`].
+///
+/// # Source
+/// The source of [`PartsOfFit::omitted`].
+pub fn omitted_term(
+    fit: &PartsOfFit<'_>,
+    records: &[SampledRows],
+    estimate: &Estimate,
+) -> Option<(Finding, OmittedTerms)> {
+    let omitted = fit.omitted(records)?;
+    let p_value = PValue::of(omitted.p_value);
+    if !p_value.is_significant() {
+        return None;
+    }
+    let all = estimate.parameters().zip(omitted.changes.iter().zip(&omitted.errors));
+    let changes = all.map(|(estimated, (by, error))| ChangeByTerm {
+        parameter: estimated.parameter,
+        by: *by,
+        standard_error: *error,
+        in_errors: by / estimated.standard_error,
+    });
+    let finding = Finding::TermLeftOut(TermLeftOut {
+        term: omitted.term,
+        explained: omitted.explained,
+        p_value,
+        changes: changes.collect(),
+    });
+    Some((finding, omitted))
+}
+
+impl TermLeftOut {
+    fn write_term(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        let name = |dof| names.response(ResponseQuantity::Displacement, dof);
+        f.write_str(match self.term {
+            OmittedTerm::ResidualFlexibility => "a residual flexibility of modes above the band",
+            OmittedTerm::HiddenMass => "a mass on a spring of its own, with a mode above the band,",
+            OmittedTerm::ResidualMass => "a residual mass of modes below the band",
+            OmittedTerm::StructuralDamping => {
+                "structural damping, a force that does not grow with the frequency,"
+            }
+            OmittedTerm::Nonlinear { power, dof, other: None } => {
+                return write!(f, "a force with the {power} {}", name(dof));
+            }
+            OmittedTerm::Nonlinear { power, dof, other: Some(other) } => {
+                return write!(f, "a force with the {power} {} less {}", name(dof), name(other));
+            }
+            _ => "another term",
+        })
+    }
+}
+
+impl Check for TermLeftOut {
+    fn subject(&self) -> Subject {
+        Subject::Alternative
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.p_value.verdict()
+    }
+
+    fn value(&self) -> f64 {
+        self.p_value.adjusted
+    }
+
+    fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        Some(&mut self.p_value)
+    }
+
+    fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
+        self.write_term(names, f)?;
+        let percent = three_digits(100.0 * self.explained);
+        write!(
+            f,
+            " explains {percent} % of the power that the model leaves ({}); with it",
+            self.p_value
+        )?;
+        let mut largest: Vec<&ChangeByTerm> = self.changes.iter().collect();
+        largest.sort_by(|a, b| b.in_errors.abs().total_cmp(&a.in_errors.abs()));
+        for (at, change) in largest.iter().take(CHANGES_TOLD).enumerate() {
+            let ChangeByTerm { parameter, by, in_errors, .. } = change;
+            let unit = parameter.matrix().unit();
+            let sign = if *by < 0.0 { '−' } else { '+' };
+            let (by, errors) = (three_digits(by.abs()), three_digits(in_errors.abs()));
+            let comma = if at > 0 { "," } else { "" };
+            write!(
+                f,
+                "{comma} {parameter} changes by {sign}{by} {unit} ({errors} standard errors)"
+            )?;
+        }
+        f.write_str(match self.term {
+            OmittedTerm::Nonlinear { .. } => {
+                ": the machine is nonlinear at this level of the force; fit the term, too (`nonlinear`)"
+            }
+            OmittedTerm::StructuralDamping => {
+                ": choose a narrow band (`band_hz`), in which viscous damping has the same effect"
+            }
+            _ => ": choose a narrower band (`band_hz`), or measure more degrees of freedom",
+        })
+    }
+}

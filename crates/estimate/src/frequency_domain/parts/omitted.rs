@@ -1,0 +1,137 @@
+//! Score tests for terms that a model leaves out, and what they would change.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::PartsOfFit;
+use super::comparison::pseudo_inverse;
+use super::linearised::remove;
+use super::terms::{LikelyMotion, OmittedTerm, SampledRows};
+use crate::frequency_domain::pulse_covariance::scatter;
+use crate::frequency_responses::covariance_of_errors;
+use crate::limits::PART_INFORMS;
+
+/// Terms that a model leaves out: the one that explains most of the residual, and what all together say of the
+/// parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OmittedTerms {
+    /// Term that is most likely.
+    pub term: OmittedTerm,
+    /// Part of the residual power that it explains (pure number).
+    pub explained: f64,
+    /// Probability that noise alone makes one of the terms explain as much.
+    pub p_value: f64,
+    /// Change of each parameter with that term, in the order and the unit of the parameters.
+    pub changes: DVector<f64>,
+    /// Standard errors of these changes, in the unit of the parameters.
+    pub errors: DVector<f64>,
+    /// Mean square that the terms add to the covariance of the parameters, each by its likelihood: the square of
+    /// their changes and the covariance of these, in the product of the units of two parameters.
+    pub mean_square: DMatrix<f64>,
+}
+
+/// What one term explains.
+struct Explained {
+    term: OmittedTerm,
+    /// sᵀV⁺s over the number of its columns and the level of the noise.
+    p_value: f64,
+    /// Part of the residual power.
+    part: f64,
+    columns: usize,
+    changes: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl PartsOfFit<'_> {
+    /// Tests terms that the model leaves out by their scores at the optimum, and tells what each would change to first
+    /// order; `records` are the samples of the rows, without which nonlinear terms are not looked for. `None` where
+    /// none can be tested.
+    ///
+    /// With columns Z, the weighted changes of the response less what the parameters explain of them, the term is
+    /// a = (ZᵀZ)⁻¹Zᵀe, and the parameters change by −(QR)⁺C a, C being the columns before. Around the estimate of the
+    /// smaller model the larger one has a mean square error of the covariance of these changes and their square; terms
+    /// that explain the same are weighed by their likelihoods, as models are in their average.
+    ///
+    /// # Source
+    /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for the test; Buckland,
+    /// Burnham & Augustin (1997), Biometrics 53, 603–618, for errors beyond one model; Schwarz (1978), Annals of
+    /// Statistics 6, 461–464, for the weights.
+    pub fn omitted(&self, records: &[SampledRows]) -> Option<OmittedTerms> {
+        let motion = LikelyMotion::new(self, records)?;
+        let terms = motion.terms();
+        let explained: Vec<Explained> = terms
+            .par_iter()
+            .filter_map(|term| self.explained(*term, motion.columns(*term)?))
+            .collect();
+        let best = explained.iter().min_by(|a, b| a.evidence(self).total_cmp(&b.evidence(self)))?;
+        let least = explained.iter().map(|one| one.p_value).fold(1.0, f64::min);
+        let weight = |one: &Explained| (best.evidence(self) - one.evidence(self)).exp();
+        let all: f64 = explained.iter().map(weight).sum::<f64>() + best.evidence(self).exp();
+        let count = self.values.len();
+        let mut mean_square = DMatrix::zeros(count, count);
+        for one in &explained {
+            let square = &one.changes * one.changes.transpose() + &one.covariance;
+            mean_square += square * (weight(one) / all);
+        }
+        let errors = best.covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+        Some(OmittedTerms {
+            term: best.term,
+            explained: best.part,
+            // Bonferroni: the least of so many.
+            p_value: (explained.len() as f64 * least).min(1.0),
+            changes: best.changes.clone(),
+            errors,
+            mean_square,
+        })
+    }
+
+    /// Returns what a term with these columns explains.
+    fn explained(&self, term: OmittedTerm, mut columns: DMatrix<f64>) -> Option<Explained> {
+        remove(&self.linear.transients, &mut columns);
+        let by_parameters = self.linear.basis.tr_mul(&columns);
+        let beyond = &columns - &self.linear.basis * &by_parameters;
+        let kept: Vec<usize> = (0..columns.ncols())
+            .filter(|at| {
+                beyond.column(*at).norm_squared()
+                    > PART_INFORMS * columns.column(*at).norm_squared()
+            })
+            .collect();
+        let (beyond, by_parameters) =
+            (beyond.select_columns(&kept), by_parameters.select_columns(&kept));
+        if kept.is_empty() {
+            return None;
+        }
+        let mut covariance = match self.responses {
+            Some(records) => covariance_of_errors(records, self.data.dof(), &beyond).0,
+            None => beyond.tr_mul(&beyond),
+        };
+        if let Some(responses) = &self.linear.responses {
+            covariance += scatter(self.data, responses, &beyond);
+        }
+        let scores = beyond.tr_mul(&self.linear.residual);
+        let (inverse, rank) = pseudo_inverse(&covariance)?;
+        let squares = scores.dot(&(inverse * &scores));
+        let (level, of_level) = self.level(squares, rank)?;
+        let law = FisherSnedecor::new(rank as f64, of_level).ok()?;
+        let (solve, _) = pseudo_inverse(&beyond.tr_mul(&beyond))?;
+        let to_parameters = -&self.linear.root * by_parameters * solve;
+        let changes = &to_parameters * scores;
+        Some(Explained {
+            term,
+            p_value: law.sf(squares / (rank as f64 * level)),
+            part: squares / self.linear.cost(),
+            columns: rank,
+            changes,
+            covariance: &to_parameters * covariance * to_parameters.transpose() * level,
+        })
+    }
+}
+
+impl Explained {
+    /// Half of Schwarz's criterion, less that of the model without the term.
+    fn evidence(&self, fit: &PartsOfFit<'_>) -> f64 {
+        let (count, left) = (fit.linear.residual.len() as f64, (1.0 - self.part).max(f64::EPSILON));
+        0.5 * (count * left.ln() + self.columns as f64 * count.ln())
+    }
+}

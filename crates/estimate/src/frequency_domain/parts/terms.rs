@@ -1,0 +1,260 @@
+//! Terms that a linear model with viscous damping leaves out, as changes of force and displacement.
+
+use std::fmt::{self, Display, Formatter};
+use std::ops::Range;
+
+use mechid_model::SecondOrderSystem;
+use mechid_signal::{Record, Sampling, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use super::PartsOfFit;
+use crate::frequency_domain::Whitened;
+use crate::limits::MAX_SENSITIVITIES;
+
+type ComplexMatrix = DMatrix<Complex<f64>>;
+
+/// Term that a linear model with viscous damping leaves out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(tag = "term", rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum OmittedTerm {
+    /// Displacement in phase with the forces and as large at every frequency: modes above the band.
+    ResidualFlexibility,
+    /// Force that grows with the fourth power of the frequency: masses on springs, with modes above the band.
+    HiddenMass,
+    /// Displacement that falls with the square of the frequency: modes below the band.
+    ResidualMass,
+    /// Damping force in phase with the velocity that does not grow with the frequency.
+    StructuralDamping,
+    /// Force that follows a power of a displacement or velocity, to the ground or between two degrees of freedom.
+    Nonlinear {
+        /// Power of the motion.
+        power: Power,
+        /// Degree of freedom.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        dof: usize,
+        /// Degree of freedom at the other end; `None`: the ground.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "maybe_from_one"))]
+        other: Option<usize>,
+    },
+}
+
+/// Power of a motion that a force is looked for in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Power {
+    /// x².
+    Square,
+    /// x³.
+    Cube,
+    /// ẋ³.
+    VelocityCube,
+    /// Sign of ẋ: dry friction.
+    VelocitySign,
+}
+
+impl Power {
+    /// All powers that are looked for.
+    pub const ALL: [Self; 4] = [Self::Square, Self::Cube, Self::VelocityCube, Self::VelocitySign];
+
+    /// Returns the power of a displacement or of its rate, in the power of the unit of either.
+    fn of(self, displacement: f64, velocity: f64) -> f64 {
+        match self {
+            Self::Square => displacement * displacement,
+            Self::Cube => displacement.powi(3),
+            Self::VelocityCube => velocity.powi(3),
+            Self::VelocitySign => velocity.signum(),
+        }
+    }
+}
+
+impl Display for Power {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Power::Square => "square of",
+            Power::Cube => "cube of",
+            Power::VelocityCube => "cube of the velocity of",
+            Power::VelocitySign => "sign (dry friction) of the velocity of",
+        })
+    }
+}
+
+/// Rows of a record, or of a part of it, on lines of this sampling.
+#[derive(Debug, Clone)]
+pub struct SampledRows {
+    /// Rows of the data.
+    pub rows: Range<usize>,
+    /// Samples of the record or of its period.
+    pub sampling: Sampling,
+}
+
+/// Force (N, by a factor) and displacement (m, by a factor) of a term, rows × n.
+struct Change {
+    force: ComplexMatrix,
+    displacement: ComplexMatrix,
+}
+
+/// Most likely motion of a fit on its lines.
+pub(super) struct LikelyMotion<'a> {
+    fit: &'a PartsOfFit<'a>,
+    system: SecondOrderSystem,
+    displacement: ComplexMatrix,
+    force: ComplexMatrix,
+    records: &'a [SampledRows],
+}
+
+impl<'a> LikelyMotion<'a> {
+    pub(super) fn new(fit: &'a PartsOfFit<'a>, records: &'a [SampledRows]) -> Option<Self> {
+        let [mass, damping, stiffness] = fit.unknowns.assemble(fit.values.as_slice());
+        let system = SecondOrderSystem::new(mass, damping, stiffness).ok()?;
+        let covariance = |row: usize| fit.noise.covariance(row);
+        let displacement = Whitened::likely_displacement(&fit.closed, &system, covariance)?;
+        let mut force = displacement.clone();
+        for (row, omega) in fit.data.omega().iter().enumerate() {
+            let of_row = system.dynamic_stiffness(*omega) * displacement.row(row).transpose();
+            force.row_mut(row).copy_from(&of_row.transpose());
+        }
+        Some(Self { fit, system, displacement, force, records })
+    }
+
+    /// Returns the terms that can be looked for, as many as the size of the fit allows.
+    pub(super) fn terms(&self) -> Vec<OmittedTerm> {
+        let (n, rows) = (self.fit.data.dof(), self.fit.data.len());
+        let mut all = vec![OmittedTerm::ResidualFlexibility, OmittedTerm::ResidualMass];
+        all.extend([OmittedTerm::HiddenMass, OmittedTerm::StructuralDamping]);
+        if self.records.is_empty() {
+            return all;
+        }
+        let of_each =
+            |dof, other| Power::ALL.map(|power| OmittedTerm::Nonlinear { power, dof, other });
+        let to_ground = (0..n).flat_map(|dof| of_each(dof, None));
+        let between = (0..n).flat_map(|dof| (dof + 1..n).flat_map(move |b| of_each(dof, Some(b))));
+        let most = MAX_SENSITIVITIES / (2 * n * rows).max(1);
+        all.extend(to_ground.chain(between).take(most));
+        all
+    }
+
+    /// Returns the weighted changes of the response by a term, each of unit length, one below the other; `None` where
+    /// it changes nothing.
+    pub(super) fn columns(&self, term: OmittedTerm) -> Option<DMatrix<f64>> {
+        let changes = self.changes(term)?;
+        let covariance = |row: usize| self.fit.noise.covariance(row).clone();
+        let mut columns = Vec::new();
+        for Change { force, displacement } in changes {
+            let data = self.fit.data.with_force(-force).with_displacement(displacement);
+            let values = &self.fit.values;
+            let white = Whitened::residual_of(&data, &self.fit.unknowns, values, covariance)?;
+            let length = white.residual.norm();
+            if length > 0.0 {
+                columns.push(white.residual / length);
+            }
+        }
+        (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+    }
+
+    fn changes(&self, term: OmittedTerm) -> Option<Vec<Change>> {
+        let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
+        let driven = (0..n).filter(|dof| self.force.column(*dof).norm_squared() > 0.0);
+        let pairs = driven.flat_map(|force| (0..n).map(move |response| (response, force)));
+        let of_forces = |power: i32| {
+            let one = |(response, force): (usize, usize)| {
+                self.displaced(response, |row| self.force[(row, force)] * omega[row].powi(power))
+            };
+            pairs.clone().map(one).collect()
+        };
+        Some(match term {
+            OmittedTerm::ResidualFlexibility => of_forces(0),
+            OmittedTerm::ResidualMass => of_forces(-2),
+            OmittedTerm::HiddenMass => {
+                let one = |dof: usize| {
+                    let motion = |row: usize| self.displacement[(row, dof)];
+                    self.forced(&[(dof, 1.0)], |row| motion(row) * omega[row].powi(4))
+                };
+                (0..n).map(one).collect()
+            }
+            OmittedTerm::StructuralDamping => {
+                let stiffness = self.system.stiffness().map(|k| Complex::new(0.0, -k));
+                let force = &self.displacement * stiffness.transpose();
+                vec![Change { displacement: DMatrix::zeros(omega.len(), n), force }]
+            }
+            OmittedTerm::Nonlinear { power, dof, other } => {
+                let values = self.power_of(power, dof, other)?;
+                let ends: Vec<(usize, f64)> =
+                    [(dof, -1.0)].into_iter().chain(other.map(|other| (other, 1.0))).collect();
+                vec![self.forced(&ends, |row| values[row])]
+            }
+        })
+    }
+
+    fn displaced(&self, response: usize, of: impl Fn(usize) -> Complex<f64>) -> Change {
+        let force = DMatrix::zeros(self.fit.data.len(), self.fit.data.dof());
+        let mut displacement = force.clone();
+        displacement
+            .column_mut(response)
+            .iter_mut()
+            .enumerate()
+            .for_each(|(row, to)| *to = of(row));
+        Change { force, displacement }
+    }
+
+    fn forced(&self, ends: &[(usize, f64)], of: impl Fn(usize) -> Complex<f64>) -> Change {
+        let displacement = DMatrix::zeros(self.fit.data.len(), self.fit.data.dof());
+        let mut force = displacement.clone();
+        for (dof, sign) in ends {
+            let of_end = force.column_mut(*dof);
+            of_end.into_iter().enumerate().for_each(|(row, to)| *to = of(row) * *sign);
+        }
+        Change { force, displacement }
+    }
+
+    /// Returns a power of the motion on every row, over whole records from sample to sample; what its ends leave is
+    /// that of a transient.
+    fn power_of(
+        &self,
+        power: Power,
+        dof: usize,
+        other: Option<usize>,
+    ) -> Option<Vec<Complex<f64>>> {
+        let omega = self.fit.data.omega();
+        let mut values = vec![Complex::new(0.0, 0.0); omega.len()];
+        for SampledRows { rows, sampling } in self.records {
+            let line = |row: usize| (omega[row] / sampling.omega0()).round() as usize;
+            let mut motion: ComplexMatrix = DMatrix::zeros(sampling.len() / 2 + 1, 2);
+            for row in rows.clone() {
+                let x = self.displacement[(row, dof)]
+                    - other.map_or(Complex::new(0.0, 0.0), |o| self.displacement[(row, o)]);
+                let place = line(row);
+                motion[(place, 0)] = x;
+                motion[(place, 1)] = x * Complex::new(0.0, omega[row]);
+            }
+            let motion = Spectrum::from_lines(*sampling, motion).ok()?.to_record().ok()?;
+            let of_sample = |(x, v): (&f64, &f64)| power.of(*x, *v);
+            let both = motion.channel(0).iter().zip(motion.channel(1));
+            let force = Record::from_channel(*sampling, both.map(of_sample).collect()).ok()?;
+            let force = Spectrum::of(&force);
+            for row in rows.clone() {
+                values[row] = force.line(line(row), 0);
+            }
+        }
+        Some(values)
+    }
+}
+
+/// Serialises an index counted from 1.
+#[cfg(feature = "serde")]
+fn from_one<S: serde::Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_u64(*index as u64 + 1)
+}
+
+/// The same of an index that may be missing.
+#[cfg(feature = "serde")]
+fn maybe_from_one<S: serde::Serializer>(
+    index: &Option<usize>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match index {
+        Some(index) => serializer.serialize_some(&(index + 1)),
+        None => serializer.serialize_none(),
+    }
+}
