@@ -4,7 +4,7 @@ use mechid_analysis::identify::{OpenFit, Source};
 use mechid_analysis::{
     AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
-use mechid_checks::{DataPart, Finding, PartsAgreement, Subject};
+use mechid_checks::{DataPart, Finding, OmittedTerm, PartsAgreement, Power, Subject};
 use mechid_problems::FaultyOscillator;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 
@@ -130,4 +130,34 @@ fn a_response_that_is_noise_is_no_result() {
     };
     assert!(matches!(refused, AnalysisError::NothingDetermined { .. }), "{refused}");
     assert!(refused.to_string().starts_with("the data do not determine the machine: "));
+}
+
+/// What a term left out changes is in the intervals, though no part of the data disagrees with another.
+#[test]
+fn a_term_that_the_model_leaves_out_is_named_and_counted() {
+    let linear = FaultyOscillator::linear();
+    let rubbing = FaultyOscillator { friction: 5.0, ..linear };
+    let hardening = FaultyOscillator { cubic: 1e8, ..linear };
+    let cases = [
+        (rubbing, Power::VelocitySign, "c", linear.damping),
+        (hardening, Power::Cube, "k", linear.stiffness),
+    ];
+    for (machine, expected, name, value) in cases {
+        for found in [
+            identify(&[periods(&machine, 12)], &Identify::default()).unwrap(),
+            open(&[random(&machine, 13)]),
+        ] {
+            let left_out = found.checks().iter().find_map(|check| match &check.finding {
+                Finding::TermLeftOut(term) => Some(term),
+                _ => None,
+            });
+            let left_out = left_out.expect("a term");
+            let is_expected = matches!(left_out.term, OmittedTerm::Nonlinear { power, dof: 0, other: None } if power == expected);
+            assert!(is_expected, "{found}");
+            let shift = left_out.changes.iter().find(|c| c.parameter.to_string() == name).unwrap();
+            let estimated = found.estimate().parameter(name).unwrap();
+            assert!(estimated.standard_error > 0.9 * shift.by.abs(), "{found}");
+            assert!(holds(&found, name, value), "{found}");
+        }
+    }
 }
