@@ -113,7 +113,7 @@ pub enum AnalysisError {
         response: String,
         /// Point of the force.
         force: String,
-        /// What else may be done, beginning with its punctuation; empty if there is nothing.
+        /// Advice, beginning with its punctuation; may be empty.
         advice: &'static str,
     },
     /// A file is neither a record with named columns nor a table of frequency responses.

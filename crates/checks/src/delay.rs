@@ -151,8 +151,8 @@ fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Optio
     Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
 }
 
-/// Returns the delay, in whole samples of `dt` s, with the largest likelihood for the system without
-/// a delay.
+/// Returns the delay, in whole samples of `dt` s, with the largest likelihood for the system
+/// without a delay.
 fn whole_samples(likelihood: &mut DelayedOpenRecord<'_>, dt: f64) -> Option<f64> {
     let mut best = (0.0, f64::INFINITY);
     for step in -MAX_DELAY..=MAX_DELAY {

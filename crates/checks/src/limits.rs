@@ -288,5 +288,5 @@ pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 /// high-pass.
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;
 
-/// Changes by a term left out that its sentence tells at most.
+/// Maximum number of changes in the sentence about an omitted term; the result has all of them.
 pub(crate) const CHANGES_TOLD: usize = 3;

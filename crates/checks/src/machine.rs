@@ -16,8 +16,9 @@ use super::prior::PriorAgreement;
 use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
-/// Tests the power of the residual against the noise if `source` says where that is known from
-/// ([`Finding::Misfit`]), the parts of the data against one another ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// Tests the power of the residual against the noise if `source` states the origin of the noise
+/// power ([`Finding::Misfit`]), the parts of the data against one another
+/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and whether
 /// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source

@@ -24,11 +24,11 @@ pub struct TermLeftOut {
     /// Probability that noise alone makes one of the terms explain as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// What the term changes, parameter by parameter.
+    /// Changes by the term, parameter by parameter (unit of the parameter).
     pub changes: Vec<ChangeByTerm>,
 }
 
-/// Change of a parameter by a term beside it.
+/// Change of a parameter by an omitted term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ChangeByTerm {
@@ -43,8 +43,8 @@ pub struct ChangeByTerm {
     pub in_errors: f64,
 }
 
-/// Looks for terms that the model of a fit leaves out ([`Finding::TermLeftOut`]); `None` where noise explains the
-/// residual as well. `records` as in [`PartsOfFit::omitted`].
+/// Tests for terms that the model of a fit leaves out ([`Finding::TermLeftOut`]); `None` if noise
+/// explains the residual as well. `records` are those of [`PartsOfFit::omitted`].
 ///
 /// # Source
 /// The source of [`PartsOfFit::omitted`].

@@ -12,7 +12,8 @@ use super::p_value::PValue;
 use super::{Subject, Verdict};
 use crate::Finding;
 
-/// Difference of the parts of the data about the parameters: records, bands of lines, stretches of time.
+/// Difference of the parts of the data about the parameters: records, bands of lines, sections of
+/// time.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PartsAgreement {
@@ -29,7 +30,7 @@ pub struct PartsAgreement {
     pub by_others: f64,
     /// Standard error of the difference by the noise alone (unit of the parameter).
     pub standard_error: f64,
-    /// Factor by which the scatter of the parts makes standard errors larger than the noise does (pure number).
+    /// Ratio of standard errors from the scatter of the parts to those from the noise (pure number).
     pub scatter: f64,
     /// Number of independent differences of the parts behind that factor.
     pub degrees_of_freedom: usize,
@@ -82,8 +83,9 @@ pub enum RowParts {
     Halves,
 }
 
-/// Tests whether the parts of the data agree about the parameters of a fit ([`Finding::PartsAgreement`]), with one error
-/// rate for all `splits`. `None` where no split can be made.
+/// Tests whether the parts of the data agree about the parameters of a fit
+/// ([`Finding::PartsAgreement`]), with one error rate for all `splits`. `None` if no split is
+/// possible.
 ///
 /// # Source
 /// That of [`PartsOfFit::compare`]; Bonferroni's inequality for several splits.

@@ -103,7 +103,7 @@ fn write_lines(message: &str, every: Duration, end: &Receiver<()>, to: &mut impl
     let begin = Instant::now();
     while end.recv_timeout(every) == Err(RecvTimeoutError::Timeout) {
         let seconds = begin.elapsed().as_secs();
-        // A line that nobody can read changes nothing.
+        // The work goes on if the line cannot be written.
         let _ = writeln!(to, "{}, {seconds} s so far", PROGRESS.after(message));
     }
 }

@@ -10,8 +10,9 @@ pub(crate) const DELAY_STEPS: usize = 30;
 /// Maximum number of Gauss–Newton steps of the first search.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
-/// Number of lines of a block of which one is searched in where the noise is unknown; the minimum
-/// is then followed in all lines. A larger block would leave narrow resonances with too few lines.
+/// Length of the blocks of lines with one line each in the first search if the noise is unknown;
+/// the minimum is then followed in all lines. A larger block would leave narrow resonances with too
+/// few lines.
 pub(crate) const LINES_PER_SEARCHED: usize = 10;
 
 /// Minimum number of lines that are searched in: fewer cost little anyway.

@@ -21,8 +21,8 @@ const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
 /// matrices.
 const DENSE_DOF: usize = 64;
 
-/// Maximum share of entries that are not zero of full matrices that are stored as sparse ones; with more,
-/// the factors of an irregular pattern may have all entries.
+/// Maximum share of entries unequal to zero in full matrices that are stored as sparse ones; with
+/// more, the factors of an irregular pattern may have all entries.
 const SPARSE_SHARE: f64 = 0.1;
 
 /// Maximum number of degrees of freedom of such a machine for computations that need full matrices:

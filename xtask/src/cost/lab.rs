@@ -14,7 +14,7 @@ use mechid_problems::exact_foh_periodic;
 use mechid_problems::machines::{Support, chain};
 use nalgebra::DMatrix;
 
-/// Time after which a case is ended: longer ones tell nothing more.
+/// Time after which a case is ended, in s.
 const MOST_SECONDS: f64 = 120.0;
 
 /// Time between two looks at the memory of a program.
@@ -27,7 +27,7 @@ struct Case {
     arguments: Vec<String>,
 }
 
-/// What a case took.
+/// Time and memory of a case.
 struct Cost {
     name: &'static str,
     /// `None` if it was ended after [`MOST_SECONDS`].
@@ -80,7 +80,7 @@ fn measured(program: &Path, folder: &Path, case: Case) -> Result<Cost, String> {
     Ok(Cost { name: case.name, seconds, memory })
 }
 
-/// Returns the largest memory of a running program, in GB, where the system tells it.
+/// Returns the largest memory of a running program, in GB, if the system states it.
 fn largest_memory(child: &Child) -> Option<f64> {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

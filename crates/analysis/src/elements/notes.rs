@@ -23,7 +23,7 @@ pub enum ElementNote {
     ScaledErrors {
         /// Factor.
         factor: f64,
-        /// What disagrees beyond the noise.
+        /// Checks that disagree beyond the noise.
         because: Vec<Subject>,
     },
     /// Most of the information on a parameter comes from its prior.

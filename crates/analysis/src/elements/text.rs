@@ -108,8 +108,11 @@ impl ElementSummary {
         text_table(&rows)
     }
 
-    /// Mean over the determined parameters of what a candidate takes off their standard errors, in
-    /// per cent.
+    /// Returns the reduction of the standard errors by a candidate, averaged over the determined
+    /// parameters, in per cent.
+    ///
+    /// # Source
+    /// Arithmetic mean of the relative reductions.
     pub fn reduction(&self, row: &CandidateRow) -> Option<f64> {
         let pairs = self.parameters.iter().zip(&row.standard_errors);
         let reductions: Vec<f64> = pairs

@@ -39,7 +39,8 @@ pub struct Fitted {
     pub nonlinear: Option<WithTerms>,
     /// Factor by which the standard errors of `estimate` are larger than those of the noise.
     pub error_scale: f64,
-    /// Mean square that a term left out adds to the covariance of the parameters, if there is such a term.
+    /// Mean square error that omitted terms add to the covariance of the parameters, in the product
+    /// of the units of two parameters (parameters × parameters).
     pub omitted: Option<DMatrix<f64>>,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,

@@ -17,8 +17,8 @@ pub struct ElementArgs {
     /// Find the unknown coefficients of the machine in this description: degrees of freedom,
     /// elements (masses, springs and dampers, bearings, known matrices), sensors anywhere, and
     /// inputs (forces, motion of the support, unbalance). Columns have the names of sensors and
-    /// inputs. A record with
-    /// --period is taken as whole periods, one with --hits as the hits of a hammer, otherwise as an open record
+    /// inputs. A record with --period is taken as whole periods, one with --hits as the hits of a
+    /// hammer, otherwise as an open record
     #[arg(long, value_name = "MACHINE.json", conflicts_with_all = ["force", "displacement", "velocity",
           "acceleration", "domain", "lines", "without_lines", "method", "force_noise", "extent",
           "between_samples", "ac_coupling", "mass", "structure", "struck", "nonlinear", "candidates",

@@ -57,8 +57,8 @@ impl Whitened {
         Self::sensitive_to(&[], data, unknowns, values, covariance)
     }
 
-    /// Returns the displacement G F̂ (rows × n, in m) under the most likely force, given its noise and
-    /// the displacement; `None` as for [`Whitened::new`].
+    /// Returns the displacement G F̂ (rows × n, in m) under the most likely force, given its noise
+    /// and the displacement; `None` as for [`Whitened::new`].
     pub(super) fn likely_displacement<'a>(
         data: &FrequencyData,
         system: &SecondOrderSystem,

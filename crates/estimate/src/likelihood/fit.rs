@@ -270,9 +270,9 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Factor by which errors are larger than those of the noise alone: the Birge ratio where the misfit is
-    /// too large for the noise, the scatter of the parts of the data where they disagree, the larger of
-    /// both; otherwise 1.
+    /// Returns the ratio of the standard errors to those of the noise alone: the larger one of the
+    /// Birge ratio, if the misfit is too large for the noise, and the scatter of the parts of the
+    /// data, if they disagree; otherwise 1.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227; Liang & Zeger (1986), Biometrika 73, 13–22.

@@ -28,7 +28,7 @@ pub struct ComparedParts {
     pub by_others: f64,
     /// Standard error of the difference by the noise alone, in the unit of the parameter.
     pub standard_error: f64,
-    /// Factor by which the scatter of the parts makes standard errors larger than the noise does.
+    /// Ratio of standard errors from the scatter of the parts to those from the noise.
     pub scatter: f64,
     /// Number of independent differences behind that factor.
     pub degrees_of_freedom: usize,
@@ -41,7 +41,7 @@ impl ComparedParts {
     }
 }
 
-/// A fit at its minimum, of which parts can be compared.
+/// Fit at its minimum, linearised for the comparison of its parts.
 struct Linear<'a> {
     residual: DVector<f64>,
     /// Orthonormal columns that the parameters explain.
@@ -55,8 +55,8 @@ struct Linear<'a> {
     omega: &'a [f64],
 }
 
-/// Compares records and bands of lines, with one error rate for both; `None` for large fits, for data without
-/// noise, and where no part can be made.
+/// Compares records and bands of lines, with one error rate for both; `None` for large fits, for
+/// data without noise, and if no split is possible.
 ///
 /// # Source
 /// That of [`PartsOfFit::compare`](crate::frequency_domain::PartsOfFit::compare).

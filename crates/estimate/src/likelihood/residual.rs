@@ -173,8 +173,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         jacobian.iter().all(|value| value.is_finite()).then_some(jacobian)
     }
 
-    /// Residuals of each open record, and orthonormal columns that its transient explains of them; `None` where the
-    /// response does not exist.
+    /// Returns the residuals of each open record, and orthonormal columns that its transient explains
+    /// of them; `None` if the response does not exist.
     pub(super) fn transient_bases(
         &self,
         parameters: &[f64],

@@ -16,7 +16,7 @@ use crate::system::System;
 /// The fastest motions of a system, found when they are asked for.
 pub(super) struct Fastest<'a> {
     pub(super) system: &'a dyn System,
-    /// Its rate, in 1/s, and the motion itself.
+    /// Rate of the fastest motion, in 1/s, and the motion itself.
     fastest: OnceCell<(f64, Option<SecondOrderSystem>)>,
     /// The stiffest and the most damped motion of a passive system; `None` of others.
     passive: OnceCell<Option<[SecondOrderSystem; 2]>>,

@@ -160,8 +160,9 @@ impl Examined<'_> {
         Ok(least)
     }
 
-    /// The limit of a large system that may gain energy: that of its fastest motion, if a step a little
-    /// below it does not grow and one a little above it does, otherwise that of a search.
+    /// Returns the limit of a large system that may gain energy: that of its fastest motion, if a
+    /// step a little below it does not grow and one a little above it does, otherwise that of a
+    /// search.
     fn limit_of_any(&self, fastest: &Fastest<'_>) -> Result<Option<f64>, IntegrateError> {
         let (rate, equations) = (fastest.rate()?, Equations::from_system(fastest.system));
         let radius = |dt: f64| {

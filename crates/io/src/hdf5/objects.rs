@@ -1,7 +1,7 @@
-//! Objects of MATLAB 7.3, of which timetables are read.
+//! Timetables among the objects of MATLAB 7.3.
 //!
-//! A variable of a class holds the number of its object. What the properties of the object are stands in a table of
-//! integers that all variables share, `#subsystem#/MCOS`; its other cells are the values.
+//! A variable of a class holds the number of its object. A table of integers that all variables
+//! share, `#subsystem#/MCOS`, lists the properties of the objects; its other cells are the values.
 //!
 //! # Source
 //! The format is not published; after the description and the writer of the package `mat-io` 1.0.
@@ -23,13 +23,13 @@ const MAX_WORDS: u64 = 16;
 /// Words of an object in the table: class, two unknown ones, two kinds of properties, dependencies.
 const OBJECT_WORDS: usize = 6;
 
-/// Words of a class in the table, of which the second is its name.
+/// Words of a class in the table; the second one is its name.
 const CLASS_WORDS: usize = 4;
 
 /// Words of a property: name, kind, value.
 const PROPERTY_WORDS: usize = 3;
 
-/// Kind of a property whose value stands in a cell.
+/// Kind of a property whose value is in a cell.
 const IN_CELL: u32 = 1;
 
 /// Cells before those of the values.
@@ -119,8 +119,8 @@ impl Objects {
     }
 }
 
-/// Returns the properties of a record, by its number: each record is their count, and then they, in an even number of
-/// words.
+/// Returns the properties of a record, by its number: each record has their count and then the
+/// properties, in an even number of words.
 fn record(region: &[u32], number: u32) -> Option<&[u32]> {
     let mut at = 0_usize;
     let len = |at: usize| Some(PROPERTY_WORDS.saturating_mul(*region.get(at)? as usize));
@@ -162,8 +162,8 @@ enum RowTimes {
 }
 
 impl Reader {
-    /// Adds the variables of a timetable as columns, with their units and instants; returns whether the data set
-    /// refers to one.
+    /// Adds the variables of a timetable as columns, with their units and instants; returns whether
+    /// the data set refers to one.
     pub(super) fn add_timetable(
         &mut self,
         dataset: &Dataset,

@@ -161,7 +161,8 @@ impl<'a> Source<'a> {
     /// Returns the format of the file.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
-        // Programs other than MATLAB write its version 7.3 with the words of level 5: the number says so.
+        // Programs other than MATLAB write version 7.3 with the words of level 5: only the number
+        // differs.
         let is_version_73 = head.get(VERSION) == Some(&VERSION_73);
         if head.starts_with(b"MATLAB 5.0 MAT-file") && !is_version_73 {
             Kind::Mat5

@@ -439,8 +439,8 @@ fn unit_words(name: &str, wanted: Option<Quantity>) -> Option<UnitWords> {
     })
 }
 
-/// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. It is used if it has no other meaning and the name
-/// is that of its quantity.
+/// Reads a unit before the name: `lbf: Hammer`, `mm displacement`. It is used if it has no other
+/// meaning and the name is that of its quantity.
 fn leading_unit(name: &str, words: &[Range<usize>], wanted: Quantity) -> Option<UnitWords> {
     let text_of = |span: &Range<usize>| &name[span.clone()];
     (1..words.len().min(4)).rev().find_map(|count| {

@@ -19,8 +19,8 @@ pub(crate) const LEAST_ONSET: usize = 10;
 /// Number of rows of a block of columns: bounds the memory.
 pub(crate) const POLE_CHUNK: usize = 4096;
 
-/// Decay, in nepers, beyond which a mode has no columns: 10⁻¹⁵ of its first amplitude, which
-/// changes no digit of a fit. Smaller values would lose information, larger ones cost time.
+/// Decay, in nepers, after which a mode has no columns: to 10⁻¹⁵ of its first amplitude, below the
+/// digits of a fit. Smaller values would lose information, larger ones cost time.
 pub(crate) const DEAD: f64 = 35.0;
 
 /// Maximum number of steps of a search.

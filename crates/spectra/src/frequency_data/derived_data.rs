@@ -48,8 +48,8 @@ impl FrequencyData {
         data
     }
 
-    /// Returns some rows, by their indices in rising order, without the noise that was stated for all
-    /// of them: the initial estimates of a search need none.
+    /// Returns some rows, by their indices in rising order, without the noise that was stated for
+    /// all of them: the initial estimates of a search need none.
     #[must_use]
     pub fn rows(&self, rows: &[usize]) -> Self {
         Self {

@@ -16,14 +16,15 @@ use crate::limits::PART_INFORMS;
 pub struct PartsComparison {
     /// Number of parts.
     pub parts: usize,
-    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by that alone.
+    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by noise
+    /// alone.
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
     /// Probability that noise alone makes the parts differ as much.
     pub p_value: f64,
-    /// Factor by which the scatter of the parts makes standard errors larger than those of the noise, for the parameter
-    /// about which they disagree most or, where that is more, for all together.
+    /// Ratio of standard errors from the scatter of the parts to those from the noise, for the
+    /// parameter with the largest disagreement or, if that is larger, for all together.
     pub error_scale: f64,
     /// The largest difference of a part from the others in units of its standard error.
     pub largest: Option<Difference>,
@@ -61,9 +62,10 @@ pub(crate) struct Scores<'a> {
 
 /// Variance of the residual in units of the noise.
 pub(crate) enum Level {
-    /// That of the noise stated, times a factor for weights that are sampled, with its degrees of freedom.
+    /// Variance of the stated noise, times a factor for weights that are sampled, with its degrees
+    /// of freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
-    /// That of a residual with this sum of squares and so many free numbers, times such a factor.
+    /// Variance of a residual with a sum of squares and a number of free values, times such a factor.
     Residual { inflation: f64, cost: f64, free: f64 },
 }
 
@@ -113,7 +115,8 @@ impl Scores<'_> {
         self.covariance.view((part * count, part * count), (count, count)).into_owned()
     }
 
-    /// Compares the scores with their covariance; `None` where there are too few residuals to know the noise by.
+    /// Compares the scores with their covariance; `None` with too few residuals for an estimate of
+    /// the noise.
     pub(crate) fn compare(&self, level: &Level) -> Option<ScoreComparison> {
         let (squares, rank) = whitened_square(&self.covariance, &self.scores)?;
         let degrees = rank as f64;
@@ -130,7 +133,8 @@ impl Scores<'_> {
         })
     }
 
-    /// Returns the largest factor by which the scatter of the scores makes the standard error of a parameter larger.
+    /// Returns the largest ratio of a standard error from the scatter of the scores to its value from
+    /// the noise.
     fn largest_scatter(&self, level: f64) -> Option<f64> {
         let of_row = |row: usize| {
             let root = self.root.row(row).transpose();
@@ -146,7 +150,8 @@ impl Scores<'_> {
         (0..self.root.nrows()).filter_map(of_row).max_by(f64::total_cmp)
     }
 
-    /// Returns the difference of one part from the others that is largest in units of its standard error.
+    /// Returns the difference of one part from the others that is largest in units of its standard
+    /// error.
     fn largest_difference(&self, level: f64) -> Option<PartDifference> {
         let of_part = |(part, own): (usize, &DMatrix<f64>)| {
             let (inverse, _) = pseudo_inverse(&self.covariance_of(part))?;
@@ -181,15 +186,16 @@ impl PartDifference {
 }
 
 impl PartsOfFit<'_> {
-    /// Compares what the parts of a split say about the parameters; `None` where there are fewer than two parts or too
-    /// few residuals to know the noise by.
+    /// Compares the parameters that the parts of a split determine; `None` with fewer than two parts
+    /// or too few residuals for an estimate of the noise.
     ///
-    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d degrees of freedom and
-    /// those of the level of the noise.
+    /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d
+    /// degrees of freedom and those of the level of the noise.
     ///
     /// # Source
-    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40, 207–227, for the
-    /// factor; Liang & Zeger (1986), Biometrika 73, 13–22, for that of one parameter (scatter of the scores of parts).
+    /// Chow (1960), Econometrica 28, 591–605, as a score test; Birge (1932), Physical Review 40,
+    /// 207–227, for the factor; Liang & Zeger (1986), Biometrika 73, 13–22, for the factor of one
+    /// parameter (scatter of the scores of parts).
     pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
         let cuts = Cuts::new(self, split)?;
         let parts: Vec<Part> = cuts.parts().collect();

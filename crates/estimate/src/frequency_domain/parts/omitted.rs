@@ -12,7 +12,7 @@ use crate::frequency_domain::pulse_covariance::scatter;
 use crate::frequency_responses::covariance_of_errors;
 use crate::limits::PART_INFORMS;
 
-/// Terms that a model leaves out: the one that explains most of the residual, and what all together say of the
+/// Terms that a model leaves out: the most likely one, and the effect of all together on the
 /// parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmittedTerms {
@@ -24,14 +24,15 @@ pub struct OmittedTerms {
     pub p_value: f64,
     /// Change of each parameter with that term, in the order and the unit of the parameters.
     pub changes: DVector<f64>,
-    /// Standard errors of these changes, in the unit of the parameters.
+    /// Standard errors of these changes, in the order and the unit of the parameters.
     pub errors: DVector<f64>,
-    /// Mean square that the terms add to the covariance of the parameters, each by its likelihood: the square of
-    /// their changes and the covariance of these, in the product of the units of two parameters.
+    /// Mean square error that the terms add to the covariance of the parameters (parameters ×
+    /// parameters), each weighted by its likelihood: the squares of the changes plus their
+    /// covariance, in the product of the units of two parameters.
     pub mean_square: DMatrix<f64>,
 }
 
-/// What one term explains.
+/// Test of one term.
 struct Explained {
     term: OmittedTerm,
     /// sᵀV⁺s over the number of its columns and the level of the noise.
@@ -44,19 +45,20 @@ struct Explained {
 }
 
 impl PartsOfFit<'_> {
-    /// Tests terms that the model leaves out by their scores at the optimum, and tells what each would change to first
-    /// order; `records` are the samples of the rows, without which nonlinear terms are not looked for. `None` where
-    /// none can be tested.
+    /// Tests terms that the model leaves out by their scores at the optimum, with the change of each
+    /// parameter to first order. `records` has the samples of the rows; without them nonlinear terms
+    /// are not tested. `None` if no term can be tested.
     ///
-    /// With columns Z, the weighted changes of the response less what the parameters explain of them, the term is
-    /// a = (ZᵀZ)⁻¹Zᵀe, and the parameters change by −(QR)⁺C a, C being the columns before. Around the estimate of the
-    /// smaller model the larger one has a mean square error of the covariance of these changes and their square; terms
-    /// that explain the same are weighed by their likelihoods, as models are in their average.
+    /// C are the weighted changes of the response by a term, and Z what remains of them without the
+    /// part that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
+    /// parameters change by −(QR)⁺C a. Around the estimate of the smaller model, the mean square
+    /// error of the larger one is the covariance of these changes plus their square. Terms that
+    /// explain the same are weighted by their likelihoods, as in an average of models.
     ///
     /// # Source
-    /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for the test; Buckland,
-    /// Burnham & Augustin (1997), Biometrics 53, 603–618, for errors beyond one model; Schwarz (1978), Annals of
-    /// Statistics 6, 461–464, for the weights.
+    /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for the
+    /// test; Buckland, Burnham & Augustin (1997), Biometrics 53, 603–618, for errors beyond one
+    /// model; Schwarz (1978), Annals of Statistics 6, 461–464, for the weights.
     pub fn omitted(&self, records: &[SampledRows]) -> Option<OmittedTerms> {
         let motion = LikelyMotion::new(self, records)?;
         let terms = motion.terms();
@@ -78,7 +80,7 @@ impl PartsOfFit<'_> {
         Some(OmittedTerms {
             term: best.term,
             explained: best.part,
-            // Bonferroni: the least of so many.
+            // Bonferroni's bound for the smallest of all.
             p_value: (explained.len() as f64 * least).min(1.0),
             changes: best.changes.clone(),
             errors,

@@ -21,13 +21,15 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 pub enum OmittedTerm {
     /// Displacement in phase with the forces and as large at every frequency: modes above the band.
     ResidualFlexibility,
-    /// Force that grows with the fourth power of the frequency: masses on springs, with modes above the band.
+    /// Force that grows with the fourth power of the frequency: masses on springs, with modes above
+    /// the band.
     HiddenMass,
     /// Displacement that falls with the square of the frequency: modes below the band.
     ResidualMass,
     /// Damping force in phase with the velocity that does not grow with the frequency.
     StructuralDamping,
-    /// Force that follows a power of a displacement or velocity, to the ground or between two degrees of freedom.
+    /// Force that follows a power of a displacement or velocity, to the ground or between two degrees
+    /// of freedom.
     Nonlinear {
         /// Power of the motion.
         power: Power,
@@ -40,7 +42,7 @@ pub enum OmittedTerm {
     },
 }
 
-/// Power of a motion that a force is looked for in.
+/// Power of a motion that is tested as a force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Power {
@@ -55,7 +57,7 @@ pub enum Power {
 }
 
 impl Power {
-    /// All powers that are looked for.
+    /// All powers that are tested.
     pub const ALL: [Self; 4] = [Self::Square, Self::Cube, Self::VelocityCube, Self::VelocitySign];
 
     /// Returns the power of a displacement or of its rate, in the power of the unit of either.
@@ -118,7 +120,7 @@ impl<'a> LikelyMotion<'a> {
         Some(Self { fit, system, displacement, force, records })
     }
 
-    /// Returns the terms that can be looked for, as many as the size of the fit allows.
+    /// Returns the terms that can be tested, as many as the size of the fit allows.
     pub(super) fn terms(&self) -> Vec<OmittedTerm> {
         let (n, rows) = (self.fit.data.dof(), self.fit.data.len());
         let mut all = vec![OmittedTerm::ResidualFlexibility, OmittedTerm::ResidualMass];
@@ -135,8 +137,8 @@ impl<'a> LikelyMotion<'a> {
         all
     }
 
-    /// Returns the weighted changes of the response by a term, each of unit length, one below the other; `None` where
-    /// it changes nothing.
+    /// Returns the weighted changes of the response by a term, each of unit length, one below the
+    /// other; `None` if the response does not change.
     pub(super) fn columns(&self, term: OmittedTerm) -> Option<DMatrix<f64>> {
         let changes = self.changes(term)?;
         let covariance = |row: usize| self.fit.noise.covariance(row).clone();
@@ -208,8 +210,8 @@ impl<'a> LikelyMotion<'a> {
         Change { force, displacement }
     }
 
-    /// Returns a power of the motion on every row, over whole records from sample to sample; what its ends leave is
-    /// that of a transient.
+    /// Returns a power of the motion on every row, computed from sample to sample over whole records;
+    /// the effect of their ends is that of a transient.
     fn power_of(
         &self,
         power: Power,
