@@ -178,14 +178,6 @@ pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
 /// Maximum number of factorisations for each end of the enclosure.
 pub(crate) const ENCLOSURE_FACTORISATIONS: usize = 64;
 
-/// Relative precision of the step limit of a large system that may gain energy: the accuracy of the
-/// rate of its fastest motion.
-pub(crate) const LIMIT_PRECISION: f64 = 1e-3;
-
-/// Ratio of the steps at which a scheme without a limit on passive systems is tried on another
-/// large system: smaller ones take more time, larger ones could jump over steps that grow.
-pub(crate) const COARSE_STEP_FACTOR: f64 = 32.0;
-
 /// Number of Arnoldi steps for the eigenvalue of largest modulus.
 pub(crate) const ARNOLDI_STEPS: usize = 32;
 

@@ -16,35 +16,23 @@ use crate::system::System;
 /// The fastest motions of a system, found when they are asked for.
 pub(super) struct Fastest<'a> {
     pub(super) system: &'a dyn System,
-    /// Rate of the fastest motion, in 1/s, and the motion itself.
-    fastest: OnceCell<(f64, Option<SecondOrderSystem>)>,
+    rate: OnceCell<f64>,
     /// The stiffest and the most damped motion of a passive system; `None` of others.
     passive: OnceCell<Option<[SecondOrderSystem; 2]>>,
 }
 
 impl<'a> Fastest<'a> {
     pub(super) fn new(system: &'a dyn System) -> Self {
-        Self { system, fastest: OnceCell::new(), passive: OnceCell::new() }
+        Self { system, rate: OnceCell::new(), passive: OnceCell::new() }
     }
 
     /// Returns the largest modulus among the eigenvalues, in 1/s, estimated by Arnoldi's iteration.
     pub(super) fn rate(&self) -> Result<f64, IntegrateError> {
-        Ok(self.found()?.0)
-    }
-
-    /// Returns the system that moves only as the fastest motion does; `None` if numbers overflow.
-    pub(super) fn motion(&self) -> Result<Option<&SecondOrderSystem>, IntegrateError> {
-        Ok(self.found()?.1.as_ref())
-    }
-
-    fn found(&self) -> Result<&(f64, Option<SecondOrderSystem>), IntegrateError> {
-        if let Some(found) = self.fastest.get() {
-            return Ok(found);
+        if let Some(rate) = self.rate.get() {
+            return Ok(*rate);
         }
-        let equations = Equations::from_system(self.system);
-        let (rate, shape) = fastest_motion(&equations)?;
-        let motion = shape.and_then(|shape| reduced(&equations, &shape).ok());
-        Ok(self.fastest.get_or_init(|| (rate, motion)))
+        let rate = fastest(&Equations::from_system(self.system))?;
+        Ok(*self.rate.get_or_init(|| rate))
     }
 
     /// Returns a single degree of freedom for each of these motions, at least as fast.
@@ -103,13 +91,6 @@ pub(super) fn reduced_to(
 /// Returns the largest modulus among the eigenvalues of a system, in 1/s, estimated by Arnoldi's
 /// iteration.
 pub(super) fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
-    Ok(fastest_motion(equations)?.0)
-}
-
-/// Returns what [`fastest`] does, and the complex displacements of this motion.
-fn fastest_motion(
-    equations: &Equations,
-) -> Result<(f64, Option<DVector<Complex<f64>>>), IntegrateError> {
     let n = equations.dof();
     let mut mass = equations.mass_only("Arnoldi", 0.0)?;
     // The iteration also finds the unit of time that makes the two halves of the state comparable.
@@ -128,9 +109,9 @@ fn fastest_motion(
         let Some(largest) = largest else { break };
         let rate = largest.value.norm();
         if rate == 0.0 || (0.5..2.0).contains(&rate) {
-            return Ok((rate / unit, Some(largest.vector.rows(0, n).into_owned())));
+            return Ok(rate / unit);
         }
         unit /= rate;
     }
-    Ok((1.0 / unit, None))
+    Ok(1.0 / unit)
 }

@@ -150,7 +150,14 @@ impl Examined<'_> {
             StableSteps::Unknown => None,
             _ => fastest.motions()?,
         };
-        let Some(motions) = motions else { return self.limit_of_any(fastest) };
+        let Some(motions) = motions else {
+            let (rate, equations) = (fastest.rate()?, Equations::from_system(fastest.system));
+            let radius = |dt: f64| {
+                let mut stepper = (self.prepare)(fastest.system, dt)?;
+                self.growth_found(&equations, rate, stepper.as_mut(), dt)
+            };
+            return self.search(&radius, rate, 2.0, 1e-3);
+        };
         let mut least: Option<f64> = None;
         if self.stable_steps != StableSteps::All {
             for motion in motions {
@@ -158,32 +165,6 @@ impl Examined<'_> {
             }
         }
         Ok(least)
-    }
-
-    /// Returns the limit of a large system that may gain energy: that of its fastest motion, if a
-    /// step a little below it does not grow and one a little above it does, otherwise that of a
-    /// search.
-    fn limit_of_any(&self, fastest: &Fastest<'_>) -> Result<Option<f64>, IntegrateError> {
-        let (rate, equations) = (fastest.rate()?, Equations::from_system(fastest.system));
-        let radius = |dt: f64| {
-            let mut stepper = (self.prepare)(fastest.system, dt)?;
-            self.growth_found(&equations, rate, stepper.as_mut(), dt)
-        };
-        let along = match fastest.motion()? {
-            Some(motion) => self.small_limit(motion).ok().flatten(),
-            None => None,
-        };
-        if let Some(limit) = along {
-            let [below, above] = [-1.0, 1.0].map(|s| limit * (1.0 + s * limits::LIMIT_PRECISION));
-            if radius(below)?.is_none() && radius(above)?.is_some() {
-                return Ok(Some(below));
-            }
-        }
-        let factor = match self.stable_steps {
-            StableSteps::All if along.is_none() => limits::COARSE_STEP_FACTOR,
-            _ => 2.0,
-        };
-        self.search(&radius, rate, factor, limits::LIMIT_PRECISION)
     }
 
     /// The limit from the whole amplification matrix.
