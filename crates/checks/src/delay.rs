@@ -75,9 +75,7 @@ fn delay_of_equations(equations: &DelayedForce<'_>, dt: f64, driven: &[usize]) -
 /// sinusoidal disturbances have been subtracted from the `records`. `None` if no delay of up to 16
 /// samples (64 if the response hardly follows the force) satisfies this.
 ///
-/// The transients are estimated again for each delay; otherwise they would absorb a part of it. The
-/// Hann window, under which a delay is searched first, removes the `pulses` of hits: their delay is
-/// the best one in whole samples.
+/// The transients are estimated again for each delay; otherwise they would absorb a part of it.
 ///
 /// # Source
 /// Ours: equations of motion under Hann's window with the force times e^(−iωτ), then maximum
@@ -88,7 +86,6 @@ pub fn delay_of_open_records(
     unknowns: &Unknowns,
     fit: &OutputErrorFit,
     is_explained: bool,
-    pulses: bool,
 ) -> Option<Finding> {
     let (first, remaining_records) = records.split_first()?;
     let joined = remaining_records
@@ -97,11 +94,7 @@ pub fn delay_of_open_records(
         .ok()?;
     let mut likelihood = DelayedOpenRecord::from_fit(&joined, unknowns, fit)?;
     let undelayed = likelihood.cost(0.0)?;
-    let near = if pulses {
-        whole_samples(&mut likelihood, dt)?
-    } else {
-        delay_under_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0)
-    };
+    let near = delay_under_window(&joined, dt, unknowns, &fit.estimate).unwrap_or(0.0);
     if near.abs() > DELAY_NEAR {
         likelihood.search(near * dt)?;
     }
@@ -149,20 +142,6 @@ fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Optio
     let findings = after.records.iter().flat_map(SpectralResidual::findings);
     let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
     Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
-}
-
-/// Returns the delay, in whole samples of `dt` s, with the largest likelihood for the system
-/// without a delay.
-fn whole_samples(likelihood: &mut DelayedOpenRecord<'_>, dt: f64) -> Option<f64> {
-    let mut best = (0.0, f64::INFINITY);
-    for step in -MAX_DELAY..=MAX_DELAY {
-        let samples = step as f64;
-        let cost = likelihood.cost(samples * dt)?;
-        if cost < best.1 {
-            best = (samples, cost);
-        }
-    }
-    Some(best.0)
 }
 
 /// Returns the delay, in samples, that fits the equations of motion under Hann's window best, each

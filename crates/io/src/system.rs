@@ -235,7 +235,7 @@ impl SystemDescription {
         let few = |entries: &Entries| match entries {
             Entries::Rows(rows) => {
                 let filled = rows.iter().flatten().filter(|value| **value != 0.0).count();
-                rows.len() > DENSE_DOF
+                rows.len() > ALL_ENTRIES_DOF
                     && filled as f64 <= SPARSE_SHARE * (rows.len() * rows.len()) as f64
             }
             _ => false,

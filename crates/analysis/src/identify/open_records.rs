@@ -156,12 +156,7 @@ pub(super) fn fit(
         finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
     };
     let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
-    let is_left = |finding: &Finding| finding.verdict() > Verdict::Good;
-    let pulses = matches!(excitation, Excitation::Hits(_));
-    // The search tries each delay of hits, which is slow: it runs if a residual is left.
-    let late = (!pulses || residuals.iter().any(|left| left.findings().iter().any(is_left)))
-        .then(|| delay_of_open_records(&data, dt, unknowns, &fit, is_explained, pulses))
-        .flatten();
+    let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
     let Compared { parts, omitted } = if residuals.iter().any(SpectralResidual::is_rounding) {
         Compared::default()
     } else {

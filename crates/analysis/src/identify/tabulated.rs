@@ -95,7 +95,7 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
 }
 
 /// Returns a table in which the responses to a force stand for those that reciprocity makes equal to them, with a
-/// remark; the table itself if a force has all of its responses, or none has them by reciprocity either.
+/// remark; the table itself if every force has all of its responses, or none has them by reciprocity either.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (the receptance of symmetric matrices is symmetric).
@@ -113,7 +113,7 @@ fn with_reciprocal<'a>(
     };
     let is_symmetric = how.structure.forms.contains(&Form::Symmetric);
     let forces = distinct(functions.iter().map(|f| &f.reference));
-    if !is_symmetric || !how.points.is_empty() || forces.iter().any(|force| is_whole(&force)) {
+    if !is_symmetric || !how.points.is_empty() || forces.iter().all(|force| is_whole(&force)) {
         return (table, None);
     }
     let mut all = functions.clone();
