@@ -14,16 +14,18 @@ use crate::AnalysisError;
 use crate::limits::{ACQUISITION_ROUNDS, ACQUISITION_SETTLED};
 use crate::measurement::Block;
 
-/// Traces of the acquisition in open records, which the fit allows for.
+/// Properties of the acquisition that the fit of open records takes into account.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Acquisition {
-    /// Course of the force between its samples, held or linear; `None`: that of a band-limited force.
+    /// Assumption on the force between its samples, held or linear; `None` for a band-limited
+    /// force.
     pub between_samples: Option<Discretisation>,
     /// Channels behind a first-order high-pass.
     pub ac_coupling: Vec<AcCoupling>,
 }
 
-/// A channel behind a first-order high-pass, written `a1=0.5` with its name and the corner frequency in Hz.
+/// A channel behind a first-order high-pass, written `a1=0.5`: its name and the corner frequency in
+/// Hz.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AcCoupling {
@@ -52,12 +54,12 @@ impl FromStr for AcCoupling {
 }
 
 impl Acquisition {
-    /// Returns whether there is anything to allow for.
+    /// Returns whether these are the defaults: band-limited force, no high-pass.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Returns the lines of a record as if all channels were coupled alike.
+    /// Returns the lines of a record, corrected as if all channels had the same coupling.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if a channel does not exist, or for Euler's rule.
@@ -90,12 +92,12 @@ impl Acquisition {
         Ok(data)
     }
 
-    /// Returns a fit that allows for the force between samples `dt` (s) apart, and the records with the band-limited force
-    /// that has the same response.
+    /// Returns a fit with the given assumption on the force between samples `dt` (s) apart, and the
+    /// records with the band-limited force that has the same response.
     ///
     /// # Source
-    /// Successive substitution: the equivalent force depends on the system only by what lies above half the sampling
-    /// rate.
+    /// Successive substitution: the equivalent force depends on the system only through the
+    /// response above half the sampling rate.
     pub(super) fn refitted(
         &self,
         fit: OutputErrorFit,

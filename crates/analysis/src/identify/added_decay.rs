@@ -1,4 +1,4 @@
-//! The decay that an exponential window adds to frequency responses, taken off again.
+//! The decay that an exponential window adds to frequency responses, and its removal.
 
 use std::f64::consts::TAU;
 
@@ -27,8 +27,8 @@ pub(crate) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, An
     }
 }
 
-/// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as the estimators take
-/// them: under the window they are iω + σ and (iω + σ)² times it.
+/// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as
+/// the estimators assume. Under the window they are iω + σ and (iω + σ)² times the displacement.
 pub(crate) fn as_derivatives(
     table: &FrequencyResponses,
     quantity: ResponseQuantity,
@@ -52,7 +52,8 @@ pub(crate) fn as_derivatives(
     table
 }
 
-/// Returns the known entries of the machine that responses under the window have: M, C + 2σM and K + σC + σ²M.
+/// Returns the known entries of the system that includes the decay σ of the window: M, C + 2σM and
+/// K + σC + σ²M.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] if the window mixes a known entry with one that is not.
@@ -75,7 +76,7 @@ pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, Analy
         };
         match (damping, mass) {
             (Some(_), None) => return mixed(Matrix::Damping, Matrix::Mass),
-            // Of proportional damping they follow from the others.
+            // A proportional damping is determined by the entries of M and K.
             (Some(damping), Some(mass)) if !unknowns.has_proportional_damping() => {
                 let value = damping + 2.0 * rate * mass;
                 windowed = windowed.fix(Matrix::Damping, row, column, value)?;

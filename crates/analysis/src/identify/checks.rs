@@ -15,19 +15,19 @@ use super::fitted::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
 use crate::measurement::{Block, Channels};
 
-/// One finding, with the record it belongs to.
+/// A finding and its record.
 #[derive(Debug, Serialize)]
 pub struct CheckRow {
     /// Time of the check.
     pub when: When,
-    /// Name of the record, where there are several.
+    /// Name of the record; `None` with one record.
     pub record: Option<String>,
     /// Subject of the check.
     #[serde(serialize_with = "as_text")]
     pub subject: Subject,
     /// Good, doubtful or bad.
     pub verdict: Verdict,
-    /// Number that decides the verdict, a ratio or a probability; `None` where it is infinite.
+    /// Number that decides the verdict, a ratio or a probability; `None` if it is infinite.
     pub value: Option<f64>,
     /// The finding, in a sentence.
     pub text: String,
@@ -45,19 +45,19 @@ pub enum When {
     After,
 }
 
-/// Circumstances of a fit by which its checks differ.
+/// Circumstances of a fit that decide which checks apply.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scope {
-    /// `false` where some equations of motion are known up to factors only.
+    /// `false` if the scale of some equations of motion is unknown.
     pub scaled: bool,
-    /// `true` of hits of a hammer: one that meets a machine in motion may take power out of it.
+    /// `true` for hits of a hammer: a hit on a moving machine may extract power.
     pub hits: bool,
-    /// Part of the motion that is left unexplained, where that is known.
+    /// Unexplained part of the response; `None` if it is unknown.
     pub unexplained: Option<f64>,
 }
 
-/// All findings before and after a fit, with one error rate for the statistical tests among them; `modes` are
-/// those of the estimate.
+/// Returns all findings before and after a fit, with one error rate for the statistical tests among
+/// them; `modes` are the modes of the estimate.
 pub(crate) fn rows(
     fitted: &Fitted,
     modes: &[IdentifiedMode],
@@ -100,7 +100,7 @@ pub(crate) fn rows(
         };
         add(When::After, Some(at), &checks);
     }
-    // The lines that a nonlinearity disturbs most are those of the resonances, and no disturbance.
+    // A nonlinearity disturbs the lines at the resonances most; no outside disturbance acts there.
     if all.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion(_))) {
         all.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
     }
@@ -113,7 +113,8 @@ pub(crate) fn rows(
     Ok(all.iter().map(row).collect())
 }
 
-/// Returns the motion that a fit takes for the response to unmeasured forces where nothing but its residual shows it.
+/// Returns the finding that a fit attributes the residual to unmeasured forces, which no other
+/// quantity confirms.
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);
@@ -122,7 +123,7 @@ fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding
         .map(|fraction| Finding::UnmeasuredForce(UnmeasuredForce { fraction }))
 }
 
-/// Returns the faults of each channel by itself.
+/// Returns the faults of the sensors, each channel checked separately.
 pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
     let mut findings = clipped_channels(Quantity::Force, &measured.force);
     for (kind, motion) in measured.responses() {
@@ -135,11 +136,11 @@ pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
     findings
 }
 
-/// Faults of the channels themselves, whatever is fitted to them.
+/// Returns the faults of the channels, which do not depend on the model.
 pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
     let mut findings = of_sensors(measured);
     findings.extend(kinematics(&measured.responses())?);
-    // A velocity gives the power without differentiation.
+    // A measured velocity gives the power without differentiation.
     let (motion, kind) = match &measured.velocity {
         Some(velocity) => (velocity, ResponseQuantity::Velocity),
         None => measured.response(),
@@ -148,7 +149,7 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
     Ok(findings)
 }
 
-/// Tests of a residual; none if it has too few samples.
+/// Returns the tests of a residual; none if it has too few samples.
 fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> {
     let SampleResidual { samples, fitted, force, noise_span } = residual;
     match residual.lags() {
@@ -185,7 +186,7 @@ impl CheckRow {
         self.verdict == Verdict::Bad
     }
 
-    /// The sentence, with the record it is about.
+    /// Returns the sentence of the finding, preceded by the name of its record.
     pub fn sentence(&self) -> String {
         match &self.record {
             Some(record) => format!("{record}: {}", self.text),

@@ -1,4 +1,4 @@
-//! Coherence of the records that were fitted.
+//! Coherence of the fitted records.
 
 use std::f64::consts::TAU;
 
@@ -43,13 +43,14 @@ impl ResponseCoherence {
 }
 
 impl Identified {
-    /// Returns the coherence of the responses with the forces, in the band of the fit: that of the frequency
-    /// responses fitted; of hammer tests that of all hits together; of other records that are no periods that of
-    /// their segments, of the length that [`frf`](crate::frf()) chooses. `None` of whole periods, and where there are
-    /// too few hits or segments.
+    /// Returns the coherence of the responses with the forces in the band of the fit. It is
+    /// computed from the fitted frequency responses; for hammer tests, from all hits together; for
+    /// other records that are not periodic, from segments of the length that [`frf`](crate::frf())
+    /// chooses. `None` for whole periods, and if there are too few hits or segments.
     ///
     /// # Errors
-    /// An [`AnalysisError`] if a file cannot be read again, and the errors of averages over segments.
+    /// An [`AnalysisError`] if a file cannot be read again, and the errors of averages over
+    /// segments.
     pub fn coherence(&self) -> Result<Option<ResponseCoherence>, AnalysisError> {
         if let Some(fitted) = &self.fitted.coherence {
             return Ok(Some(fitted.clone()));

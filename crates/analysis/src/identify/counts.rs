@@ -1,4 +1,4 @@
-//! Equations and memory that a fit needs, counted before any work.
+//! Number of equations and memory that a fit needs, checked before the computation.
 
 use mechid_estimate::Unknowns;
 use mechid_numerics::NumericsError;
@@ -7,7 +7,7 @@ use super::options::{Identify, Source};
 use crate::AnalysisError;
 use crate::measurement::Windowed;
 
-/// Refuses a fit with fewer equations than unknowns, and one whose spectra take too much memory.
+/// Refuses a fit with fewer equations than unknowns, and a fit whose spectra need too much memory.
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] and [`AnalysisError::Memory`].
@@ -19,7 +19,7 @@ pub(super) fn check(
 ) -> Result<(), AnalysisError> {
     let samples = |record: &Windowed| match how.source {
         Source::Segments(_) | Source::Samples(_) => record.samples(),
-        // Periods are averaged, and a line is two real equations.
+        // Periods are averaged; each line gives two real equations.
         _ if period_given => record.held.period,
         _ => record.samples(),
     };
@@ -28,7 +28,7 @@ pub(super) fn check(
         Source::Terms(fit) => fit.terms.terms.len(),
         _ => 0,
     };
-    // Each equation of motion, or one of them, has at least as many unknowns of its own.
+    // Some equation of motion has at least this number of unknowns.
     let needed = (unknowns.independent() + terms).div_euclid(unknowns.dof().max(1));
     if rows < needed {
         return Err(NumericsError::TooFewRows { rows, unknowns: needed }.into());

@@ -1,4 +1,5 @@
-//! Velocity and acceleration where only one of displacement and acceleration was measured.
+//! Velocity and acceleration by differentiation or integration if only one of displacement and
+//! acceleration was measured.
 
 use std::ops::Range;
 
@@ -10,14 +11,14 @@ use super::options::Derivatives;
 use crate::AnalysisError;
 use crate::measurement::{Block, joined};
 
-/// Samples of a fit in the time domain, completed by derivatives where something was not measured.
+/// Samples of a fit in the time domain, with derived responses for those that were not measured.
 #[derive(Debug)]
 pub struct Prepared {
     pub displacement: Record,
     pub velocity: Record,
     pub acceleration: Option<Record>,
     pub force: Record,
-    /// Whether all of these are second derivatives of the quantities they are named after.
+    /// `true` if all of these are second derivatives of the quantities that they are named after.
     pub twice_differentiated: bool,
 }
 
@@ -32,11 +33,11 @@ impl Prepared {
         }
     }
 
-    /// Returns the measured samples, completed if `derivatives` says how.
+    /// Returns the measured samples; with `derivatives`, the missing responses are derived.
     ///
     /// # Errors
     /// [`AnalysisError::TimeDomainMotions`] if a kind of response is missing,
-    /// [`AnalysisError::NothingToDerive`] if none is.
+    /// [`AnalysisError::NothingToDerive`] if none is missing.
     pub fn of(measured: &Block, derivatives: Option<Derivatives>) -> Result<Self, AnalysisError> {
         let force = &measured.force;
         let filter = derivatives.map(Derivatives::filter).transpose()?.flatten();
@@ -67,7 +68,7 @@ impl Prepared {
         }
     }
 
-    /// Returns some of the samples, counted from 0.
+    /// Returns the samples of a range, counted from 0.
     pub fn window(self, samples: Range<usize>) -> Result<Self, AnalysisError> {
         if samples == (0..self.force.len()) {
             return Ok(self);
@@ -82,7 +83,7 @@ impl Prepared {
         })
     }
 
-    /// Returns these samples followed by the first of others.
+    /// Returns these samples followed by the first sample of `others`.
     pub fn followed_by(&self, others: &Self) -> Result<Self, AnalysisError> {
         let join = |own: &Record, other: &Record| joined(own, &other.window(0, 1)?);
         let pair = self.acceleration.as_ref().zip(others.acceleration.as_ref());
@@ -95,7 +96,7 @@ impl Prepared {
         })
     }
 
-    /// Returns displacement, velocity and acceleration together, if there is an acceleration.
+    /// Returns displacement, velocity and acceleration together; `None` without an acceleration.
     pub fn response(&self) -> Result<Option<Response>, AnalysisError> {
         let Some(a) = &self.acceleration else { return Ok(None) };
         Ok(Some(Response::new(self.displacement.clone(), self.velocity.clone(), a.clone())?))

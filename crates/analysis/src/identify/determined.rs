@@ -1,4 +1,4 @@
-//! Refusal of fits by which the data determine nothing.
+//! Refusal of fits in which the data determine no parameter.
 
 use mechid_checks::Finding;
 use mechid_estimate::{Estimate, IdentifiedMode};
@@ -12,13 +12,14 @@ use super::{Identify, Source};
 use crate::AnalysisError;
 use crate::text::significant;
 
-/// Maximum number of parameters and modes that a message names.
+/// Maximum number of parameters and modes that a message lists.
 const NAMED: usize = 6;
 
-/// Refuses a fit of a linear system in which nothing else says why it is bad, and that is singular to rounding, that
-/// explains no more of the response than chance does, or in which the interval of every parameter holds zero. Several
-/// degrees of freedom may have modes all the same; with one, the response to the force is then no more than noise, and
-/// its mode is a peak of that.
+/// Refuses a fit of a linear system that is singular to rounding, that explains no more of the
+/// response than chance does, or in which the interval of every parameter contains zero, unless
+/// another finding already explains the failure. With several degrees of freedom the modes may
+/// still be determined; with one, the response is then indistinguishable from noise, and so is its
+/// mode.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].
@@ -34,7 +35,7 @@ pub(super) fn check(
     if fitted.nonlinear.is_some() || says_why {
         return Ok(());
     }
-    // Least squares, which noise biases, may explain nothing of a response that is hardly noise.
+    // Least squares is biased by noise: it may explain none of a response that is mostly signal.
     let is_biased = fitted.least_squares
         || matches!(
             &how.source,
@@ -63,7 +64,7 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Returns a remark on a fit that determines modes, but no parameter.
+/// Returns the remark on a fit that determines modes but no parameter.
 pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<String> {
     let frequencies = determined(modes);
     let is_alone = fitted.nonlinear.is_none() && is_open(&fitted.estimate);
@@ -73,7 +74,8 @@ pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<S
     })
 }
 
-/// Returns whether the interval of every parameter holds zero. As many equations as unknowns leave no interval.
+/// Returns whether the interval of every parameter contains zero; `false` if there are no degrees
+/// of freedom for an interval.
 fn is_open(estimate: &Estimate) -> bool {
     estimate.parameters().len() > 0
         && estimate.parameters().all(|p| {
@@ -84,7 +86,7 @@ fn is_open(estimate: &Estimate) -> bool {
         })
 }
 
-/// Returns natural frequencies whose intervals do not hold zero.
+/// Returns the natural frequencies whose intervals do not contain zero.
 fn determined(modes: &[IdentifiedMode]) -> Vec<String> {
     let is_determined = |mode: &&IdentifiedMode| {
         let interval = mode.natural_frequency_interval_hz(CONFIDENCE);

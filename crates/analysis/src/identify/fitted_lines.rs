@@ -1,4 +1,4 @@
-//! The lines of a fit one by one: what was measured, what was fitted, what is left.
+//! Lines of a fit: measured response, fitted response and residual.
 
 use std::f64::consts::TAU;
 
@@ -10,35 +10,37 @@ use serde::Serialize;
 
 use crate::AnalysisError;
 
-/// One line of one record, or of frequency responses one line under one of the forces.
+/// One line of one record; for frequency responses, one line under one of the forces.
 ///
-/// Complex numbers are pairs of real and imaginary part. Responses are in the quantity measured, in its SI
-/// unit, under the force stated: of frequency responses that is one newton.
+/// Complex numbers are pairs of real and imaginary part. Responses are in the SI unit of the
+/// measured quantity. The force is the measured one, for frequency responses one newton.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedLine {
     /// Frequency, in Hz.
     pub frequency_hz: f64,
     /// Force on each degree of freedom, in N.
     pub force: Vec<[f64; 2]>,
-    /// Measured response of each degree of freedom as it was fitted, in the SI unit of its quantity; of segments less
-    /// what their window blunts.
+    /// Measured response of each degree of freedom as it was fitted, in the SI unit of its
+    /// quantity; for segments, the bias of the window is subtracted.
     pub measured: Vec<[f64; 2]>,
-    /// Standard error of real and imaginary part alike of each measured response, √(E|ΔX|²/2), in its unit;
-    /// `None` where the noise is not known.
+    /// Standard error of each measured response, √(E|ΔX|²/2), equal for real and imaginary part, in
+    /// its unit; `None` if the noise is unknown.
     pub measured_standard_error: Option<Vec<f64>>,
     /// Response of the identified system to the force, of each degree of freedom, in the same unit.
     pub fitted: Vec<[f64; 2]>,
-    /// Standard error of each fitted response likewise, from that of the parameters, in its unit.
+    /// Standard error of each fitted response, propagated from the parameters, in its unit.
     pub fitted_standard_error: Vec<f64>,
     /// Measured minus fitted response of each degree of freedom, in the same unit.
     pub residual: Vec<[f64; 2]>,
 }
 
 impl FittedLine {
-    /// Computes every line of a fit; the standard errors to first order in those of the parameters.
+    /// Computes every line of a fit; standard errors are propagated from the parameters to first
+    /// order.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined, [`AnalysisError::Model`] if the
+    /// [`AnalysisError::Estimate`] if the data do not determine a parameter,
+    /// [`AnalysisError::Model`] if the
     /// system has no response at a line.
     pub(super) fn all(
         data: &FrequencyData,
@@ -55,7 +57,7 @@ impl FittedLine {
             let displacement = &receptance * &force;
             let fitted = &displacement * quantity;
             let measured = data.displacement().row(row).transpose() * quantity;
-            // dX = −H dD X for a change of the dynamic stiffness D.
+            // First-order change: dX = −H dD X for a change dD of the dynamic stiffness.
             let slopes = DMatrix::from_fn(data.dof(), parameters.len(), |response, at| {
                 let parameter = &parameters[at];
                 let change = match parameter.matrix() {

@@ -1,4 +1,4 @@
-//! Noise of the forces of a record that does not show it by its scatter.
+//! Noise of the forces of a record without repeated periods.
 
 use std::ops::Range;
 
@@ -11,18 +11,19 @@ use crate::hits::HitNoise;
 use crate::measurement::Block;
 use crate::text::significant;
 
-/// Noise over the force, in the RMS, below which it is taken for none: it moves no parameter.
+/// Smallest ratio of noise to force (RMS) that counts as noise; below it the noise changes no
+/// parameter.
 const ROUNDING: f64 = 1e-5;
 
-/// Noise of the forces of one record that a fit allows for.
+/// Noise of the forces of one record, as used by a fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ForceNoise {
-    /// Standard deviation on the samples of the force on each degree of freedom, in N; `None` where it is not
-    /// known and taken for none.
+    /// Standard deviation of the noise on the samples of each force, one per degree of freedom, in
+    /// N; `None` if it is unknown and assumed zero.
     pub levels_n: Vec<Option<f64>>,
     /// Source of the levels.
     pub source: ForceNoiseSource,
-    /// Samples of the pulse of a hit, counted from 0, which alone have the noise.
+    /// Samples of the pulse of a hit, counted from 0; only these contain the force noise.
     #[serde(skip)]
     pulse: Option<Range<usize>>,
 }
@@ -40,10 +41,11 @@ pub enum ForceNoiseSource {
 }
 
 impl ForceNoise {
-    /// Returns the noise of a record: as `stated`, otherwise that between the hits or that above the band.
+    /// Returns the noise of a record: the `stated` level if given, otherwise estimated between the
+    /// hits or above the band.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] unless one level is stated for all forces or for each.
+    /// [`AnalysisError::Setting`] unless one level is stated for all forces, or one for each.
     pub(super) fn of(
         held: &Block,
         stated: Option<&[f64]>,
@@ -89,7 +91,7 @@ impl ForceNoise {
         Ok((0..dofs).map(|dof| Some(level(dof))).collect())
     }
 
-    /// Returns the data of a record with this noise of its forces.
+    /// Returns the data of a record with this noise of its forces included.
     pub(super) fn known_to(
         &self,
         data: FrequencyData,
@@ -142,7 +144,7 @@ impl ForceNoise {
     }
 }
 
-/// RMS of a force about its mean, in N.
+/// Returns the RMS of a force about its mean, in N.
 fn rms(held: &Block, dof: usize) -> f64 {
     held.force.column(dof).variance().sqrt().max(f64::MIN_POSITIVE)
 }

@@ -1,4 +1,5 @@
-//! Settings of an identification as flat keywords: the program's options, Python's keywords and what results save.
+//! Settings of an identification as flat keywords: options of the program, keywords of Python, and
+//! fields of saved results.
 
 use mechid_io::LineSpec;
 use mechid_model::{Discretisation, Terms};
@@ -21,7 +22,7 @@ use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
 use crate::words::written;
 
-/// Keywords of an identification, all of them optional. [`Identify`] is made of those that go together.
+/// Keywords of an identification, all optional. Valid combinations convert to [`Identify`].
 ///
 /// ```
 /// use mechid_analysis::identify::{Domain, Identify, Keywords, Method};
@@ -41,7 +42,7 @@ pub struct Keywords {
     /// Estimator of the parameters from spectra.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// Noise spectrum by which maximum likelihood weighs the lines.
+    /// Noise spectrum that weights the lines in maximum likelihood.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Pooling>,
     /// Standard deviation of the noise on the samples of the force, in N.
@@ -56,10 +57,10 @@ pub struct Keywords {
     /// Frequency band to use.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::pair")]
     pub band_hz: Option<Band>,
-    /// Spectral lines to leave out.
+    /// Spectral lines to exclude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub without_lines: Option<LineSpec>,
-    /// Frequencies whose lines are left out.
+    /// Frequencies whose lines are excluded.
     #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "written::list")]
     pub without_hz: Vec<Disturbance>,
     /// Known masses.
@@ -68,7 +69,7 @@ pub struct Keywords {
     /// Form of M, C and K.
     #[serde(skip_serializing_if = "is_default", deserialize_with = "written::one")]
     pub structure: Structure,
-    /// Rule by which the records of a hammer test are cut into hits.
+    /// Rule for dividing the records of a hammer test into hits.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub hits: Option<HitRule>,
     /// Estimator of the frequency responses that are fitted.
@@ -80,13 +81,13 @@ pub struct Keywords {
     /// Nonlinear springs and dampers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<Terms>,
-    /// Terms of which those are added that the data ask for.
+    /// Candidate terms; those that improve the fit are added.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub candidates: Option<Terms>,
-    /// Criterion by which a candidate is added.
+    /// Criterion for adding a candidate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub criterion: Option<Criterion>,
-    /// Constants to search for beside the coefficients of terms.
+    /// Constants to estimate in addition to the coefficients of the terms.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub search: Vec<Constant>,
     /// Weighting of the lines of a fit with nonlinear terms.
@@ -98,10 +99,10 @@ pub struct Keywords {
     /// Channels behind a first-order high-pass.
     #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "written::list")]
     pub ac_coupling: Vec<AcCoupling>,
-    /// Derivation of what was not measured.
+    /// Derivation of the responses that were not measured.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub derivatives: Option<Derivatives>,
-    /// Steps between the samples.
+    /// Additional steps between the samples.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "written::optional")]
     pub refine: Option<Refinement>,
 }
@@ -117,19 +118,19 @@ pub enum Domain {
     Time,
 }
 
-/// Constants to search for beside the coefficients of nonlinear terms.
+/// Constants to estimate in addition to the coefficients of nonlinear terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constant {
-    /// Constants inside the laws, from the values given.
+    /// Constants inside the laws, starting from the given values.
     Laws,
     /// Delay of the force.
     Delay,
-    /// Phase that all channels have in common, as of equal filters.
+    /// Phase common to all channels, for instance from equal filters.
     Phase,
 }
 
-/// Kind of [`Source`] that keywords ask for.
+/// Kind of [`Source`] that the keywords request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Samples,
@@ -142,7 +143,7 @@ enum Kind {
 impl Kind {
     const ALL: [Self; 5] = [Self::Samples, Self::Segments, Self::Terms, Self::Hits, Self::Spectra];
 
-    /// Returns what asks for it.
+    /// Returns the setting that requests this kind.
     fn asked_by(self) -> &'static str {
         match self {
             Self::Samples => "`domain` time",
@@ -153,7 +154,7 @@ impl Kind {
         }
     }
 
-    /// Returns whether it uses a keyword that not every fit has.
+    /// Returns whether this kind uses a keyword that only some fits have.
     fn uses(self, keyword: &str) -> bool {
         const LINES: [&str; 4] = ["lines", "band_hz", "without_lines", "without_hz"];
         const SPECTRA: [&str; 6] =
@@ -183,7 +184,7 @@ fn refused(setting: &'static str, why: impl Into<String>) -> AnalysisError {
 }
 
 impl Keywords {
-    /// Returns the kind of source that is asked for.
+    /// Returns the requested kind of source.
     fn kind(&self) -> Kind {
         match self {
             Self { domain: Domain::Time, .. } => Kind::Samples,
@@ -194,7 +195,7 @@ impl Keywords {
         }
     }
 
-    /// Returns the keywords that were given, but for those that every fit uses.
+    /// Returns the keywords that were given, except those that every fit uses.
     fn given(&self) -> impl Iterator<Item = &'static str> {
         [
             ("method", self.method.is_some()),
@@ -222,7 +223,7 @@ impl Keywords {
         .filter_map(|(name, given)| given.then_some(name))
     }
 
-    /// Refuses a keyword that the kind of source does not use, and two of which one excludes the other.
+    /// Refuses a keyword that the kind of source does not use, and two that exclude each other.
     fn check(&self) -> Result<(), AnalysisError> {
         let kind = self.kind();
         if let Some(stray) = self.given().find(|name| !kind.uses(name)) {
@@ -244,7 +245,8 @@ impl Keywords {
         Ok(())
     }
 
-    /// Returns the source of spectral lines that are neither averaged nor fitted with nonlinear terms.
+    /// Returns the source for spectral lines that are neither averaged nor fitted with nonlinear
+    /// terms.
     fn spectra(self, lines: SpectralLines) -> Result<Source, AnalysisError> {
         let likelihood = match self.noise {
             Some(noise) if noise != Pooling::Automatic => Some(noise),

@@ -1,4 +1,4 @@
-//! Spectral lines that an identification leaves out.
+//! Spectral lines that an identification excludes.
 
 use std::str::FromStr;
 
@@ -10,34 +10,34 @@ use super::lines::{LineChoice, choose_lines};
 use crate::AnalysisError;
 use crate::measurement::Block;
 
-/// Lines that carry something else than the response to the force, such as run-out or mains.
+/// Lines with contributions other than the response to the force, such as run-out or mains hum.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LeftOut {
     /// Numbers of lines.
     pub lines: Option<LineSpec>,
-    /// Frequencies whose lines are left out.
+    /// Frequencies whose lines are excluded.
     pub frequencies: Vec<Disturbance>,
 }
 
-/// A frequency at which something else than the force acts, written `50`, `50:0.5` with half the width of
-/// the band around it, `24.5:multiples` or `24.5:0.3:multiples`, in Hz.
+/// A frequency at which a disturbance acts, written `50`, `50:0.5` with half the width of the band
+/// around it, `24.5:multiples` or `24.5:0.3:multiples`, in Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Disturbance {
     /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Half the width of the band around it, in Hz; `None` for the nearest lines only: one on a line, two
-    /// between lines.
+    /// Half the width of the band around it, in Hz; `None` for the nearest lines only: one if the
+    /// frequency is on a line, two if it is between lines.
     #[serde(default)]
     pub half_width_hz: Option<f64>,
-    /// Flag for its multiples being disturbed, too.
+    /// `true` if the multiples of the frequency are disturbed, too.
     #[serde(default)]
     pub multiples: bool,
 }
 
 impl Disturbance {
-    /// Creates the disturbance that a rotation at this frequency (Hz) and its multiples make.
+    /// Creates the disturbance of a rotation at this frequency (Hz) and its multiples.
     pub fn rotation(frequency_hz: f64) -> Self {
         Self { frequency_hz, half_width_hz: None, multiples: true }
     }
@@ -58,8 +58,8 @@ impl Disturbance {
         Some(Self { frequency_hz, half_width_hz, multiples })
     }
 
-    /// Returns whether it reaches a line at this frequency, in Hz, of a spectrum whose lines are
-    /// `spacing_hz` apart.
+    /// Returns whether the disturbance affects a line at this frequency (Hz) of a spectrum with
+    /// lines `spacing_hz` apart.
     pub fn reaches(&self, line_hz: f64, spacing_hz: f64) -> bool {
         let multiple = match self.multiples {
             true => (line_hz / self.frequency_hz).round().max(1.0),
@@ -67,7 +67,7 @@ impl Disturbance {
         };
         let apart = (line_hz - multiple * self.frequency_hz).abs();
         match self.half_width_hz {
-            // Of a frequency between two lines both show it.
+            // A frequency between two lines affects both.
             None => apart < spacing_hz * (1.0 - 1e-6),
             Some(half_width_hz) => apart <= half_width_hz + 1e-6 * spacing_hz,
         }
@@ -87,7 +87,7 @@ impl FromStr for Disturbance {
     }
 }
 
-/// Lines to identify from: a choice less those left out.
+/// Lines to identify from: a choice without the excluded lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LineRule<'a> {
     pub choice: &'a LineChoice,
@@ -98,8 +98,8 @@ impl LineRule<'_> {
     /// Returns the lines of a period of the force.
     ///
     /// # Errors
-    /// Those of [`choose_lines`]; [`AnalysisError::Setting`] if all of them are left out, and if a line to leave
-    /// out does not exist.
+    /// The errors of [`choose_lines`]; [`AnalysisError::Setting`] if all lines are excluded, and if
+    /// an excluded line does not exist.
     pub fn lines(&self, force: &Record, period: usize) -> Result<Vec<usize>, AnalysisError> {
         let chosen = choose_lines(force, period, self.choice)?;
         self.without.keep(chosen, force.sampling().with_len(period)?)
@@ -107,7 +107,7 @@ impl LineRule<'_> {
 }
 
 impl LeftOut {
-    /// Returns what is left of the lines of a period.
+    /// Returns the lines of a period that are not excluded.
     pub(crate) fn keep(
         &self,
         mut lines: Vec<usize>,
@@ -132,8 +132,8 @@ impl LeftOut {
     }
 }
 
-/// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
-/// cancel.
+/// Returns the lines of the fit, including lines without force: there the nonlinear forces and the
+/// response must cancel.
 pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
     let driven = rule.lines(&held.force, held.period)?;

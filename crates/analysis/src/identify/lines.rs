@@ -19,7 +19,7 @@ pub enum LineChoice {
     Driven,
     /// Driven lines within a frequency band.
     Band(Band),
-    /// Given lines, whatever the force.
+    /// Given lines, whether or not the force drives them.
     Lines(LineSpec),
 }
 
@@ -55,10 +55,10 @@ impl FromStr for Band {
     }
 }
 
-/// Returns the lines of one period of the force, of `period` samples, to identify from.
+/// Returns the lines of one period of the force (`period` samples) to identify from.
 ///
 /// # Errors
-/// [`AnalysisError::StillForce`] if there is no driven line at all, [`AnalysisError::NoExcitedLine`] and
+/// [`AnalysisError::StillForce`] if there is no driven line, [`AnalysisError::NoExcitedLine`] and
 /// [`AnalysisError::EmptyBand`] if no chosen line is driven.
 pub fn choose_lines(
     force: &Record,
@@ -91,8 +91,8 @@ pub fn choose_lines(
     Ok(chosen)
 }
 
-/// Returns how few lines of the records the forces drive, and what to do; `None` for lines that were chosen, or
-/// where there are not more.
+/// Returns a warning if the forces do not drive all lines of the records, with advice; `None` if the
+/// lines were chosen, or if the forces drive all of them.
 pub(super) fn few(records: &[Windowed], choice: &LineChoice) -> Option<String> {
     if *choice != LineChoice::Driven {
         return None;

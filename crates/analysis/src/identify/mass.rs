@@ -19,7 +19,7 @@ pub struct KnownMass {
     pub values: Vec<Option<f64>>,
 }
 
-/// Stands for an unknown mass.
+/// Text of an unknown mass.
 const UNKNOWN: &str = "unknown";
 
 impl FromStr for KnownMass {
@@ -42,8 +42,8 @@ impl FromStr for KnownMass {
 }
 
 impl KnownMass {
-    /// Returns the unknowns of a machine of `dof` degrees of freedom: damping, stiffness and the masses
-    /// that are not known. Of a diagonal the other entries are zero.
+    /// Returns the unknowns of a machine of `dof` degrees of freedom: damping, stiffness and the
+    /// masses that are not known. If a diagonal is given, the other entries are zero.
     ///
     /// # Errors
     /// [`AnalysisError::Mass`], [`AnalysisError::MassCount`].

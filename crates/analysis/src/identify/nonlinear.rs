@@ -1,4 +1,4 @@
-//! Fits of whole periods with nonlinear terms beside M, C and K.
+//! Fits of whole periods with nonlinear terms in addition to M, C and K.
 
 use mechid_checks::{Finding, NoiseSource, PValue, before_spectral_fit, steady_periods};
 use mechid_estimate::Unknowns;
@@ -27,49 +27,52 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Records or windows, at least, of which each is left out once to judge a candidate.
+/// Minimum number of records or windows for cross-validation of a candidate, each excluded once.
 const HELD_OUT_RECORDS: usize = 3;
 
-/// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) reads back.
+/// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) can read.
 #[derive(Debug, Serialize)]
 pub struct NonlinearSummary {
-    /// Terms as they are written, with the constants found inside them.
+    /// Terms as they are written, with the estimated constants inside them.
     pub terms: Terms,
     /// Coefficients, one for each term, in its unit.
     pub coefficients: Vec<f64>,
     /// Delay and phase of the channels; zero unless they were searched for.
     pub channels: ChannelPhase,
-    /// Parameters beside those of M, C and K, with their uncertainty.
+    /// Parameters that are not entries of M, C and K, with their uncertainty.
     pub parameters: Vec<TermRow>,
     /// Weighting of the lines that was used.
     pub weighting: Weighting,
-    /// Number of blocks of time whose scatter gives the standard errors; `None` if the scatter of the periods does, or
-    /// the residual was taken as white.
+    /// Number of blocks of time whose scatter gives the standard errors; `None` if the scatter of
+    /// the periods gives them, or if the residual was assumed white.
     pub blocks: Option<usize>,
-    /// Number of periods whose scatter gives the standard errors; `None` if another does.
+    /// Number of periods whose scatter gives the standard errors; `None` otherwise.
     pub periods: Option<usize>,
-    /// Evidence against a linear system in the first record, before any model; `None` of open records.
+    /// Evidence against a linear system in the first record, before any model; `None` for open
+    /// records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionRow>,
-    /// Growth of each term, constant forces apart, beyond the data.
+    /// Growth of each term beyond the amplitudes of the data; constant forces are omitted.
     pub extrapolation: Vec<ExtrapolationRow>,
-    /// Selection of terms; `None` where there were no candidates.
+    /// Selection of terms; `None` without candidates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub selection: Option<SelectionSummary>,
 }
 
-/// Restoring force in the equation of motion of a term, at the edge of the data and 1.5 times as far.
+/// Restoring force in the equation of motion of a term, at the largest amplitude of the data and at
+/// 1.5 times this amplitude.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExtrapolationRow {
     /// Name of the term.
     pub term: String,
-    /// Power with which its force grows there, a pure number.
+    /// Exponent of the growth of its force at the largest amplitude, a pure number.
     pub order: f64,
-    /// Part of the restoring force that the term makes, at the two places; ratios.
+    /// Part of the restoring force that the term contributes, at the two amplitudes; ratios.
     pub share: [f64; 2],
-    /// Standard error of the restoring force over the restoring force, at the two places; ratios.
+    /// Standard error of the restoring force over the restoring force, at the two amplitudes;
+    /// ratios.
     pub relative_error: [f64; 2],
-    /// `true` if predictions beyond the data are not to be relied on.
+    /// `true` if predictions beyond the data are unreliable.
     pub poor: bool,
 }
 
@@ -80,7 +83,7 @@ impl ExtrapolationRow {
         Self { term, order, share, relative_error, poor }
     }
 
-    /// Returns what speaks against extrapolation, in a sentence; `None` if nothing does.
+    /// Returns the reason against extrapolation, in a sentence; `None` if there is none.
     pub(super) fn doubt(&self) -> Option<String> {
         let percent = |ratio: f64| format!("{} %", significant(100.0 * ratio, 2));
         let [near, far] = self.share.map(percent);
@@ -96,36 +99,36 @@ impl ExtrapolationRow {
     }
 }
 
-/// One parameter beside those of M, C and K.
+/// One parameter that is not an entry of M, C or K.
 #[derive(Debug, Serialize)]
 pub struct TermRow {
     /// Name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or `p5`.
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Largest displacement (m) and velocity (m/s) of a term's coordinate in the data; `None` for
-    /// what is no coefficient of a term.
+    /// Largest displacement (m) and velocity (m/s) of a term's coordinate in the data; `None` if
+    /// the parameter is not the coefficient of a term.
     pub largest: Option<[f64; 2]>,
     /// Estimate with its uncertainty.
     #[serde(flatten)]
     pub estimate: Uncertain,
 }
 
-/// Levels of distortion, and the kind of term that a linear model lacks most.
+/// Levels of distortion, and the kind of term whose absence costs a linear model most.
 #[derive(Debug, Serialize)]
 pub struct DistortionRow {
-    /// Level on even lines, where odd ones alone are driven.
+    /// Level on even lines; `None` unless only odd lines are driven.
     pub even: Option<Level>,
-    /// Level on odd lines that are not driven.
+    /// Level on odd lines without excitation.
     pub odd: Option<Level>,
-    /// Part of the force that a linear model leaves on the lines (pure number).
+    /// Part of the force that a linear model does not explain on the lines (pure number).
     pub linear_leaves: f64,
     /// The finding, in a sentence.
     pub text: String,
 }
 
-/// Fits records with nonlinear terms: whole periods by least squares on the equation of motion, or from there by output
-/// error; open ones by output error from a linear fit on.
+/// Fits records with nonlinear terms. Whole periods: least squares on the equation of motion,
+/// optionally followed by output error. Open records: output error, started from a linear fit.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -169,7 +172,8 @@ fn fitted(
         None => Vec::new(),
     };
     let misfit = estimated.misfit();
-    // Noise on the force colours what the mean period leaves: the scatter of the periods knows it.
+    // Noise on the force colours the residual of the mean period; the scatter of the periods
+    // already includes it.
     let residuals = match misfit {
         Some(_) => Vec::new(),
         None => steady_residuals(records, &model)?,
@@ -197,7 +201,7 @@ fn fitted(
     })
 }
 
-/// Returns the name of an estimator, and the records that it simulates.
+/// Returns the name of an estimator and the records that it simulates.
 fn stepped(
     records: &[Windowed],
     estimator: TermEstimator,
@@ -225,8 +229,8 @@ fn remarks(first: &Block, estimated: &NonlinearEstimate) -> Vec<String> {
     remarks
 }
 
-/// Returns the findings on the periods of each record, and their mean spectra on the lines that the force drives, of all
-/// records together.
+/// Returns the findings on the periods of each record, and the mean spectra of all records on the
+/// lines that the force drives.
 fn driven_spectra(
     records: &[Windowed],
     band: &Lines,
@@ -248,7 +252,7 @@ fn driven_spectra(
     Ok((findings, spectra))
 }
 
-/// Chooses among the candidates; `None` where there are none.
+/// Selects terms from the candidates; `None` without candidates.
 fn select(
     data: &SteadyExperiments,
     unknowns: &Unknowns,
@@ -268,8 +272,8 @@ fn select(
     Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
 }
 
-/// Returns, record by record, the part of the response that the steady state under the measured force leaves, means
-/// apart.
+/// Returns, record by record, the residual of the steady state under the measured force, without
+/// its mean.
 fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>, AnalysisError> {
     let mut residuals = Vec::new();
     for Windowed { held, .. } in records {
@@ -292,8 +296,8 @@ fn whole_periods(held: &Block) -> Result<SteppedRecord, AnalysisError> {
     Ok(SteppedRecord { force, response, extent: Extent::WholePeriod, periods })
 }
 
-/// Estimates the terms, by output error on `stepped` records where there are any, and removes candidates that turn out
-/// to be uncertain: least squares, by which they were chosen, is biased by noise on the response.
+/// Estimates the terms, by output error if `stepped` has records, and removes uncertain candidates:
+/// the least squares that selected them is biased by noise on the response.
 fn estimated(
     data: &SteadyExperiments,
     unknowns: &Unknowns,
@@ -308,7 +312,7 @@ fn estimated(
         let estimate = match stepped {
             [] => start,
             _ => {
-                // A constant inside a law may be far from the one given.
+                // A constant inside a law may differ much from its given value.
                 let shape = ShapeConstants { laws: true, ..how.search };
                 let has_constants = |term: &Term| !term.law().constants().is_empty();
                 let is_open = !how.search.laws && terms.iter().any(has_constants);
@@ -329,7 +333,7 @@ fn estimated(
     }
 }
 
-/// The residual against the noise of the periods, as a check.
+/// Returns the check of the residual against the noise of the periods.
 fn finding(misfit: mechid_nonlinear::Misfit) -> Finding {
     Finding::Misfit(mechid_checks::Misfit {
         ratio: misfit.ratio,
@@ -375,7 +379,8 @@ impl NonlinearSummary {
         })
     }
 
-    /// Returns the findings before the fit and the amplitudes that hold the terms, a sentence each.
+    /// Returns the findings before the fit and the amplitudes of the data within which the terms
+    /// are valid, a sentence each.
     pub(super) fn text(&self) -> String {
         let before = self.distortion.as_ref();
         let mut text =

@@ -1,4 +1,4 @@
-//! Fits of open records, such as sweeps, with nonlinear terms beside M, C and K.
+//! Fits of open records, such as sweeps, with nonlinear terms in addition to M, C and K.
 
 use mechid_checks::{Verdict, steady_periods};
 use mechid_estimate::Unknowns;
@@ -16,8 +16,8 @@ use super::remarks::one_motion_of;
 use crate::AnalysisError;
 use crate::measurement::Windowed;
 
-/// Fits the samples of open records by output error. The search starts from the linear fit of the lines that the forces
-/// drive, or that `how` chooses.
+/// Fits the samples of open records by output error. The search starts from the linear fit of the
+/// driven lines, or of the lines that `how` chooses.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -78,7 +78,7 @@ pub(super) fn fit(
 }
 
 impl Fitted {
-    /// The same with nonlinear terms that were found in open records.
+    /// Returns the fit with nonlinear terms estimated from open records.
     fn with_terms(mut self, estimate: NonlinearEstimate) -> Self {
         self.nonlinear =
             Some(WithTerms { estimate, distortion: None, restoring: None, selection: None });
@@ -86,7 +86,7 @@ impl Fitted {
     }
 }
 
-/// Returns, record by record, the part of the response that the simulated one leaves.
+/// Returns, record by record, the residual of the simulated response.
 fn residuals(
     records: &[Windowed],
     estimate: &NonlinearEstimate,
@@ -111,7 +111,7 @@ fn residuals(
     Ok(residuals)
 }
 
-/// Returns why windows that are not said to be periods cannot be taken for such.
+/// Returns the reason why windows whose extent is not given cannot be treated as periods.
 pub(super) fn no_period(records: &[Windowed]) -> Result<Option<AnalysisError>, AnalysisError> {
     for Windowed { held, .. } in records {
         let looked = steady_periods(&held.force, held.response().0, held.period)?;

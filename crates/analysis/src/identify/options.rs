@@ -22,8 +22,8 @@ use crate::words;
 
 /// Settings of an identification: what is fitted and how, and what is known of the machine.
 ///
-/// Settings that cannot go together cannot be written. They are saved as the flat [`Keywords`] of the program
-/// and of Python.
+/// Invalid combinations of settings cannot be expressed. Settings are saved as the flat
+/// [`Keywords`] of the program and of Python.
 ///
 /// ```
 /// use mechid_analysis::{Identify, identify::Method};
@@ -41,22 +41,24 @@ pub struct Identify {
     pub source: Source,
     /// Known masses.
     pub mass: KnownMass,
-    /// Form of M, C and K, such as that of a chain.
+    /// Form of M, C and K, for instance a chain.
     pub structure: Structure,
 }
 
 /// Data that are fitted, and the estimator.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
-    /// Spectral lines of windows that are periods or have ends that show: the record tells which.
+    /// Spectral lines of windows; the record decides whether they are periods or their transients
+    /// are estimated.
     Spectra(SpectralFit),
     /// Spectral lines of whole periods.
     Periods(PeriodFit),
-    /// Spectral lines of open records, by maximum likelihood: the loads of their ends are found with the machine.
+    /// Spectral lines of open records, by maximum likelihood: the transients are estimated together
+    /// with the system.
     Open(OpenFit),
-    /// Hits of a hammer, each an open record of its own.
+    /// Hits of a hammer, each a separate open record.
     Hits(HitFit),
-    /// Whole periods or open records, with nonlinear springs and dampers beside M, C and K.
+    /// Whole periods or open records, with nonlinear springs and dampers in addition to M, C and K.
     Terms(TermFit),
     /// Frequency responses, averaged over segments.
     Segments(SegmentFit),
@@ -70,11 +72,11 @@ impl Default for Source {
     }
 }
 
-/// Fit of spectral lines for which the record tells whether they are those of a period.
+/// Fit of spectral lines for which the record decides whether the windows are periods.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SpectralFit {
-    /// Noise spectrum of maximum likelihood; `None`: maximum likelihood where two periods or more show the noise
-    /// or it biases least squares, otherwise least squares.
+    /// Noise spectrum of maximum likelihood; `None`: maximum likelihood if at least two periods
+    /// determine the noise or it biases least squares, otherwise least squares.
     pub likelihood: Option<Pooling>,
     /// Spectral lines.
     pub lines: SpectralLines,
@@ -83,8 +85,8 @@ pub struct SpectralFit {
 /// Fit of the spectral lines of whole periods.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PeriodFit {
-    /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least
-    /// squares, otherwise least squares.
+    /// Estimator; `None`: maximum likelihood if at least two periods determine the noise or it
+    /// biases least squares, otherwise least squares.
     pub estimator: Option<PeriodEstimator>,
     /// Spectral lines.
     pub lines: SpectralLines,
@@ -95,21 +97,21 @@ pub struct PeriodFit {
 pub enum PeriodEstimator {
     /// Least squares on the equation of motion; biased by noise on the response.
     LeastSquares,
-    /// Instrumental variables, one half of the periods against the other; not biased.
+    /// Instrumental variables from the two halves of the periods; not biased.
     Instrumental,
-    /// Maximum likelihood on the response, not biased, of least scatter; weighted by a noise spectrum from the
-    /// scatter of the periods or, of one period, from the residual.
+    /// Maximum likelihood on the response, not biased, with the smallest scatter; weighted by a
+    /// noise spectrum from the scatter of the periods or, with one period, from the residual.
     MaximumLikelihood(Pooling),
 }
 
 /// Fit of the spectral lines of open records.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OpenFit {
-    /// Noise by which the lines are weighted.
+    /// Noise that weights the lines.
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
-    /// Traces of the acquisition in the records.
+    /// Properties of the acquisition of the records.
     pub acquisition: Acquisition,
 }
 
@@ -118,22 +120,22 @@ pub struct OpenFit {
 pub struct OpenNoise {
     /// Spectrum of the noise on the response, from the residual.
     pub response: Pooling,
-    /// Standard deviation of the white noise on the samples of the force, in N: one level for all forces, or one
-    /// for each degree of freedom. `None`: of records that above the band that the force drives, of hits that
-    /// between them.
+    /// Standard deviation of the white noise on the samples of the force, in N: one level for all
+    /// forces, or one for each degree of freedom. `None`: estimated above the band that the force
+    /// drives, for hits between the hits.
     pub force: Option<Vec<f64>>,
 }
 
 /// Fit of the hits of a hammer.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HitFit {
-    /// Rule by which the records are cut into hits.
+    /// Rule for dividing the records into hits.
     pub rule: HitRule,
-    /// Noise by which the lines are weighted.
+    /// Noise that weights the lines.
     pub noise: OpenNoise,
     /// Spectral lines.
     pub lines: SpectralLines,
-    /// Traces of the acquisition in the records.
+    /// Properties of the acquisition of the records.
     pub acquisition: Acquisition,
 }
 
@@ -142,11 +144,11 @@ pub struct HitFit {
 pub struct TermFit {
     /// Springs and dampers.
     pub terms: Nonlinear,
-    /// Estimator from whole periods; open records take output error.
+    /// Estimator for whole periods; open records use output error.
     pub estimator: TermEstimator,
-    /// Extent of the windows; `None`: periods, which they must look like if none is given.
+    /// Extent of the windows; `None`: periods, refused unless the record shows them.
     pub extent: Option<Extent>,
-    /// Spectral lines; of open records those of the linear fit from which the search starts.
+    /// Spectral lines; for open records, the lines of the linear fit that starts the search.
     pub lines: SpectralLines,
 }
 
@@ -156,7 +158,7 @@ pub enum TermEstimator {
     /// Least squares on the equation of motion.
     #[default]
     EquationError,
-    /// Least squares on the simulated response, from the solution of the former on.
+    /// Least squares on the simulated response, started from the solution of the equation error.
     OutputError,
 }
 
@@ -165,7 +167,7 @@ pub enum TermEstimator {
 pub struct SpectralLines {
     /// Lines to use.
     pub choice: LineChoice,
-    /// Lines to leave out of these.
+    /// Lines to exclude from these.
     pub without: LeftOut,
 }
 
@@ -181,14 +183,14 @@ impl SpectralLines {
 pub enum Method {
     /// Least squares on the equation of motion; biased by noise on the response.
     LeastSquares,
-    /// Instrumental variables, one half of the periods against the other; not biased.
+    /// Instrumental variables from the two halves of the periods; not biased.
     Instrumental,
     /// Maximum likelihood on the response, weighted by the noise estimated from the periods; not
-    /// biased, of least scatter.
+    /// biased, with the smallest scatter.
     MaximumLikelihood,
 }
 
-/// Nonlinear springs and dampers to identify beside M, C and K.
+/// Nonlinear springs and dampers to identify in addition to M, C and K.
 ///
 /// ```
 /// use mechid_analysis::identify::Nonlinear;
@@ -202,12 +204,12 @@ pub enum Method {
 pub struct Nonlinear {
     /// Terms as they are written, such as `k3: x1^3, c2: |v1| v1`.
     pub terms: Terms,
-    /// Terms of which those are added that the data ask for; none by default.
+    /// Candidate terms; those that improve the fit are added; none by default.
     #[serde(skip_serializing_if = "Terms::is_empty")]
     pub candidates: Terms,
-    /// Criterion by which a candidate is added.
+    /// Criterion for adding a candidate.
     pub criterion: Criterion,
-    /// Constants that do not enter linearly, to search for; none by default.
+    /// Constants that enter nonlinearly and are to be estimated; none by default.
     pub search: ShapeConstants,
     /// Weighting of the lines.
     pub weighting: Weighting,
@@ -244,11 +246,11 @@ pub struct SampleFit {
     pub extent: Option<Extent>,
     /// Derivation of the velocity and acceleration that were not measured.
     pub derivatives: Option<Derivatives>,
-    /// Steps between the samples.
+    /// Additional steps between the samples.
     pub refine: Option<Refinement>,
 }
 
-/// Additional steps in every sampling interval, which make the error of a [`Discretisation`] smaller.
+/// Additional steps in every sampling interval, which reduce the error of a [`Discretisation`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
@@ -295,7 +297,7 @@ impl Between {
     }
 }
 
-/// Derivation of the kinds of response that were not measured.
+/// Derivation of the responses that were not measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Derivatives {
@@ -311,10 +313,10 @@ pub enum Derivatives {
 }
 
 impl Derivatives {
-    /// Returns the sliding polynomial, if it is one.
+    /// Returns the sliding polynomial; `None` for the spectral derivation.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if window and order do not make one.
+    /// [`AnalysisError::Setting`] if window and order are inconsistent.
     pub(crate) fn filter(self) -> Result<Option<SavitzkyGolay>, AnalysisError> {
         let Self::SavitzkyGolay { window, order } = self else { return Ok(None) };
         let wrong = |why: String| AnalysisError::Setting { setting: "derivatives", why };
@@ -374,8 +376,8 @@ impl fmt::Display for Derivatives {
 }
 
 impl Identify {
-    /// Fits spectral lines by this method: of windows that are periods or open for maximum likelihood, of whole
-    /// periods for the others.
+    /// Fits spectral lines by this method: maximum likelihood for periodic or open windows, the
+    /// others for whole periods.
     pub fn spectra(method: Method) -> Self {
         let lines = SpectralLines::default();
         let periods = |estimator| {
@@ -401,12 +403,13 @@ impl Identify {
         Self::from(Source::Samples(SampleFit::default()))
     }
 
-    /// Cuts the records of a hammer test into hits, and fits each as a record of its own.
+    /// Divides the records of a hammer test into hits, and fits each as a separate record.
     pub fn hits(rule: HitRule) -> Self {
         Self::from(Source::Hits(HitFit { rule, ..HitFit::default() }))
     }
 
-    /// Fits nonlinear springs and dampers beside M, C and K by least squares on the equation of motion.
+    /// Fits nonlinear springs and dampers in addition to M, C and K by least squares on the
+    /// equation of motion.
     pub fn nonlinear(terms: Nonlinear) -> Self {
         Self::from(Source::Terms(TermFit { terms, ..TermFit::default() }))
     }
@@ -420,7 +423,8 @@ impl Identify {
         self
     }
 
-    /// Leaves out the lines that carry something else than the response to the force; samples in time have none.
+    /// Excludes lines with contributions other than the response to the force; samples in time have
+    /// none.
     #[must_use]
     pub fn without(mut self, without: LeftOut) -> Self {
         if let Some(lines) = self.source.lines_mut() {

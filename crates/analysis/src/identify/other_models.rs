@@ -1,4 +1,5 @@
-//! Models that may explain tables of frequency responses better than viscous damping, no delay and the stated quantity.
+//! Alternative models for tables of frequency responses: delay, structural damping, another
+//! quantity, levels in dB.
 
 use mechid_checks::{
     Alternative, Cause, Finding, ModelledResponses, better_model, delay_of_responses,
@@ -14,17 +15,18 @@ use super::response_settings::IdentifyResponses;
 use super::tables::joined;
 use super::tabulated::Tabulated;
 
-/// Rounds of a delay and a fit with it.
+/// Maximum number of alternations between a delay and a fit with it.
 const DELAY_ROUNDS: usize = 2;
 
 /// Decibels per unit of the natural logarithm of a magnitude.
 const DECIBELS: f64 = 20.0 / std::f64::consts::LN_10;
 
-/// Largest level, in dB, that a magnitude read from a file may stand for.
+/// Largest level, in dB, that is converted to a magnitude; a larger number is not a level.
 const MAX_LEVEL: f64 = 400.0;
 
-/// Returns the model that explains the responses of tables far better than an `estimate` on their `data`, if there is one:
-/// with a delay, with structural damping, of another quantity, or of magnitudes that are levels.
+/// Returns the model that explains the responses of tables far better than an `estimate` from their
+/// `data`, if there is one: with a delay, with structural damping, of another quantity, or of
+/// magnitudes given as levels.
 pub(super) fn better_model_of(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -63,7 +65,7 @@ pub(super) fn better_model_of(
     Some(Finding::Alternative(Alternative { cause: causes.swap_remove(best), remaining }))
 }
 
-/// Displacements in the quantity measured.
+/// Converts displacements to the measured quantity.
 fn in_measured_quantity(
     data: &FrequencyData,
     displacement: &DMatrix<Complex<f64>>,
@@ -74,7 +76,7 @@ fn in_measured_quantity(
     })
 }
 
-/// Returns the responses of some data and those of an estimate to the forces of others.
+/// Returns the measured responses, and the responses of an estimate to the forces of other data.
 fn modelled(
     data: &FrequencyData,
     forces: &FrequencyData,
@@ -94,7 +96,8 @@ fn modelled(
     })
 }
 
-/// Standard deviation of the noise of each response in the quantity measured; `None` where it is not known, or zero.
+/// Returns the standard deviation of the noise of each response in the measured quantity; `None` if
+/// it is unknown or zero.
 fn deviation(data: &FrequencyData) -> Option<DMatrix<f64>> {
     let noise = data.noise()?;
     let deviation = DMatrix::from_fn(data.len(), data.dof(), |row, channel| {
@@ -104,7 +107,7 @@ fn deviation(data: &FrequencyData) -> Option<DMatrix<f64>> {
     deviation.iter().all(|deviation| *deviation > 0.0).then_some(deviation)
 }
 
-/// Returns the delay that fits best, in s, and the responses with it.
+/// Returns the delay of the best fit, in s, and the responses with it.
 fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, ModelledResponses)> {
     let (mut fit, mut seconds) = (estimate.clone(), 0.0);
     for _ in 0..DELAY_ROUNDS {
@@ -115,7 +118,7 @@ fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, ModelledRe
     Some((seconds, modelled(data, &data.with_later_force(seconds), &fit)?))
 }
 
-/// Returns the responses of a fit to tables whose numbers are others of a quantity.
+/// Returns the responses of a fit to tables whose numbers are reinterpreted as another quantity.
 fn refitted(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -138,7 +141,7 @@ fn refitted(
     modelled(&data, &data, &fit.estimate)
 }
 
-/// Returns the responses of a fit to tables whose magnitudes are levels of one sign in dB.
+/// Returns the responses of a fit to tables whose magnitudes are levels in dB with the given sign.
 fn of_levels(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -156,7 +159,7 @@ fn of_levels(
         table
     };
     let tables: Vec<FrequencyResponses> = tables.iter().map(without_noise).collect();
-    // The phase of a negative level that was read as a magnitude is turned by half a circle.
+    // A negative level that was read as a magnitude has its phase shifted by π.
     let magnitude = |z: Complex<f64>| z * (sign * (sign * z.norm() / DECIBELS).exp() / z.norm());
     let model = refitted(&tables, how, quantity, estimate, &magnitude)?;
     let log_area = |z: &Complex<f64>| {

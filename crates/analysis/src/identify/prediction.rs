@@ -12,7 +12,7 @@ use nalgebra::{Complex, DVector};
 use crate::AnalysisError;
 use crate::measurement::Block;
 
-/// Kind of prediction of a record, in keeping with how the machine was identified.
+/// Kind of prediction of a record, consistent with the fit that identified the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Prediction {
     /// Steady state under whole periods of a band-limited force, means subtracted.
@@ -35,7 +35,7 @@ pub enum Model {
     Nonlinear {
         /// The system.
         system: NonlinearSystem,
-        /// Delay and phase that the channels add.
+        /// Delay and phase of the channels.
         channels: ChannelPhase,
     },
 }
@@ -64,8 +64,8 @@ pub struct Compared {
 }
 
 impl Prediction {
-    /// Returns every response measured, as far as it is held, beside the one predicted. An open record
-    /// starts from the state that fits it best.
+    /// Returns the measured responses with the predicted ones, for the buffered part of the record.
+    /// An open record starts from the state that fits it best.
     pub(crate) fn predict(
         self,
         model: &Model,
@@ -80,7 +80,7 @@ impl Prediction {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             let names = names(kind, measured.channels());
             match self {
-                // Transducers have offsets, and a spectrum's mean was not fitted.
+                // Transducers have offsets, and the fit of a spectrum excludes its mean.
                 Prediction::Steady => Compared {
                     kind,
                     names,
@@ -106,7 +106,7 @@ impl Prediction {
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
         match self {
             Prediction::Steady => predict_periodic(system, force),
-            // Nor does the beginning of a long period return to itself.
+            // The first part of a long period does not close on itself either.
             Prediction::Sampled { discretisation, extent }
                 if extent == Extent::Open || measured.held_to().is_some() =>
             {
@@ -120,9 +120,9 @@ impl Prediction {
     }
 }
 
-/// Returns the steady state of a nonlinear system under the mean period of the measured force, as the
-/// channels show it, repeated for every period held. Of several steady states it is the one nearest to
-/// the measured response.
+/// Returns the steady state of a nonlinear system under the mean period of the measured force, as
+/// the channels record it, repeated for every buffered period. Of several steady states it is the
+/// one nearest to the measured response.
 pub(crate) fn steady_state(
     system: &NonlinearSystem,
     channels: ChannelPhase,
@@ -137,7 +137,8 @@ pub(crate) fn steady_state(
     shown(&steady, channels, measured.force.len() / period)
 }
 
-/// Returns the response of a nonlinear system to the measured force of an open record, from the start that fits it best.
+/// Returns the response of a nonlinear system to the measured force of an open record, from the
+/// best-fitting initial state.
 fn from_fitted_start(
     system: &NonlinearSystem,
     measured: &Block,
@@ -147,7 +148,7 @@ fn from_fitted_start(
     nonlinear::predict(system, force, Extent::Open, &start)
 }
 
-/// A response as the channels show it, over a number of periods.
+/// Returns a response as the channels record it, over a number of periods.
 pub(crate) fn shown(
     response: &Response,
     phase: ChannelPhase,

@@ -1,10 +1,11 @@
-//! Remarks that several kinds of fit make.
+//! Remarks common to several kinds of fit.
 
 use mechid_spectra::NoiseModel;
 
 use crate::measurement::Block;
 
-/// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
+/// Returns the remark on weights from the scatter of `periods` periods; `shows` states whether the
+/// scatter shows the noise.
 pub(super) fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
     let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
     distinct.dedup();

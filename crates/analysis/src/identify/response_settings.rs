@@ -22,7 +22,7 @@ pub struct IdentifyResponses {
     pub band: Option<Band>,
     /// Known masses.
     pub mass: KnownMass,
-    /// Form of M, C and K, such as that of a chain.
+    /// Form of M, C and K, for instance a chain.
     #[serde(skip_serializing_if = "Structure::is_empty")]
     pub structure: Structure,
     /// Estimator; `None`: maximum likelihood.

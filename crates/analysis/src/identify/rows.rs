@@ -1,4 +1,4 @@
-//! Rows of the tables that a result is made of: samples and lines used, parameters, modes.
+//! Rows of the tables of a result: samples and lines used, parameters, modes.
 
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns};
 use mechid_io::ParameterCovariance;
@@ -48,9 +48,9 @@ pub struct LinesUsed {
 pub struct Uncertain {
     /// Value, in its unit.
     pub value: f64,
-    /// Standard error, in the same unit; `None` for a value that is known.
+    /// Standard error, in the same unit; `None` for a known value.
     pub standard_error: Option<f64>,
-    /// Confidence interval, in the same unit; `None` for a value that is known.
+    /// Confidence interval, in the same unit; `None` for a known value.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -61,13 +61,13 @@ pub struct ParameterRow {
     pub name: String,
     /// Matrix of the parameter: mass, damping or stiffness.
     pub matrix: String,
-    /// Counted from 1.
+    /// Row, counted from 1.
     pub row: usize,
-    /// Counted from 1.
+    /// Column, counted from 1.
     pub column: usize,
     /// SI unit.
     pub unit: &'static str,
-    /// `true` if it was given, not estimated.
+    /// `true` if it was given rather than estimated.
     pub known: bool,
     #[serde(flatten)]
     /// Estimate with its uncertainty.
@@ -88,18 +88,19 @@ pub struct ProportionalDamping {
 pub struct ModeRow {
     /// `true` if the mode is underdamped.
     pub oscillates: bool,
-    /// `true` for a motion without restoring force: zero lies in the interval of its natural frequency.
+    /// `true` for a mode without restoring force: the interval of its natural frequency contains
+    /// zero.
     pub is_rigid_body: bool,
-    /// Natural frequency, in Hz; of an overdamped pair that of both.
+    /// Natural frequency, in Hz; for an overdamped pair, the one of the pair.
     pub natural_frequency_hz: Uncertain,
     /// Damped frequency, in Hz.
     pub damped_frequency_hz: Uncertain,
-    /// Damping ratio, a pure number; of an overdamped pair that of both, above 1.
+    /// Damping ratio, a pure number; for an overdamped pair, the one of the pair, above 1.
     pub damping_ratio: Uncertain,
     /// Eigenvalue of a mode that does not oscillate, in 1/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pole: Option<Uncertain>,
-    /// Number, from 1, of the other mode of an overdamped pair.
+    /// Number of the other mode of an overdamped pair, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub partner: Option<usize>,
     /// Rate at which the free response of an unstable mode grows, in 1/s.
@@ -108,7 +109,7 @@ pub struct ModeRow {
 }
 
 impl WindowRow {
-    /// The samples of a measurement.
+    /// Creates the row of the samples of a measurement.
     pub(crate) fn of(measured: &Block) -> Self {
         Self {
             first_sample: measured.first_sample,
@@ -121,22 +122,22 @@ impl WindowRow {
 }
 
 impl ModeRow {
-    /// Returns frequencies and damping of the modes of an identified system, or of one that is exactly
-    /// `known`.
+    /// Returns frequencies and damping of the modes of an identified system, or of an exactly
+    /// `known` one.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
         let rounding = EIGENVALUE_ROUNDING * largest;
         modes.iter().map(|mode| Self::of(mode, known, rounding)).collect()
     }
 
-    /// Growth rates up to `rounding` (1/s) are those of rounding.
+    /// Creates the row of a mode; growth rates up to `rounding` (1/s) count as rounding errors.
     fn of(mode: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
         let uncertain = |value: &mechid_numerics::Uncertain| match known {
             true => Ok(Uncertain::known(value.value)),
             false => Uncertain::of(value),
         };
         let grows = !mode.is_rigid_body && mode.growth_rate.value > rounding;
-        // Real eigenvalues of opposite sign have no natural frequency in common.
+        // Two real eigenvalues of opposite sign have no common natural frequency.
         let shared = mode.is_rigid_body || mode.squared_frequency.value > 0.0;
         let rate = uncertain(&mode.growth_rate)?;
         let frequency = &mode.natural_frequency_hz;
@@ -158,13 +159,15 @@ impl ModeRow {
         })
     }
 
-    /// Returns whether the mode at an index, from 0, belongs to a pair that an earlier one begins.
+    /// Returns whether the mode at an index, counted from 0, belongs to a pair that an earlier mode
+    /// already reports.
     pub(super) fn is_told_before(&self, at: usize) -> bool {
         self.partner.is_some_and(|number| number <= at)
     }
 
-    /// Returns what there is to tell of modes, with name and unit: natural frequency, damped frequency if
-    /// asked for, damping ratio; the poles of those that do not oscillate, of an overdamped pair together.
+    /// Returns the quantities of modes, with name and unit: natural frequency, damped frequency if
+    /// `damped`, damping ratio, and the poles of those that do not oscillate; an overdamped pair is
+    /// reported once.
     pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
         let mut all = Vec::new();
         for (at, mode) in modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at)) {
@@ -182,7 +185,7 @@ impl ModeRow {
                 add("rigid-body mode, frequency", mode.natural_frequency_hz, "Hz");
             } else if mode.oscillates || mode.partner.is_some() {
                 add("natural frequency", mode.natural_frequency_hz, "Hz");
-                // A mode that does not oscillate has no damped frequency to speak of.
+                // A mode that does not oscillate has no damped frequency.
                 if damped && mode.oscillates {
                     add("damped frequency", mode.damped_frequency_hz, "Hz");
                 }
@@ -194,7 +197,7 @@ impl ModeRow {
 }
 
 impl LinesUsed {
-    /// The first, the last and the number of the lines used.
+    /// Creates the row of the lines used: the first, the last and their number.
     pub(crate) fn of(used: &mechid_spectra::Lines) -> Self {
         let (lines, spacing_hz) = (used.as_slice(), used.sampling().line_spacing_hz());
         let first = lines.iter().copied().min().unwrap_or(0);
@@ -205,12 +208,12 @@ impl LinesUsed {
 }
 
 impl Uncertain {
-    /// Returns a value that was estimated.
+    /// Creates an estimated value.
     pub(crate) fn new(value: f64, standard_error: f64, interval: [f64; 2]) -> Self {
         Self { value, standard_error: Some(standard_error), interval: Some(interval) }
     }
 
-    /// Returns a value derived from the estimate.
+    /// Creates a value derived from the estimate.
     pub(crate) fn of(uncertain: &mechid_numerics::Uncertain) -> Result<Self, AnalysisError> {
         Ok(Self::new(uncertain.value, uncertain.standard_error, uncertain.interval(CONFIDENCE)?))
     }
@@ -224,12 +227,12 @@ impl Uncertain {
         }
     }
 
-    /// Returns a value that was given.
+    /// Creates a given value.
     pub(crate) fn known(value: f64) -> Self {
         Self { value, standard_error: None, interval: None }
     }
 
-    /// Value, standard error and interval; the error tells how many digits the value deserves.
+    /// Returns value, standard error and interval; the standard error decides the number of digits.
     pub fn cells(&self) -> [String; 3] {
         let (Some(error), Some([low, high])) = (self.standard_error, self.interval) else {
             return [significant(self.value, 6), "known".into(), String::new()];
@@ -243,20 +246,21 @@ impl Uncertain {
     }
 }
 
-/// Significant digits of `value` down to the second of its standard error, 3 to 12.
+/// Returns the number of significant digits of `value` down to the second of its standard error, 3
+/// to 12.
 fn digits(value: f64, error: f64) -> usize {
     let ratio = (value.abs() / error).log10();
     if ratio.is_finite() { (ratio.floor() as i32 + 3).clamp(3, 12) as usize } else { 6 }
 }
 
-/// Returns the entries of M, C and K, but for those of equations without scale.
+/// Returns the entries of M, C and K; equations without scale are omitted.
 pub(super) fn parameters(
     estimate: &Estimate,
     unscaled: Option<&Unscaled>,
 ) -> Result<Vec<ParameterRow>, AnalysisError> {
     let mut rows = Vec::new();
     let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
-    // Both in the order of `Unknowns::free`.
+    // The order of both sequences is that given by `Unknowns::free`.
     let mut estimated = estimate.parameters().peekable();
     for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
@@ -283,7 +287,8 @@ pub(super) fn parameters(
     Ok(rows)
 }
 
-/// Returns the covariance of the estimated entries of M, C and K, but for those of equations without scale.
+/// Returns the covariance of the estimated entries of M, C and K; equations without scale are
+/// omitted.
 pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> ParameterCovariance {
     let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
     let all = estimate.parameters().map(|p| p.parameter).enumerate();
@@ -296,15 +301,16 @@ pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> Pa
     ParameterCovariance::new(names, &covariance, estimate.degrees_of_freedom())
 }
 
-/// Number of parameters up to which a result carries their covariance, whose entries are its square.
+/// Maximum number of parameters for which a result contains their covariance; its size is the
+/// square of this number.
 pub(crate) const MOST_WITH_COVARIANCE: usize = 2_000;
 
-/// Returns whether a result carries the covariance of its parameters.
+/// Returns whether a result contains the covariance of its parameters.
 pub(super) fn carries_covariance(estimate: &Estimate) -> bool {
     estimate.parameters().len() <= MOST_WITH_COVARIANCE
 }
 
-/// Returns the remark on a covariance that a result does not carry.
+/// Returns the remark on a covariance that a result omits.
 pub(super) fn of_covariance(estimate: &Estimate) -> Option<String> {
     let count = estimate.parameters().len();
     (!carries_covariance(estimate)).then(|| {
@@ -339,13 +345,13 @@ pub(crate) fn mode_cells(modes: &[ModeRow], damped: bool) -> impl Iterator<Item 
 }
 
 impl ProportionalDamping {
-    /// The factors of an estimate that was to have such a damping.
+    /// Returns the factors of an estimate with proportional damping; `None` for another damping.
     pub(super) fn of(estimate: &Estimate) -> Result<Option<Self>, AnalysisError> {
         let Some([alpha, beta]) = estimate.proportional_damping() else { return Ok(None) };
         Ok(Some(Self { alpha: Uncertain::of(&alpha)?, beta: Uncertain::of(&beta)? }))
     }
 
-    /// Name, value, standard error, interval and unit of each.
+    /// Returns name, value, standard error, interval and unit of both factors.
     pub(super) fn rows(&self) -> [Vec<String>; 2] {
         [("alpha", &self.alpha, "1/s"), ("beta", &self.beta, "s")].map(|(name, factor, unit)| {
             let mut row = vec![name.to_owned()];
@@ -356,11 +362,11 @@ impl ProportionalDamping {
     }
 }
 
-/// Number of entries known to be zero up to which a table shows them.
+/// Maximum number of entries known to be zero that a table shows; of more it shows only the number.
 const ZEROS_SHOWN: usize = 12;
 
-/// Returns the table of the parameters, with the rows of others after theirs; of many entries that are known
-/// to be zero, it tells the number.
+/// Returns the table of the parameters, followed by other rows. Many entries known to be zero are
+/// only counted.
 pub(super) fn parameter_table(
     parameters: &[ParameterRow],
     others: impl Iterator<Item = Vec<String>>,
@@ -379,7 +385,7 @@ pub(super) fn parameter_table(
 }
 
 impl ParameterRow {
-    /// Name, value, standard error, interval and unit.
+    /// Returns name, value, standard error, interval and unit.
     pub(super) fn cells(&self) -> Vec<String> {
         let mut row = vec![self.name.clone()];
         row.extend(self.estimate.cells());

@@ -1,4 +1,4 @@
-//! Fits sample by sample.
+//! Fits in the time domain, sample by sample.
 
 use mechid_checks::HighestMode;
 use mechid_checks::{
@@ -20,7 +20,7 @@ use crate::AnalysisError;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
 impl SampleFit {
-    /// Returns how much of a record must be held: all of it where every sample needs all others.
+    /// Returns the part of a record to buffer: all of it if every sample depends on all others.
     pub(crate) fn hold(&self) -> Hold {
         match (self.derivatives, self.refine.map(|refine| refine.interpolation)) {
             (Some(Derivatives::Spectral), _) => Hold::Whole,
@@ -29,8 +29,9 @@ impl SampleFit {
         }
     }
 
-    /// Fits the samples of one or several windows: the equation of motion itself where there is an
-    /// acceleration and nothing else is asked for, otherwise what leads from one sample to the next.
+    /// Fits the samples of one or several windows: the equation of motion at the samples if there
+    /// is an acceleration and no other estimator is requested, otherwise the transition from each
+    /// sample to the next.
     pub(crate) fn fit(
         &self,
         records: &[Windowed],
@@ -50,8 +51,9 @@ impl SampleFit {
         }
     }
 
-    /// Goes through a record in stretches of which each but the first begins with the last sample of
-    /// the one before, and says which is the last; in one, where every sample needs all others.
+    /// Processes a record in chunks. Each chunk after the first begins with the last sample of the
+    /// previous one; the callback receives a flag for the last. If every sample depends on all
+    /// others, the record is one chunk.
     fn chunks(
         &self,
         recorded: &Windowed,
@@ -62,7 +64,7 @@ impl SampleFit {
             Hold::Whole => held.force.len(),
             _ => (CHUNK_SAMPLES / self.refine.map_or(1, |refine| refine.factor.max(1))).max(1),
         };
-        // A sliding polynomial has no middle at the first and last samples it sees.
+        // A sliding polynomial needs neighbours on both sides of each sample.
         let margin = self.noise_span() / 2;
         recorded.chunks(advance + 1 + 2 * margin, advance, &mut |chunk| {
             let len = chunk.force.len();
@@ -73,13 +75,13 @@ impl SampleFit {
         })
     }
 
-    /// Returns the extent of the samples that are held.
+    /// Returns the extent of the buffered samples.
     fn extent_of(&self, held: &Block) -> Extent {
         if held.held_to().is_some() { Extent::Open } else { self.extent() }
     }
 
-    /// Checks whether a record that is to be one period is one; by its first and last samples where it
-    /// is not held whole.
+    /// Checks whether a window stated as one period is periodic; uses the first and last samples if
+    /// it is not fully buffered.
     fn seam(&self, recorded: &Windowed, p: &Prepared, end: Option<Record>) -> Vec<Finding> {
         match (self.extent(), recorded.held.held_to(), end) {
             (Extent::Open, ..) | (_, Some(_), None) => Vec::new(),
@@ -93,7 +95,8 @@ impl SampleFit {
         }
     }
 
-    /// Gathers the samples of a record; the displacements of its last two.
+    /// Adds the equations of motion at the samples of a record; returns the displacements of its
+    /// last two samples.
     fn push_instants(
         &self,
         recorded: &Windowed,
@@ -115,8 +118,8 @@ impl SampleFit {
         Ok(end)
     }
 
-    /// Gathers what leads from sample to sample of a record that begins as `held`; the displacements
-    /// of its last two.
+    /// Adds the transitions between the samples of a record that begins with `held`; returns the
+    /// displacements of its last two samples.
     fn push_steps(
         &self,
         recorded: &Windowed,
@@ -129,7 +132,7 @@ impl SampleFit {
             if let Some((factor, interpolation)) = self.refinement() {
                 return Ok(rows.push_refined(p.states(), extent, factor, interpolation)?);
             }
-            // After the last sample of a period comes its first.
+            // After its last sample a period continues with its first.
             let closes = last && extent == Extent::WholePeriod;
             let p = if closes { p.followed_by(held)? } else { p };
             let [x, v, force] = p.states();
@@ -154,7 +157,7 @@ impl SampleFit {
         let measured = responses.iter().zip(prepared).map(|(response, p)| (response, &p.force));
         let before_all = before_equation_of_motion(&Vec::from_iter(measured), unknowns)?;
         let estimate = rows.solve(unknowns)?;
-        // Says what the data leave open, before anything is made of it.
+        // Refuses undetermined parameters first.
         estimate.system()?;
         let span = self.noise_span();
         let residuals = prepared.iter().filter_map(|p| equation_residual(p, &estimate, span));
@@ -176,7 +179,7 @@ impl SampleFit {
         })
     }
 
-    /// Returns the findings beside those on the residual.
+    /// Returns the findings other than those on the residual.
     fn at_samples_after(
         &self,
         p: &Prepared,
@@ -184,7 +187,7 @@ impl SampleFit {
     ) -> Result<Vec<Finding>, AnalysisError> {
         let Some(response) = p.response()? else { return Ok(Vec::new()) };
         let mut checks = Vec::from_iter(delay_at_samples(&response, &p.force, estimate.unknowns()));
-        // What was differentiated has noise in common from sample to sample.
+        // Differentiation correlates the noise of neighbouring samples.
         if self.derivatives.is_none() {
             checks.extend(noise_on_response(&response, &p.force, estimate)?);
         }
@@ -213,7 +216,8 @@ impl SampleFit {
         let mut before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
-        // The modes that were found say more than a force held between the samples.
+        // The identified modes are more specific than the warning about a force held between the
+        // samples.
         for finding in &mut before_all {
             if matches!(
                 finding,
@@ -227,7 +231,7 @@ impl SampleFit {
             let [samples, fitted] =
                 missing_force(&estimate, p.states(), discretisation, extent, self.refinement())?;
             let force = p.force.window(0, samples.len())?;
-            // An error of a measured state is in the interval before it and in the one after.
+            // An error of a measured state affects the intervals before and after it.
             let noise_span = self.noise_span() + 1;
             Ok(Residual::Samples(SampleResidual { samples, fitted, force, noise_span }))
         };
@@ -255,13 +259,13 @@ impl SampleFit {
 
     fn prediction(&self, discretisation: Discretisation) -> Prediction {
         match &self.derivatives {
-            // What was differentiated by its spectrum is predicted by it.
+            // Spectral derivatives assume a periodic response, so the prediction does, too.
             Some(Derivatives::Spectral) => Prediction::Steady,
             _ => Prediction::Sampled { discretisation, extent: self.extent() },
         }
     }
 
-    /// Samples apart that the noise of one sample still reaches.
+    /// Returns the largest distance, in samples, at which the noise of one sample has an effect.
     fn noise_span(&self) -> usize {
         self.derivatives.map_or(0, Derivatives::window).saturating_sub(1)
     }
@@ -297,13 +301,13 @@ impl SampleFit {
     }
 }
 
-/// The displacements of the last two samples.
+/// Returns the displacements of the last two samples.
 fn last_two(p: &Prepared) -> Result<Option<Record>, AnalysisError> {
     let (x, len) = (&p.displacement, p.displacement.len());
     Ok(if len < 2 { None } else { Some(x.window(len - 2, 2)?) })
 }
 
-/// F − M ẍ − C ẋ − K x, left of the inertia.
+/// Returns the residual F − M ẍ − C ẋ − K x of the equation of motion.
 fn equation_residual(
     p: &Prepared,
     estimate: &Estimate,
@@ -324,7 +328,7 @@ fn equation_residual(
     Some(residual())
 }
 
-/// Returns the name of the estimator from sample to sample.
+/// Returns the name of the estimator that works from sample to sample.
 fn estimator(discretisation: Discretisation) -> &'static str {
     match discretisation {
         Discretisation::Euler => "least squares from sample to sample, Euler's rule",

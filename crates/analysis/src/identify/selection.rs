@@ -1,4 +1,4 @@
-//! Terms that a selection tried, as a summary.
+//! Summary of the terms that a selection tried.
 
 use mechid_nonlinear::{Criterion, Selection, SelectionStep};
 use mechid_signal::message;
@@ -7,19 +7,19 @@ use serde::Serialize;
 use super::options::Nonlinear;
 use crate::text::{significant, text_table};
 
-/// Terms that were tried, one after the other.
+/// Terms in the order in which they were tried.
 #[derive(Debug, Clone, Serialize)]
 pub struct SelectionSummary {
-    /// Criterion by which a term was added.
+    /// Criterion for adding a term.
     pub criterion: Criterion,
     /// Number of candidates.
     pub candidates: usize,
-    /// The fits, the first without any candidate, then with each term that was added.
+    /// The fits: the first without candidates, then one for each added term.
     pub steps: Vec<SelectionRow>,
-    /// The candidate that came next and was not worth it; `None` if all were added.
+    /// The next candidate, which did not improve the criterion; `None` if all were added.
     pub refused: Option<SelectionRow>,
-    /// Names of the terms that were added and removed again, because their coefficients do not differ from
-    /// zero by their standard errors.
+    /// Names of the terms that were added and later removed, because zero is within the uncertainty
+    /// of their coefficients.
     pub removed: Vec<String>,
 }
 
@@ -28,14 +28,14 @@ pub struct SelectionSummary {
 pub struct SelectionRow {
     /// Name of the term added; `None` for the first step.
     pub added: Option<String>,
-    /// The criterion with it, a pure number, the smaller the better.
+    /// Value of the criterion with it, a pure number; smaller is better.
     pub score: f64,
-    /// Part of the weighted force that is left with it, a ratio.
+    /// Part of the weighted force that the fit does not explain, a ratio.
     pub unexplained: f64,
 }
 
 impl SelectionSummary {
-    /// Returns the summary of a selection made with the settings `how`.
+    /// Creates the summary of a selection with the settings `how`.
     pub(super) fn of(selection: Selection, how: &Nonlinear) -> Self {
         let row = |step: SelectionStep| SelectionRow {
             added: step.added,

@@ -1,4 +1,4 @@
-//! Sinusoids beside the response to the forces, found in open records and taken off.
+//! Sinusoids in open records that are not responses to the forces; they are subtracted.
 
 use std::f64::consts::TAU;
 
@@ -9,29 +9,29 @@ use serde::Serialize;
 use crate::measurement::Block;
 use crate::text::significant;
 
-/// Frequencies that a remark names.
+/// Maximum number of frequencies that a remark lists.
 const NAMED: usize = 4;
-/// Relative difference of frequencies in several records below which they are one.
+/// Maximum relative difference of equal frequencies in several records.
 const SAME: f64 = 1e-3;
 
-/// A sinusoid in the responses of one record that the forces do not account for.
+/// A sinusoid in the responses of one record that the forces do not explain.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SinusoidRow {
     /// The record.
     pub record: String,
     /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// Amplitude in the response of each degree of freedom, in the unit of the response that was fitted.
+    /// Amplitude in the response of each degree of freedom, in the unit of the fitted response.
     pub amplitudes: Vec<f64>,
-    /// Largest of the amplitudes over √2 times the standard deviation of their responses, a ratio.
+    /// Largest ratio of an amplitude to √2 times the standard deviation of its response.
     pub share: f64,
-    /// Place of the record among all: names may be the same.
+    /// Index of the record, because names may be equal.
     #[serde(skip)]
     place: usize,
 }
 
 impl SinusoidRow {
-    /// Lists the sinusoids of the record at a place among all.
+    /// Lists the sinusoids of the record with the index `place`.
     pub(super) fn all(place: usize, held: &Block, sinusoids: &[Sinusoid]) -> Vec<Self> {
         let deviations: Vec<f64> =
             held.response().0.data().column_iter().map(|x| x.variance().sqrt()).collect();
@@ -50,13 +50,14 @@ impl SinusoidRow {
         sinusoids.iter().map(row).collect()
     }
 
-    /// Returns the remark on those of all records, the strongest first, if there are any.
+    /// Returns the remark on the sinusoids of all records, the strongest first; `None` if there are
+    /// none.
     pub(super) fn remark(all: &[Self]) -> Option<String> {
         let mut by_size: Vec<&Self> = all.iter().collect();
         by_size.sort_by(|a, b| b.share.total_cmp(&a.share));
         let mut named: Vec<&Self> = Vec::new();
         for one in by_size {
-            // Records of one test have the same.
+            // Records of one test contain the same sinusoids.
             let known = |other: &&Self| {
                 other.place != one.place
                     && (other.frequency_hz / one.frequency_hz - 1.0).abs() < SAME

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::AnalysisError;
 
-/// Statements on the form of M, C and K, which leave fewer unknowns; none by default.
+/// Statements on the form of M, C and K, which reduce the number of unknowns; none by default.
 ///
 /// ```
 /// use mechid_analysis::identify::Structure;
@@ -32,8 +32,8 @@ pub struct Structure {
 pub enum Form {
     /// M, C and K are symmetric.
     Symmetric,
-    /// Masses in a row, each joined by springs and dampers to its neighbours and to the ground: M is diagonal,
-    /// C and K are symmetric and have neighbours of the diagonal only.
+    /// Masses in a row, each joined by springs and dampers to its neighbours and to the ground: M
+    /// is diagonal, C and K are symmetric and tridiagonal.
     Chain,
     /// M is diagonal.
     DiagonalMass,
@@ -110,16 +110,16 @@ impl FromStr for Structure {
 }
 
 impl Structure {
-    /// Returns whether nothing is said.
+    /// Returns whether there is no statement.
     pub fn is_empty(&self) -> bool {
         self.forms.is_empty()
     }
 
-    /// Returns the unknowns that are left.
+    /// Returns the unknowns that remain.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if there is no such entry, and that or [`AnalysisError::Setting`] if statements or
-    /// known masses contradict each other.
+    /// [`AnalysisError::Estimate`] if there is no such entry, and this or
+    /// [`AnalysisError::Setting`] if statements or known masses contradict each other.
     pub fn apply(&self, mut unknowns: Unknowns) -> Result<Unknowns, AnalysisError> {
         let has = |form: Form| self.forms.contains(&form);
         let (chain, proportional) = (has(Form::Chain), has(Form::ProportionalDamping));

@@ -35,20 +35,20 @@ use crate::modal::{ShapedMode, shape_table};
 use crate::modes::resonances;
 use crate::text::{compact, paragraph, significant};
 
-/// Identifies the machine behind one or several tables of frequency responses, which are fitted
+/// Identifies a machine from one or several tables of frequency responses, which are fitted
 /// together; each needs the response at every point where a force acts.
 ///
-/// Maximum likelihood weights every response by its variance: from its standard error where the
-/// table has one, otherwise from coherence and averages. Of a table with neither, the noise is taken as
-/// white, of the level that the residual has.
+/// Maximum likelihood weights every response by its variance: from its standard error if the table
+/// has one, otherwise from coherence and averages. Without either, the noise is assumed white, with
+/// the level of the residual.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoResponse`] if a response is missing,
-/// [`AnalysisError::Setting`] for settings that the table contradicts or that it needs,
+/// [`AnalysisError::Setting`] for settings that are missing or that contradict the table,
 /// [`AnalysisError::EmptyBand`], and [`AnalysisError::Estimate`] if the fit fails.
 ///
 /// # Source
-/// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance that the coherence gives).
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance from the coherence).
 pub fn identify_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -114,12 +114,12 @@ pub fn identify_responses(
     Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
 }
 
-/// A fit with the data that it was made of.
+/// A fit with its data.
 struct OfFit<'a> {
     fit: &'a Fit,
     of_machine: &'a Estimate,
     data: &'a FrequencyData,
-    /// Part of the response that the fit leaves, a ratio.
+    /// Part of the response that the fit does not explain, a ratio.
     unexplained: Option<f64>,
 }
 
@@ -210,7 +210,7 @@ fn remarks(
 
 /// A machine identified from tables of frequency responses.
 ///
-/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) formats the result for a reader, `serde` for programs.
 #[derive(Debug)]
 pub struct IdentifiedResponses {
     estimate: Estimate,
@@ -236,30 +236,31 @@ pub struct ResponseSummary {
     pub frequencies: FrequencyRow,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each, but for those of [`unscaled`](Self::unscaled) equations.
+    /// Parameters, one each, without the entries of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscaled: Option<Unscaled>,
-    /// Factors of proportional damping, if it was to be such.
+    /// Factors of proportional damping; `None` unless it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proportional_damping: Option<ProportionalDamping>,
     /// Modes, by rising frequency.
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
-    /// Every line of the fit, if they were asked for.
+    /// Every line of the fit; `None` unless requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_lines: Option<Vec<FittedLine>>,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
+    /// M, C and K, as `mechid force --system` and others read them; `None` if equations have no
+    /// scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
-    /// Covariance of the parameters that were estimated, for what is derived from them; `None` for more than
-    /// 2,000 of them, for which [`IdentifiedResponses::covariance`] has it.
+    /// Covariance of the estimated parameters, for quantities derived from them; `None` for more
+    /// than 2,000 parameters: use [`IdentifiedResponses::covariance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<ParameterCovariance>,
     /// The settings, which repeat the analysis.
@@ -289,8 +290,8 @@ impl FrequencyRow {
 }
 
 impl IdentifiedResponses {
-    /// Returns the estimate of M, C and K with its covariance; where equations have no scale
-    /// ([`ResponseSummary::unscaled`]), of one of the systems with the same modes.
+    /// Returns the estimate of M, C and K with its covariance. If equations have no scale
+    /// ([`ResponseSummary::unscaled`]), it is one of the systems with the same modes.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
     }
@@ -298,8 +299,8 @@ impl IdentifiedResponses {
     /// Returns the identified system.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined, [`AnalysisError::Unscaled`] if
-    /// they give its modes alone.
+    /// [`AnalysisError::Estimate`] if the data do not determine a parameter,
+    /// [`AnalysisError::Unscaled`] if they determine only its modes.
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
         self.check_scale()?;
         Ok(self.estimate.system()?)
@@ -309,19 +310,19 @@ impl IdentifiedResponses {
         Unscaled::check(self.summary.unscaled.as_ref())
     }
 
-    /// Returns the covariance of the parameters that were estimated, whatever their number.
+    /// Returns the covariance of the estimated parameters, for any number of them.
     pub fn covariance(&self) -> ParameterCovariance {
         covariance(&self.estimate, self.summary.unscaled.as_ref())
     }
 
-    /// Returns the estimate that was fitted to [`IdentifiedResponses::data`]: [`IdentifiedResponses::estimate`]
-    /// with the decay that an exponential window adds.
+    /// Returns the estimate that was fitted to [`IdentifiedResponses::data`]:
+    /// [`IdentifiedResponses::estimate`] with the decay that an exponential window adds.
     pub fn fitted(&self) -> &Estimate {
         &self.fitted
     }
 
-    /// Returns the frequency responses that were fitted: unit forces and displacements, with the noise
-    /// of the latter.
+    /// Returns the frequency responses that were fitted: unit forces, and displacements with their
+    /// noise.
     pub fn data(&self) -> &FrequencyData {
         &self.data
     }
@@ -331,8 +332,8 @@ impl IdentifiedResponses {
         &self.summary
     }
 
-    /// Adds every line of the fit to [`IdentifiedResponses::summary`]: measured and fitted responses with
-    /// their standard errors, and the residual.
+    /// Adds every line of the fit to [`IdentifiedResponses::summary`]: measured and fitted
+    /// responses with their standard errors, and the residual.
     ///
     /// # Errors
     /// [`AnalysisError::Model`] if the identified system has no response at a line.
@@ -388,24 +389,24 @@ impl fmt::Display for IdentifiedResponses {
     }
 }
 
-/// A fit, and what it leaves against the noise.
+/// A fit with the normalised power of its residual.
 struct Fit {
     name: &'static str,
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
-    /// Fit of the averages, if all tables state the segments that they are made of.
+    /// Fit of the averages; `None` unless all tables state their segments.
     averaged: Option<ResponseEstimate>,
 }
 
-/// Returns the data of all tables, one after the other.
+/// Returns the data of all tables, concatenated.
 pub(super) fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
     measured[1..].iter().try_fold(first.data.clone(), |data, next| Ok(data.and(&next.data)?))
 }
 
 impl Fit {
-    /// Returns the quality of the fit; `rows` are those of all tables together.
+    /// Returns the quality of the fit; `rows` is the number of rows of all tables together.
     fn row(
         &self,
         of_machine: &Estimate,
@@ -413,7 +414,8 @@ impl Fit {
         method: Option<Method>,
         rows: usize,
     ) -> FitRow {
-        // Least squares fits the force, maximum likelihood the response.
+        // Least squares minimises the residual of the force, maximum likelihood the residual of the
+        // response.
         let each = of_machine.residual_nrmse();
         let of_force = || (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt();
         let of_response = unexplained.filter(|_| method != Some(Method::LeastSquares));

@@ -1,4 +1,4 @@
-//! Tables of frequency responses as the estimators take them.
+//! Conversion of tables of frequency responses to data for the estimators.
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -19,7 +19,7 @@ use super::{Band, added_decay};
 use crate::AnalysisError;
 use crate::limits::COHERENCE_OF_ONE;
 
-/// Noise as a table states it.
+/// Noise as stated by a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Noise {
     Stated,
@@ -28,7 +28,7 @@ pub(super) enum Noise {
 }
 
 impl Noise {
-    /// Returns where the noise is known from, in words.
+    /// Returns the origin of the noise level, in words.
     pub(super) fn source(self) -> Option<&'static str> {
         match self {
             Noise::Stated => Some("that follows from the standard errors"),
@@ -38,7 +38,7 @@ impl Noise {
     }
 }
 
-/// Responses of a table, by their points.
+/// Responses of a table, sorted by their points.
 struct Layout<'a> {
     points: Vec<String>,
     /// Points of the forces.
@@ -86,7 +86,8 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Returns advice for a force at a point where no response was measured, as of a hammer that roves.
+/// Returns advice for a force at a point without a measured response, for instance from a roving
+/// hammer.
 fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     if table.functions.iter().any(|f| f.response == force) {
         return "";
@@ -94,11 +95,12 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     "; by reciprocity a row of responses is a column: `structure` symmetric"
 }
 
-/// Returns a table in which the responses to a force stand for those that reciprocity makes equal to them, with a
-/// remark; the table itself if every force has all of its responses, or none has them by reciprocity either.
+/// Returns a table with missing responses replaced by their reciprocal ones, with a remark. Returns
+/// the table itself if the responses to every force are complete, or if reciprocity completes none.
 ///
 /// # Source
-/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (the receptance of symmetric matrices is symmetric).
+/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (symmetric matrices have a symmetric
+/// receptance).
 fn with_reciprocal<'a>(
     table: Cow<'a, FrequencyResponses>,
     how: &IdentifyResponses,
@@ -149,20 +151,21 @@ fn with_reciprocal<'a>(
     (Cow::Owned(reciprocal), Some(remark))
 }
 
-/// A table as the estimators take it.
+/// A table converted to data for the estimators.
 pub(super) struct Tabulated {
     pub(super) points: Vec<String>,
     /// Degrees of freedom with a force, counted from 0.
     pub(super) driven: Vec<usize>,
     pub(super) noise: Noise,
     pub(super) data: FrequencyData,
-    /// Responses with their coherence, to be checked, and the degrees of freedom of their forces.
+    /// Responses with their coherence, for checks, and the degrees of freedom of their forces.
     coherent: Coherent,
-    /// Responses to each force by itself with its degree of freedom, where no coherence states their noise.
+    /// Responses to each force separately, with its degree of freedom; empty if a coherence states
+    /// the noise.
     columns: Vec<(FrequencyData, usize)>,
-    /// Whether these are averages over segments of which window and number are known.
+    /// `true` if these are averages over segments with a known window and number.
     is_averaged: bool,
-    /// Remarks on what the table states and was not used.
+    /// Remarks on entries of the table that were not used.
     pub(super) remarks: Vec<String>,
 }
 
@@ -241,13 +244,13 @@ impl Tabulated {
         Ok(Self { points, driven, noise, data, coherent, columns, is_averaged, remarks })
     }
 
-    /// Returns the responses as averages over segments of which window and number are known, with the degrees of
-    /// freedom of their forces; `None` if the table does not state them.
+    /// Returns the responses as averages over segments with a known window and number, with the
+    /// degrees of freedom of their forces; `None` if the table does not state the segments.
     pub(super) fn averaged(&self) -> Option<&Coherent> {
         self.is_averaged.then_some(&self.coherent)
     }
 
-    /// Puts other responses in the place of the averaged ones: less what their window blunts.
+    /// Replaces the averaged responses by ones corrected for the bias of the window.
     pub(super) fn replace(
         &mut self,
         responses: &mut dyn Iterator<Item = Frf>,
@@ -259,8 +262,8 @@ impl Tabulated {
         Ok(())
     }
 
-    /// Returns the findings before and after the fit; `all` is the number of rows of all tables, `settled` whether
-    /// what a window blunts was told from the machine.
+    /// Returns the findings before and after the fit. `all` is the number of rows of all tables;
+    /// `settled` states whether the bias of the window was separated from the system.
     pub(super) fn findings(
         &self,
         estimate: &Estimate,
@@ -299,7 +302,7 @@ fn standard_errors(
     Some(rows.iter().map(at_row).collect())
 }
 
-/// Returns the responses to each force by itself with its degree of freedom.
+/// Returns the responses to each force separately, with its degree of freedom.
 fn columns(
     omega: &[f64],
     response: &[DMatrix<Complex<f64>>],
@@ -309,7 +312,7 @@ fn columns(
 ) -> Result<Vec<(FrequencyData, usize)>, AnalysisError> {
     let column = |(input, dof): (usize, &usize)| {
         let response: Vec<_> = response.iter().map(|h| h.columns(input, 1).into_owned()).collect();
-        // A standard error is that of the real and of the imaginary part.
+        // A standard error applies to the real part and to the imaginary part.
         let variance: Option<Vec<_>> = errors.map(|errors| {
             errors.iter().map(|e| e.columns(input, 1).map(|e| 2.0 * e * e)).collect()
         });
@@ -320,8 +323,8 @@ fn columns(
     driven.iter().enumerate().map(column).collect()
 }
 
-/// Returns the responses with points in positive directions: a force or a response in −Z is one in +Z of the other sign.
-/// Points that are asked for in negative directions stay as they are.
+/// Returns the responses with points in positive directions: a force or a response in −Z is one in
+/// +Z with the opposite sign. Points requested in negative directions are unchanged.
 pub(crate) fn with_positive_directions<'a>(
     table: &'a FrequencyResponses,
     points: &[String],
@@ -359,8 +362,8 @@ pub(crate) fn with_positive_directions<'a>(
     Cow::Owned(positive)
 }
 
-/// Returns the responses of a table as the estimators take them, and in words where their noise is
-/// known from.
+/// Returns the responses of a table as data for the estimators, and the origin of the noise level
+/// in words.
 pub(crate) fn response_data(
     table: &FrequencyResponses,
     how: &IdentifyResponses,
@@ -399,7 +402,7 @@ fn quantity(
     }
 }
 
-/// Returns the rows of a table inside the band, without that of 0 Hz.
+/// Returns the rows of a table inside the band, excluding 0 Hz.
 fn rows(table: &FrequencyResponses, band: Option<Band>) -> Result<Vec<usize>, AnalysisError> {
     let Band { low_hz, high_hz } = band.unwrap_or(Band { low_hz: 0.0, high_hz: f64::INFINITY });
     let hz = &table.frequency_hz;
@@ -415,12 +418,12 @@ fn rows(table: &FrequencyResponses, band: Option<Band>) -> Result<Vec<usize>, An
 /// Frequency responses with their coherence, and the degrees of freedom of their forces.
 pub(super) type Coherent = Vec<(Frf, Vec<usize>)>;
 
-/// Returns responses, one after the other, as data of one fit.
+/// Concatenates responses to the data of one fit.
 fn joined(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
     together(coherent.iter().map(|(frf, dofs)| Ok(frf.data(dofs)?)))
 }
 
-/// Returns data, one after the other, as those of one fit.
+/// Concatenates data for one fit.
 fn together(
     mut each: impl Iterator<Item = Result<FrequencyData, AnalysisError>>,
 ) -> Result<FrequencyData, AnalysisError> {
@@ -428,7 +431,7 @@ fn together(
     each.try_fold(first, |data, next| Ok(data.and(&next?)?))
 }
 
-/// Returns whether the coherences of a table are 1 but for rounding (their median on some rows).
+/// Returns whether the coherences of a table are 1 up to rounding (their median on some rows).
 fn is_without_noise(table: &FrequencyResponses, rows: &[usize]) -> bool {
     let values = table.coherence.iter().flat_map(|c| rows.iter().map(|row| c.values[*row]));
     let mut values: Vec<f64> = values.collect();
@@ -436,18 +439,19 @@ fn is_without_noise(table: &FrequencyResponses, rows: &[usize]) -> bool {
     values.get(values.len() / 2).is_some_and(|median| 1.0 - median < COHERENCE_OF_ONE)
 }
 
-/// Segments that the responses of a table are averages over.
+/// Segments over which the responses of a table were averaged.
 struct Averaged {
     lines: Lines,
     segments: Segments,
     count: usize,
 }
 
-/// Deviation of a frequency from a line, in lines, up to which it is one in spite of the digits of a file.
+/// Largest distance of a frequency from a line, in lines, that counts as rounding in the file.
 const OF_LINE: f64 = 1e-3;
 
 impl Averaged {
-    /// The segments that a table states; `None` if it states none, or has other frequencies than their lines.
+    /// Returns the stated segments of a table; `None` if it states none, or if its frequencies are
+    /// not their lines.
     fn of(table: &FrequencyResponses, rows: &[usize]) -> Result<Option<Self>, AnalysisError> {
         let Some(stated) = table.segments else { return Ok(None) };
         let per_line_hz = stated.sample_rate_hz / stated.samples as f64;
@@ -474,8 +478,8 @@ struct Columns<'a> {
 }
 
 impl Columns<'_> {
-    /// Returns responses with their coherence: averages over the segments that the table states, or over as many as
-    /// are given.
+    /// Returns responses with their coherence: averages over the segments that the table states, or
+    /// over the given number.
     fn frequency_responses(
         &self,
         table: &FrequencyResponses,
@@ -500,8 +504,8 @@ impl Columns<'_> {
         Ok(Frf::new(omega, response, coherence, averages, self.measured)?)
     }
 
-    /// Returns the responses with the coherence of the table: of all forces together where it is multiple,
-    /// otherwise of each by itself; `None` if the table has none.
+    /// Returns the responses with the coherence of the table: one for all forces if it is multiple,
+    /// otherwise one for each force; `None` if the table has none.
     fn coherent(
         &self,
         table: &FrequencyResponses,
@@ -557,7 +561,7 @@ impl Columns<'_> {
     }
 }
 
-/// Returns the different texts, in the order in which they first appear.
+/// Returns the distinct texts, in the order of their first appearance.
 fn distinct<'a>(texts: impl Iterator<Item = &'a String>) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for text in texts {

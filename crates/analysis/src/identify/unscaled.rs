@@ -1,4 +1,5 @@
-//! Equations of motion that the data fix up to factors only, though they fix the modes.
+//! Equations of motion that the data determine only up to factors, although they determine the
+//! modes.
 
 use std::fmt;
 
@@ -8,25 +9,26 @@ use serde::Serialize;
 
 use crate::AnalysisError;
 
-/// Equations of motion whose entries of M, C and K do not follow from the data, though the modes do.
+/// Equations of motion whose entries of M, C and K the data do not determine, although they
+/// determine the modes.
 ///
-/// Where no force acts on a degree of freedom and no entry of its equation is known, the equation may be
-/// multiplied by any number, and added to any other one whose mass is free in that column: the responses to
-/// the forces that act stay as they are, and with them poles and shapes.
+/// If no force acts on a degree of freedom and no entry of its equation is known, this equation may
+/// be multiplied by any number, and added to any other equation whose mass is free in this column.
+/// The responses to the forces do not change, and neither do poles and mode shapes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unscaled {
     /// Degrees of freedom without force and without known entry in their equation, counted from 1.
     pub degrees_of_freedom: Vec<usize>,
-    /// Equations, rows of M, C and K, that are not given, counted from 1.
+    /// Equations, rows of M, C and K, whose entries are not reported, counted from 1.
     pub equations: Vec<usize>,
 }
 
 impl Unscaled {
-    /// Fits the modes of such equations where `fit` refuses them, from forces on the degrees of freedom
-    /// `driven`, counted from 0.
+    /// Fits the modes of such equations if `fit` refuses them; the forces act on the degrees of
+    /// freedom `driven`, counted from 0.
     ///
     /// # Errors
-    /// Those of `fit`.
+    /// The errors of `fit`.
     pub(super) fn or_fitted<T>(
         unknowns: &Unknowns,
         driven: &[usize],
@@ -36,8 +38,8 @@ impl Unscaled {
         let (mut normalised, mut unscaled) = (unknowns.clone(), None);
         loop {
             match fit(&normalised) {
-                // That a channel is noise and no force may only come to light in the fit.
-                // Related equations have one scale in common.
+                // Only the fit may reveal that a force channel is noise.
+                // Related equations have a common scale.
                 Err(AnalysisError::Estimate(EstimateError::OnlyRatios { dof, .. }))
                     if !unknowns.is_related()
                         && (unscaled.is_none() || !free.contains(&(dof - 1))) =>
@@ -55,9 +57,9 @@ impl Unscaled {
         }
     }
 
-    /// Finds the equations and the unknowns of one of the systems that have the same modes: that with unit
-    /// masses on the degrees of freedom `free`, counted from 0, and no mass that couples other equations to
-    /// these.
+    /// Returns the equations and the unknowns of one of the systems with the same modes: it has
+    /// unit masses on the degrees of freedom `free`, counted from 0, and no mass that couples other
+    /// equations to these.
     fn normalised(unknowns: &Unknowns, free: &[usize]) -> Result<(Self, Unknowns), AnalysisError> {
         let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
         for row in 0..unknowns.dof() {
@@ -74,12 +76,12 @@ impl Unscaled {
         Ok((Self { degrees_of_freedom, equations }, normalised))
     }
 
-    /// Returns whether an equation, counted from 0, is not given.
+    /// Returns whether the entries of an equation, counted from 0, are not reported.
     pub(super) fn hides(&self, equation: usize) -> bool {
         self.equations.contains(&(equation + 1))
     }
 
-    /// Refuses a system that has no scale.
+    /// Refuses a system without scale.
     pub(super) fn check(unscaled: Option<&Self>) -> Result<(), AnalysisError> {
         match unscaled {
             Some(unscaled) => Err(AnalysisError::Unscaled { unscaled: unscaled.clone() }),
@@ -87,14 +89,15 @@ impl Unscaled {
         }
     }
 
-    /// Refuses forces, on degrees of freedom counted from 0, to which the response is not known.
+    /// Refuses forces, on degrees of freedom counted from 0, whose responses are unknown.
     pub(super) fn check_forces(&self, driven: &[usize]) -> Result<(), AnalysisError> {
         let is_unknown = |dof: &usize| self.degrees_of_freedom.contains(&(dof + 1));
         Self::check(driven.iter().any(is_unknown).then_some(self))
     }
 }
 
-/// Degrees of freedom, counted from 0, without force and without known entry in their equation.
+/// Returns the degrees of freedom, counted from 0, without force and without known entry in their
+/// equation.
 fn without_force(unknowns: &Unknowns, driven: &[usize]) -> Vec<usize> {
     let dofs = unknowns.dof();
     let entries = || Matrix::ALL.into_iter().flat_map(|matrix| (0..dofs).map(move |j| (matrix, j)));

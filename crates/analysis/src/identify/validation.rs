@@ -12,12 +12,12 @@ use crate::AnalysisError;
 use crate::measurement::{CHUNK_SAMPLES, Hold, Window, Windowed};
 use crate::text::{significant, text_table};
 
-/// A record predicted.
+/// A predicted record.
 #[derive(Debug, Serialize)]
 pub struct Validation {
     /// The record.
     pub file: String,
-    /// Counted from 1.
+    /// First sample, counted from 1.
     pub first_sample: usize,
     /// Last sample, counted from 1.
     pub last_sample: usize,
@@ -34,8 +34,8 @@ pub struct Share {
     pub degree_of_freedom: usize,
     /// Name of the channel.
     pub name: String,
-    /// 100 (1 − ‖measured − predicted‖ / ‖measured − mean‖): 100 is perfect, 0 no better than the
-    /// mean, negative worse; in per cent.
+    /// 100 (1 − ‖measured − predicted‖ / ‖measured − mean‖), in per cent: 100 is perfect, 0 as good
+    /// as the mean, negative worse.
     pub fit_percent: f64,
 }
 
@@ -45,15 +45,16 @@ pub struct Share {
 pub struct ValidationWindow {
     /// First sample, counted from 1; `None`: the first of the record.
     pub start: Option<usize>,
-    /// Number of samples; `None`: all from `start` on.
+    /// Number of samples; `None`: all after `start`.
     pub samples: Option<usize>,
 }
 
 impl ValidationWindow {
-    /// Returns the window to predict of a record whose fitted window had periods of `period` samples.
+    /// Returns the window of a record to predict; `period` is the number of samples in a period of
+    /// the fitted window.
     ///
     /// # Errors
-    /// [`AnalysisError::ValidationPeriod`] if the samples are less than a period of a steady state.
+    /// [`AnalysisError::ValidationPeriod`] if the samples do not cover a period of a steady state.
     pub(super) fn window(
         &self,
         period: Option<usize>,
@@ -71,8 +72,8 @@ impl ValidationWindow {
     }
 }
 
-/// Returns how much of a window that is predicted must be held: of an open record, whose prediction
-/// goes through it in chunks, no more than of a record that is fitted.
+/// Returns the part of a predicted window to buffer. An open record is predicted in chunks, so it
+/// needs no more than a fitted record.
 pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
     match (fitted, prediction) {
         (Hold::Whole, _) => Hold::Whole,
@@ -118,7 +119,7 @@ impl Validation {
         })
     }
 
-    /// Returns the result as a person reads it.
+    /// Returns the result as text for a reader.
     pub fn text(&self) -> String {
         let (first, last) = (self.first_sample, self.last_sample);
         let mut rows = vec![vec![
@@ -133,8 +134,8 @@ impl Validation {
     }
 }
 
-/// Returns the predicted part of each response of an open record, in per cent: one pass finds where it
-/// started, another follows it from there.
+/// Returns the predicted part of each response of an open record, in per cent. The first pass
+/// estimates the initial state, the second predicts from it.
 fn in_stretches(
     recorded: &Windowed,
     system: &SecondOrderSystem,
@@ -173,11 +174,11 @@ fn in_stretches(
     Ok(levels.into_iter().map(|(kind, levels)| (kind, fits(levels))).collect())
 }
 
-/// A channel measured, and what a prediction leaves of it.
+/// Power of a measured channel, and of the residual of its prediction.
 #[derive(Debug, Clone, Default)]
 struct Level {
     measured: RunningStatistics,
-    /// Sum of the squares of what is left.
+    /// Sum of the squares of the residual.
     left: f64,
 }
 
