@@ -8,19 +8,20 @@ use serde::{Deserialize, Serialize};
 use super::units::Role;
 use crate::AnalysisError;
 
-/// Column that stands for a force that does not act, or for a response that was not measured.
+/// Column name for a force that does not act, or for a response that was not measured.
 pub const ABSENT: &str = "0";
 
 /// Columns of force and response, one per degree of freedom, in the same order everywhere.
 ///
-/// A column is named as in the file, or by its number counted from 1; `"0"` stands for a force that
-/// does not act.
+/// A column is identified by its name in the file, or by its number counted from 1; `"0"` means
+/// that the force does not act.
 ///
 /// ```
 /// use mechid_analysis::{Channels, ResponseQuantity};
 ///
 /// let one = Channels::new("force", ResponseQuantity::Displacement, "x");
-/// let two = Channels::new("fx,fy", ResponseQuantity::Displacement, "x,y").and(ResponseQuantity::Velocity, "vx,vy");
+/// let two = Channels::new("fx,fy", ResponseQuantity::Displacement, "x,y");
+/// let two = two.and(ResponseQuantity::Velocity, "vx,vy");
 /// assert_eq!((one.force.len(), two.velocity.len()), (1, 2));
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,13 +38,14 @@ pub struct Channels {
 }
 
 impl Channels {
-    /// Returns the channels of one kind of response under forces; several degrees of freedom are
+    /// Creates the channels of forces and one kind of response; several degrees of freedom are
     /// separated by commas.
     pub fn new(force: &str, response: ResponseQuantity, columns: &str) -> Self {
         Self { force: split(force), ..Self::default() }.and(response, columns)
     }
 
-    /// Returns the channels of responses alone, for the reconstruction of an unknown force.
+    /// Creates the channels of responses without forces, for the reconstruction of an unknown
+    /// force.
     pub fn of_responses(response: ResponseQuantity, columns: &str) -> Self {
         Self::default().and(response, columns)
     }
@@ -59,9 +61,9 @@ impl Channels {
         self
     }
 
-    /// Returns the same channels with a force for each response, where fewer are measured: the
-    /// others do not act. Frequency responses need no place of a force, and take forces and
-    /// responses as two lists.
+    /// Returns the same channels with one force entry for each response: missing ones are forces
+    /// that do not act. Only fits need this; frequency responses accept forces and responses as two
+    /// lists.
     #[must_use]
     pub fn with_a_force_each(mut self) -> Self {
         let responses = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
@@ -81,7 +83,7 @@ impl Channels {
         }
     }
 
-    /// Returns the same channels by other names.
+    /// Returns the same channels with other names.
     pub(crate) fn renamed(&self, mut name: impl FnMut(&String) -> String) -> Self {
         let mut each = |columns: &[String]| -> Vec<String> {
             let of = |column: &String| match column.as_str() {
@@ -98,27 +100,27 @@ impl Channels {
         }
     }
 
-    /// Returns the name of the force on a degree of freedom, counted from 0: `force 2` where it has
-    /// no column.
+    /// Returns the name of the force on a degree of freedom, counted from 0; `force 2` if it has no
+    /// column.
     pub fn force_name(&self, dof: usize) -> String {
         named(&self.force, "force", dof)
     }
 
-    /// Returns the name of a response of a degree of freedom, counted from 0: `velocity 2` where it
+    /// Returns the name of a response of a degree of freedom, counted from 0; `velocity 2` if it
     /// has no column.
     pub fn response_name(&self, kind: ResponseQuantity, dof: usize) -> String {
         named(self.response(kind), &kind.to_string(), dof)
     }
 
-    /// Returns the kind of response that is named first, of displacement, velocity and
+    /// Returns the first kind of response with columns, in the order displacement, velocity,
     /// acceleration.
     pub fn first_response(&self) -> Option<ResponseQuantity> {
         ResponseQuantity::ALL.into_iter().find(|kind| !self.response(*kind).is_empty())
     }
 
-    /// Returns the names in several records of the same machine put together: a force has the name
-    /// from the first record in which it acts, and one that acts at several places in turn, as a
-    /// hammer does, that of its place, too: `force at a1`.
+    /// Returns common names for several records of the same machine. A force has its name in the
+    /// first record in which it acts; a force that acts at several points in turn, as of a roving
+    /// hammer, is also named after the point: `force at a1`.
     pub(crate) fn together(records: &[&Self]) -> Self {
         let mut all = records.first().map(|first| Self::clone(first)).unwrap_or_default();
         for (dof, name) in all.force.iter_mut().enumerate() {
@@ -139,12 +141,12 @@ impl Channels {
         Self { force: force.collect(), ..all.clone() }
     }
 
-    /// Returns the columns of some records in which one force acts, each on another degree of
-    /// freedom (`dofs`, one per record, counted from 1), as that of a hammer does.
+    /// Returns the columns of records with a roving force, one set per record; `dofs` are the
+    /// degrees of freedom of the force, one per record, counted from 1.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] unless there are one force column and a degree of freedom for
-    /// each record, which has a response.
+    /// [`AnalysisError::Setting`] unless there is one force column, and one degree of freedom with
+    /// a response for each record.
     pub fn struck(&self, dofs: &[usize], records: usize) -> Result<Vec<Self>, AnalysisError> {
         let wrong = |why: String| AnalysisError::Setting { setting: "struck", why };
         let [force] = &self.force[..] else {
@@ -168,7 +170,7 @@ impl Channels {
         Ok(dofs.iter().map(of).collect())
     }
 
-    /// Returns the columns that are read and what each is to hold, forces first.
+    /// Returns the columns to read and their quantities, forces first.
     pub(crate) fn roles(&self) -> Vec<Role<'_>> {
         let groups = [
             (&self.force, Quantity::Force, "force"),
@@ -182,13 +184,12 @@ impl Channels {
         groups.filter(|role| role.column != ABSENT).collect()
     }
 
-    /// Returns the columns that are read, forces first.
+    /// Returns the columns to read, forces first.
     pub(crate) fn used(&self) -> Vec<&String> {
         self.roles().into_iter().map(|role| role.column).collect()
     }
 
-    /// Checks that there are a force and a response for every degree of freedom, as an
-    /// identification needs them.
+    /// Checks that every degree of freedom has a force and a response, as identification requires.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`].

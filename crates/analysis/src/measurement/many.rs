@@ -1,4 +1,4 @@
-//! Files that hold many records, told apart by a column.
+//! Files with many records, distinguished by a column.
 
 use std::path::Path;
 use std::slice::from_ref;
@@ -8,7 +8,7 @@ use mechid_io::{ParquetFile, RecordFile, RecordRows, TimeAxis, escaped};
 use super::{Channels, Measurement, Reading};
 use crate::AnalysisError;
 
-/// Number of records that an error lists.
+/// Maximum number of records that an error lists.
 const LISTED: usize = 5;
 
 /// Returns the records of a file, in the order of their rows.
@@ -20,7 +20,7 @@ pub(crate) fn records_of(
     Ok(ParquetFile::open(path, &reading.limits())?.records(column)?)
 }
 
-/// Opens the record asked for, or the only one.
+/// Opens the requested record, or the only one.
 pub(super) fn open_one(
     reading: &Reading,
     path: &Path,
@@ -50,8 +50,7 @@ pub(super) fn open_one(
     Ok(RecordFile::of_table(table).with_memory(file.memory()))
 }
 
-/// Opens records that follow one another in a file, of which only the columns used are read, and
-/// once.
+/// Opens consecutive records of a file in one pass; only the used columns are read.
 pub(crate) fn open_all(
     path: &Path,
     channels: &Channels,

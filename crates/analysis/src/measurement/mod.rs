@@ -1,4 +1,4 @@
-//! Measured forces and responses: which file or arrays, which columns, and which window of them.
+//! Measured forces and responses: file or arrays, columns, and window.
 
 pub mod channels;
 #[cfg(feature = "parquet")]
@@ -27,16 +27,15 @@ pub use self::window::{Window, Windowed};
 use crate::AnalysisError;
 use crate::limits::{FEW_CHANNELS, PAIR_BYTES, PREDICT_BYTES, check_memory};
 
-/// Number of samples in memory of a window that is not needed as a whole.
+/// Maximum number of samples in memory of a window that is not needed as a whole.
 pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 
-/// Number of samples read at a time from a window that is not held in memory.
+/// Number of samples read at a time from a window that is not buffered.
 pub const CHUNK_SAMPLES: usize = 1 << 16;
 
-/// Forces and responses of a machine, in a file of any length or in memory, and the window of them
-/// to use.
+/// Forces and responses of a machine, in a file of any length or in memory, and the window to use.
 ///
-/// Columns in other units are converted to SI units, wherever they come from.
+/// Columns in other units are converted to SI units, from files and from arrays.
 ///
 /// ```
 /// use mechid_analysis::{Channels, Measurement, ResponseQuantity};
@@ -63,7 +62,7 @@ pub(crate) struct RecordSource {
     /// Path that the record was read from; `None` for arrays.
     pub path: Option<PathBuf>,
     pub channels: Channels,
-    /// The same by the names of the columns for results, without units.
+    /// The same channels with the names for results, without units.
     pub names: Arc<Channels>,
     pub reading: Reading,
     /// Time axis of the whole record.
@@ -81,7 +80,7 @@ pub(crate) struct RecordSource {
 #[derive(Debug)]
 enum Samples {
     File(Box<RecordFile>),
-    /// Samples × columns used.
+    /// Samples × used columns.
     Memory(DMatrix<f64>),
 }
 
@@ -90,7 +89,7 @@ enum Samples {
 pub struct Block {
     /// Name of the record for messages.
     pub file: String,
-    /// Samples × degrees of freedom, in N; of a long window the first samples only, as of the
+    /// Samples × degrees of freedom, in N; for a long window only the first samples, also of the
     /// responses.
     pub force: Record,
     /// Samples × degrees of freedom, in m.
@@ -107,7 +106,7 @@ pub struct Block {
     pub periods: usize,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub driven: Vec<usize>,
-    /// Columns that were in other than SI units, and a time axis that may be.
+    /// Remarks on columns that were not in SI units, and on a time axis with a doubtful unit.
     pub unit_remarks: Vec<String>,
     /// Texts in headers that may be units.
     pub unit_findings: Vec<Finding>,
@@ -116,9 +115,9 @@ pub struct Block {
 }
 
 impl Measurement {
-    /// Opens a record file: text, MATLAB or universal file, packed with gzip or not.
+    /// Opens a record file: text, MATLAB or universal file, optionally compressed with gzip.
     ///
-    /// A long text is gone through once and not held in memory.
+    /// A long text is read in one pass and not stored in memory.
     ///
     /// # Errors
     /// The errors of [`Measurement::open_with`].
@@ -142,7 +141,7 @@ impl Measurement {
         Self::of_file(reading.open(path, IN_MEMORY_SAMPLES)?, Some(path), channels, reading)
     }
 
-    /// Takes columns of a file that is open.
+    /// Creates a measurement from columns of an open file.
     pub(crate) fn of_file(
         mut file: RecordFile,
         path: Option<&Path>,
@@ -185,12 +184,12 @@ impl Measurement {
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }
 
-    /// Takes a force and one or several kinds of response from memory, in SI units, samples ×
-    /// degrees of freedom each.
+    /// Creates a measurement from a force and one or several kinds of response in memory, in SI
+    /// units, samples × degrees of freedom each.
     ///
     /// # Errors
-    /// [`AnalysisError::ArrayShape`] if a response is not as long as the force or has not as many
-    /// degrees of freedom.
+    /// [`AnalysisError::ArrayShape`] if a response and the force differ in length or in the number
+    /// of degrees of freedom.
     pub fn from_records(
         force: &Record,
         responses: &[(ResponseQuantity, &Record)],
@@ -219,12 +218,13 @@ impl Measurement {
         Self::from_columns(force.sampling(), &named, &channels)
     }
 
-    /// Takes named columns from memory; a name may say a unit, as in a file (`x [um]`).
+    /// Creates a measurement from named columns in memory; a name may contain a unit, as in a file
+    /// (`x [um]`).
     ///
     /// # Errors
     /// [`AnalysisError::NoColumn`] if a channel has no column, [`AnalysisError::ArrayShape`] if a
-    /// column is not as long as the time axis, [`AnalysisError::Signal`] if a value is not finite,
-    /// [`AnalysisError::Unit`].
+    /// column and the time axis differ in length, [`AnalysisError::Signal`] if a value is not
+    /// finite, [`AnalysisError::Unit`].
     pub fn from_columns(
         sampling: Sampling,
         columns: &[(&str, &[f64])],
@@ -255,7 +255,7 @@ impl Measurement {
             into.copy_from_slice(values);
             labels.push((format!("\"{name}\""), stated_unit(name, "", Some(role.quantity))));
         }
-        // Finite, or an error that says where not.
+        // Refuses values that are not finite.
         let record = Record::new(sampling, data)?;
         let units = ToSi::new("the record", labels.into_iter(), &roles)?;
         let data = record.into_data();
@@ -275,11 +275,11 @@ impl Measurement {
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }
 
-    /// Uses whole periods of this many samples, from the first sample of the window on.
+    /// Uses whole periods of this number of samples, beginning with the first sample of the window.
     ///
     /// # Errors
     /// [`AnalysisError::Window`] if the record is shorter than one period,
-    /// [`AnalysisError::Setting`] for a period of no sample.
+    /// [`AnalysisError::Setting`] for a period without samples.
     pub fn period(mut self, samples: usize) -> Result<Self, AnalysisError> {
         self.window.period = Some(samples);
         self.span().map(|_| self)
@@ -288,14 +288,14 @@ impl Measurement {
     /// Uses a part of the record.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of it, [`AnalysisError::Setting`]
-    /// for a period of no sample.
+    /// [`AnalysisError::Window`] if the window exceeds the record, [`AnalysisError::Setting`] for a
+    /// period without samples.
     pub fn window(mut self, window: Window) -> Result<Self, AnalysisError> {
         self.window = window;
         self.span().map(|_| self)
     }
 
-    /// Gives the record a name for messages and results, as for a record from memory.
+    /// Names the record in messages and results, for instance one from memory.
     #[must_use]
     pub fn named(mut self, name: &str) -> Self {
         if let Some(source) = Arc::get_mut(&mut self.source) {
@@ -304,7 +304,7 @@ impl Measurement {
         self
     }
 
-    /// Returns the name of the record in messages: that of the file as the user wrote it.
+    /// Returns the name of the record in messages: the file name as the user wrote it.
     pub fn name(&self) -> &str {
         &self.source.name
     }
@@ -327,7 +327,7 @@ impl Measurement {
         Ok(self.hold(Hold::Whole)?.held.force)
     }
 
-    /// Returns every kind of response measured, over the whole window, samples × degrees of freedom
+    /// Returns every measured kind of response over the whole window, samples × degrees of freedom,
     /// in m, m/s or m/s².
     ///
     /// # Errors
@@ -337,7 +337,7 @@ impl Measurement {
         Ok(held.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
     }
 
-    /// Returns the saved form; `None` for a record from memory.
+    /// Returns the settings that open the record again; `None` for a record from memory.
     pub fn plan(&self) -> Option<RecordPlan> {
         Some(RecordPlan {
             path: self.source.path.clone()?,
@@ -382,7 +382,7 @@ impl Measurement {
         self.window.span(&self.source.name, self.source.sampling.len())
     }
 
-    /// Reads the window and holds as much of it in memory as `hold` says.
+    /// Reads the window and buffers the part stated by `hold`.
     ///
     /// # Errors
     /// [`AnalysisError::Window`], [`AnalysisError::ZeroForce`] if no force acts, and if the file
@@ -393,7 +393,7 @@ impl Measurement {
 }
 
 impl Measurement {
-    /// Reads the whole window of any numbers of forces and responses and holds it.
+    /// Reads and buffers the whole window, with any numbers of forces and responses.
     ///
     /// # Errors
     /// As [`Measurement::hold`].
@@ -410,15 +410,15 @@ fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
 }
 
 impl RecordSource {
-    /// Refuses work on so many samples of the columns used, of `bytes` bytes a number, that takes
-    /// too much memory.
+    /// Refuses a computation on `samples` samples of the used columns, with `bytes` bytes a number,
+    /// that needs too much memory.
     pub fn check_memory(&self, samples: usize, bytes: usize) -> Result<(), AnalysisError> {
         let numbers = samples.saturating_mul(self.channels.roles().len());
         check_memory(&self.name, numbers, bytes, self.memory)
     }
 
-    /// Refuses work on the noise of so many spectral lines of all columns used that takes too much
-    /// memory.
+    /// Refuses a computation on the noise of `lines` spectral lines of all used columns that needs
+    /// too much memory.
     pub fn check_spectra(&self, lines: usize) -> Result<(), AnalysisError> {
         let channels = self.channels.roles().len();
         if channels <= FEW_CHANNELS {
@@ -428,9 +428,9 @@ impl RecordSource {
         check_memory(&self.name, pairs, PAIR_BYTES, self.memory)
     }
 
-    /// Passes the samples `window` of the columns used on in blocks of `rows` rows (samples ×
-    /// columns, SI units, offsets subtracted), each beginning `advance` rows after the one before;
-    /// the last may be shorter.
+    /// Passes the samples `window` of the used columns to the callback in blocks of `rows` rows
+    /// (samples × columns, SI units, offsets subtracted). Each block begins `advance` rows after
+    /// the previous one; the last may be shorter.
     pub fn blocks(
         &self,
         window: std::ops::Range<usize>,
@@ -472,7 +472,7 @@ impl RecordSource {
         }
     }
 
-    /// Sorts a block that begins with sample `first`, counted from 1, into forces and responses.
+    /// Sorts a block whose first sample is `first`, counted from 1, into forces and responses.
     pub fn sorted(&self, block: &DMatrix<f64>, first: usize) -> Result<Block, AnalysisError> {
         let sampling = self.sampling.with_len(block.nrows())?;
         let mut next = block.as_slice().chunks_exact(block.nrows());
@@ -509,13 +509,13 @@ impl RecordSource {
 }
 
 impl Block {
-    /// Returns the first kind of response measured.
+    /// Returns the first measured kind of response.
     pub fn response(&self) -> (&Record, ResponseQuantity) {
         let (kind, record) = self.responses()[0];
         (record, kind)
     }
 
-    /// Returns every kind of response measured.
+    /// Returns every measured kind of response.
     pub fn responses(&self) -> Vec<(ResponseQuantity, &Record)> {
         let candidates = [
             (ResponseQuantity::Displacement, &self.displacement),
@@ -537,7 +537,7 @@ impl Block {
         self.first_sample + self.period * self.periods - 1
     }
 
-    /// Returns the last sample that is held, counted from 1, if others follow in the window.
+    /// Returns the last buffered sample, counted from 1; `None` if the whole window is buffered.
     pub fn held_to(&self) -> Option<usize> {
         let held = self.first_sample + self.force.len() - 1;
         (held < self.last_sample()).then_some(held)

@@ -18,29 +18,29 @@ use crate::limits::memory_bytes;
 pub struct Reading {
     /// Number of header lines to skip above a table of text.
     pub skip_lines: u64,
-    /// Time column, by name or number counted from 1; `None`: the file's own time axis, or a column
-    /// called time or t.
+    /// Time column, by name or number counted from 1; `None`: the time axis of the file, or a
+    /// column called time or t.
     pub time: Option<String>,
-    /// Sampling rate, in Hz, where there is no time column.
+    /// Sampling rate, in Hz, if there is no time column.
     pub sample_rate_hz: Option<f64>,
     /// Constant to subtract from every channel.
     pub detrend: Detrend,
-    /// Column whose value names the record of each row, where a Parquet file holds many records.
+    /// Column whose value names the record of each row, in a Parquet file with many records.
     pub record_column: Option<String>,
-    /// Record to read of such a file, by its value in that column; `None`: the only one.
+    /// Record of such a file to read, by its value in this column; `None`: the only one.
     pub record_id: Option<String>,
-    /// Units of columns, by their names or numbers, whatever their headers say: `g`, `lbf`, `ms`.
+    /// Units of columns, by their names or numbers; they replace those in the headers: `g`, `lbf`,
+    /// `ms`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
-    /// Factors that take columns to SI units, by their names or numbers, whatever their headers
-    /// say; in SI units per unit of the column.
+    /// Factors to SI units, by column name or number; they replace the units in the headers; in SI
+    /// units per unit of the column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scales: BTreeMap<String, f64>,
-    /// Factor by which to raise the limits on what a file may ask of memory
-    /// ([`mechid_io::Limits`]); `None`: 1.
+    /// Factor on the memory limits for reading a file ([`mechid_io::Limits`]); `None`: 1.
     pub limits_factor: Option<usize>,
-    /// Memory that the numbers of a file and the work on them may take, in units of GB; `None`:
-    /// 0.27 GB and 512 bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
+    /// Maximum memory for the numbers of a file and their analysis, in GB; `None`: 0.27 GB and 512
+    /// bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_gb: Option<f64>,
 }
@@ -57,18 +57,18 @@ pub enum Detrend {
 }
 
 impl Reading {
-    /// Opens a record file, of whose text at most `rows` rows are held in memory.
+    /// Opens a record file; at most `rows` rows of a text are kept in memory.
     ///
     /// # Errors
-    /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold
-    /// the record asked for, or several and none is asked for.
+    /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not contain
+    /// the requested record, or contains several and none is requested.
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
         let mut file = self.open_as_written(path, rows)?;
         self.state_units(&mut file)?;
         Ok(file)
     }
 
-    /// Gives the columns of a file the units and factors that are stated.
+    /// Applies the stated units and factors to the columns of a file.
     pub(super) fn state_units(&self, file: &mut RecordFile) -> Result<(), AnalysisError> {
         for (column, unit) in &self.units {
             file.set_unit(column, unit)?;
@@ -101,7 +101,8 @@ impl Reading {
         }
     }
 
-    /// Returns the time axis asked for, that of the file, or the time column found by its name.
+    /// Returns the requested time axis, otherwise the one of the file, otherwise the time column
+    /// identified by its name.
     pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
         match (self.sample_rate_hz, &self.time) {
             (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
@@ -112,7 +113,7 @@ impl Reading {
     }
 }
 
-/// A record file with all that says what is in it: the saved form of a [`Measurement`].
+/// A record file with its channels, settings and window: the saved form of a [`Measurement`].
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RecordPlan {

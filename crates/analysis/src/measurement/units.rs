@@ -126,8 +126,8 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
 /// Maximum relative difference of equal sampling rates, because a time column has few digits.
 const SAME_RATE: f64 = 1e-4;
 
-/// Returns a remark if the given sampling rate differs from that of the file: of its time column,
-/// or of a number with the name of a sampling rate (`Fs`).
+/// Returns a remark if the given sampling rate differs from the rate of the file, which its time
+/// column or a number with the name of a sampling rate (`Fs`) gives.
 pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<String> {
     let rate_hz = reading.sample_rate_hz?;
     let of_file = Reading { sample_rate_hz: None, ..reading.clone() };
@@ -162,8 +162,8 @@ const LONG_S: f64 = 1000.0;
 /// needs it, but day numbers read as seconds give it.
 const FAST_HZ: f64 = 1e7;
 
-/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: that of day numbers at
-/// 1 Hz.
+/// Minimum doubtful sampling rate, in Hz, of instants above [`DAY_NUMBERS`]: the rate of day
+/// numbers at 1 Hz.
 const RATHER_FAST_HZ: f64 = 86_400.0;
 
 /// Smallest instant that may be a day number: 20,000 is a day of 1954 in a spreadsheet.

@@ -1,4 +1,4 @@
-//! The window of a record, and how much of it is held in memory.
+//! The window of a record, and the part of it that is buffered in memory.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use crate::limits::{STRETCH_BYTES, WHOLE_BYTES};
 pub struct Window {
     /// First sample, counted from 1.
     pub start: usize,
-    /// Number of samples in one period; `None`: all samples from `start` on are one window.
+    /// Number of samples in one period; `None`: all samples after `start` are one window.
     pub period: Option<usize>,
-    /// Number of whole periods; `None`: as many as there are.
+    /// Number of whole periods; `None`: as many as the record contains.
     pub periods: Option<usize>,
 }
 
@@ -30,12 +30,12 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Returns the first sample, counted from 0, and the number of samples of the window into a
-    /// record of `samples` samples called `file`.
+    /// Returns the first sample, counted from 0, and the number of samples of the window in a
+    /// record `file` with `samples` samples.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of them,
-    /// [`AnalysisError::Setting`] for a period of no sample.
+    /// [`AnalysisError::Window`] if the window exceeds the record, [`AnalysisError::Setting`] for a
+    /// period without samples.
     pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), AnalysisError> {
         if self.period == Some(0) {
             let why = "a period has one sample or more, not 0".into();
@@ -58,19 +58,19 @@ impl Window {
     }
 }
 
-/// Amount of a window that is held in memory.
+/// Part of a window that is buffered in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hold {
-    /// All of it.
+    /// The whole window.
     Whole,
-    /// Number of whole periods that [`IN_MEMORY_SAMPLES`] samples have, one at least.
+    /// Whole periods within [`IN_MEMORY_SAMPLES`] samples, at least one.
     Periods,
     /// [`IN_MEMORY_SAMPLES`] samples, or this number if it is larger.
     Samples(usize),
 }
 
 impl Hold {
-    /// Number of samples to keep in memory for a window of `len` samples with period `period`.
+    /// Returns the number of samples to buffer for a window of `len` samples with period `period`.
     fn samples(self, len: usize, period: usize) -> usize {
         let held = match self {
             Hold::Whole => len,
@@ -80,7 +80,7 @@ impl Hold {
         held.min(len)
     }
 
-    /// Bytes of memory for each number that is held.
+    /// Returns the memory, in bytes, for each buffered number.
     fn bytes(self) -> usize {
         match self {
             Hold::Whole => WHOLE_BYTES,
@@ -89,11 +89,10 @@ impl Hold {
     }
 }
 
-/// The window of a measurement, which can be gone through from beginning to end, however long it
-/// is.
+/// The window of a measurement, which can be processed from beginning to end at any length.
 #[derive(Debug, Clone)]
 pub struct Windowed {
-    /// Samples held in memory, from the first one on.
+    /// Buffered samples, beginning with the first.
     pub held: Block,
     source: Arc<RecordSource>,
     /// Samples, counted from 0.
@@ -106,7 +105,7 @@ impl Windowed {
         Self::of_any_layout(measurement, hold)
     }
 
-    /// Reads a window whose forces and responses need not belong to the same degrees of freedom.
+    /// Reads a window in which forces and responses may belong to different degrees of freedom.
     pub(super) fn of_any_layout(
         measurement: &Measurement,
         hold: Hold,
@@ -134,12 +133,12 @@ impl Windowed {
         Ok(Self { held, source, window: start..start + len })
     }
 
-    /// Number of samples in the window, held or not.
+    /// Returns the number of samples in the window, whether buffered or not.
     pub(crate) fn samples(&self) -> usize {
         self.window.len()
     }
 
-    /// Refuses work on the noise of so many spectral lines that takes too much memory.
+    /// Refuses a computation on the noise of `lines` spectral lines that needs too much memory.
     ///
     /// # Errors
     /// [`AnalysisError::Memory`].
@@ -147,16 +146,16 @@ impl Windowed {
         self.source.check_spectra(lines)
     }
 
-    /// Returns the samples held in memory and drops the rest.
+    /// Returns the buffered samples and drops the rest.
     pub fn into_held(self) -> Block {
         self.held
     }
 
-    /// Returns some samples of a window that is held as a whole, counted from its first, under
-    /// another force.
+    /// Returns a range of samples, counted from the first, of a fully buffered window, with another
+    /// force.
     ///
     /// # Errors
-    /// [`AnalysisError::Signal`] if the window does not have them.
+    /// [`AnalysisError::Signal`] if the range exceeds the window.
     pub(crate) fn part(&self, samples: Range<usize>, force: Record) -> Result<Self, AnalysisError> {
         let held = &self.held;
         let part = |record: &Option<Record>| {
@@ -181,7 +180,7 @@ impl Windowed {
         Ok(Self { held, source: Arc::clone(&self.source), window })
     }
 
-    /// Returns how many samples to take at a time: all of a window that is held.
+    /// Returns the number of samples to process at a time: the whole window if it is buffered.
     pub(crate) fn at_once(&self) -> usize {
         match self.held.held_to() {
             None => self.held.force.len().max(CHUNK_SAMPLES),
@@ -189,9 +188,9 @@ impl Windowed {
         }
     }
 
-    /// Passes the window to `take` in chunks of `samples` samples, each beginning `advance` samples
-    /// after the one before; the last may be shorter. A window that is held and fits into one chunk
-    /// is not read again.
+    /// Passes the window to `take` in chunks of `samples` samples. Each chunk begins `advance`
+    /// samples after the previous one; the last may be shorter. A buffered window that fits into
+    /// one chunk is not read again.
     pub(crate) fn chunks(
         &self,
         samples: usize,
