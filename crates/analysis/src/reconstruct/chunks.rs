@@ -1,4 +1,4 @@
-//! The force of an open record that is not held.
+//! Reconstruction of the force of an open record in chunks.
 
 use std::ops::Range;
 
@@ -13,9 +13,10 @@ use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::CHUNK_SAMPLES;
 
-/// Returns whether a method finds each sample of an open record from those beside it.
+/// Returns whether a method reconstructs each sample of an open record from neighbouring samples
+/// only.
 pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> bool {
-    // The phase that channels add is that of the whole record.
+    // The correction of the channels' phase needs the whole record.
     let phase = machine.nonlinear.as_ref().is_some_and(|p| p.channels != ChannelPhase::default());
     let whole = request.periodic || request.band_hz.is_some();
     !phase && !whole && matches!(method, Method::Continuous | Method::Discretised)
@@ -25,7 +26,7 @@ pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> b
 pub type Take<'a> =
     dyn FnMut(&Measurement, &IdentifiedForce, Range<usize>) -> Result<(), AnalysisError> + 'a;
 
-/// Finds the force by such a method, one chunk after the other.
+/// Reconstructs the force by such a method, chunk by chunk.
 pub fn find(
     request: &Request,
     machine: &Machine,
@@ -37,8 +38,8 @@ pub fn find(
     if !complete(&recorded.channels, machine.system().dof(), with_acceleration) {
         return Err(AnalysisError::ForceMotions { with_acceleration });
     }
-    // From sample to sample the force at a sample is the mean of what the steps before and after
-    // it say: at the ends of a chunk one of them is missing, unless the record ends there too.
+    // The force at a sample is the mean of the values from the step before and the step after. At
+    // the ends of a chunk one of these steps is missing, so the chunks overlap.
     let beside = usize::from(!with_acceleration);
     let advance = CHUNK_SAMPLES - 2 * beside;
     let (len, mut first) = (recorded.sampling.len(), 0);
@@ -53,8 +54,8 @@ pub fn find(
     })
 }
 
-/// The error with the sample that it names counted from the beginning of the window, not from that
-/// of the chunk beginning with sample `first`.
+/// Returns the error with its sample counted from the beginning of the window rather than of the
+/// chunk, whose first sample is `first`.
 fn of_the_window(error: AnalysisError, first: usize) -> AnalysisError {
     match error {
         AnalysisError::Force(ForceError::Signal(SignalError::NotFinite {

@@ -1,4 +1,4 @@
-//! Consistency of velocity with the rate of displacement, and of acceleration with that of
+//! Consistency of velocity with the rate of displacement, and of acceleration with the rate of
 //! velocity.
 
 use mechid_force::{Channel, Measurement};
@@ -6,12 +6,12 @@ use mechid_model::ResponseQuantity;
 
 use crate::text::significant;
 
-/// Two channels, one of which should be the rate of the other, as a record goes by.
+/// Two channels and their running sums; one channel should be the rate of the other.
 #[derive(Debug)]
 struct Pair {
     motion: usize,
     rate: usize,
-    /// Sums over the steps: change of the motion times that by the rate, and the square of each.
+    /// Sums over the steps: measured change times integrated change, and the square of each.
     product: f64,
     changes: f64,
     by_rate: f64,
@@ -21,14 +21,15 @@ struct Pair {
 #[derive(Debug)]
 pub struct KinematicConsistency(Vec<Pair>);
 
-/// Correlation below which noise may have made the difference.
+/// Minimum correlation for a comparison of magnitudes; below it noise may explain a difference.
 const ALIKE: f64 = 0.7;
 
-/// Ratio that no sampling makes: the trapezoidal rule is as far out with 2.4 samples per period.
+/// Minimum ratio of magnitudes for a remark; the trapezoidal rule has such an error only below 2.4
+/// samples per period.
 const ANOTHER_UNIT: f64 = 3.0;
 
 impl KinematicConsistency {
-    /// The pairs among these channels.
+    /// Creates the pairs among these channels.
     pub fn of(channels: &[Channel]) -> Self {
         let find = |dof: usize, quantity: ResponseQuantity| {
             channels.iter().position(|c| *c == Channel { dof, quantity })
@@ -44,7 +45,7 @@ impl KinematicConsistency {
         Self(channels.iter().enumerate().filter_map(pair).collect())
     }
 
-    /// Takes the steps of some samples: x(k+1) − x(k) and Δt (ẋ(k) + ẋ(k+1))/2.
+    /// Adds the steps of the samples: x(k+1) − x(k) and Δt (ẋ(k) + ẋ(k+1))/2.
     pub fn push(&mut self, measured: &Measurement) {
         let (record, half) = (measured.record(), 0.5 * measured.sampling().dt());
         for pair in &mut self.0 {
@@ -58,7 +59,7 @@ impl KinematicConsistency {
         }
     }
 
-    /// Returns a remark for each pair that does not belong together.
+    /// Returns a remark for each inconsistent pair.
     pub fn remarks(&self, columns: &[String]) -> Vec<String> {
         let mismatch = |pair: &Pair| {
             let alike = pair.product / (pair.changes * pair.by_rate).sqrt();

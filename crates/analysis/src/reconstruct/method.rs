@@ -1,4 +1,4 @@
-//! The methods, which of them suits a record, and what it finds.
+//! Reconstruction methods, their selection and their results.
 
 use std::f64::consts::TAU;
 
@@ -26,49 +26,49 @@ pub struct Request {
     /// Degrees of freedom with an unknown force, counted from 0.
     pub forced: Vec<usize>,
     pub lines: Option<Vec<usize>>,
-    /// Frequencies between which the force is sought, in Hz.
+    /// Frequency band of the reconstructed force, in Hz.
     pub band_hz: Option<[f64; 2]>,
     pub periodic: bool,
     pub start: Start,
     pub rule: Rule,
-    /// Standard deviation of the noise in each measured channel, in its SI unit, as far as the mean
-    /// of the periods has it; empty if not known.
+    /// Standard deviation of the noise on each measured channel, averaged over the periods, in its
+    /// SI unit; empty if unknown.
     pub noise: Vec<f64>,
-    /// Periods in that mean.
+    /// Number of averaged periods.
     pub averaged: usize,
 }
 
-/// A force and how it was found.
+/// A reconstructed force with its method.
 pub struct Found {
     pub force: IdentifiedForce,
     pub how: How,
 }
 
-/// Method of a reconstruction and what it chose.
+/// Method of a reconstruction and its chosen parameters.
 pub struct How {
     pub method: &'static str,
     /// Reason for this method.
     pub why: String,
-    /// Whether the standard error counts the noise of the record.
+    /// `true` if the standard error includes the noise of the record.
     pub counts_noise: bool,
-    /// Parameters that were chosen, with their units.
+    /// Chosen parameters, with their units.
     pub chosen: Vec<(String, f64, &'static str)>,
-    /// Unexplained part of each measured channel; `None` where there is no surplus channel.
+    /// Unexplained part of each measured channel; `None` without surplus channels.
     pub unexplained: Option<Vec<Unexplained>>,
-    /// Frequency, in Hz, below which the responses show less of a force than noise; `None` where
-    /// the method does not tell, or they show it nowhere.
+    /// Frequency, in Hz, below which noise exceeds the part of the force in the responses; `None`
+    /// if the method cannot decide, or if noise prevails at all frequencies.
     pub seen_from_hz: Option<f64>,
-    /// Frequencies between which force and standard error hold, in Hz; `None`: all.
+    /// Frequency band, in Hz, in which force and standard error are valid; `None`: all.
     pub band_hz: Option<[f64; 2]>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
 }
 
-/// The method for a record of these channels, and the reason for it.
+/// Returns the method for a record with these channels, and the reason for it.
 ///
 /// # Errors
-/// [`AnalysisError::NonlinearMachine`] where the machine is not linear and the motion not complete,
-/// or another method was asked for than its equation of motion.
+/// [`AnalysisError::NonlinearMachine`] if the machine is nonlinear and the response is incomplete,
+/// or if the requested method is not the equation of motion.
 pub fn choose(
     request: &Request,
     machine: &Machine,
@@ -100,7 +100,7 @@ pub fn choose(
     Ok((method, why))
 }
 
-/// Reconstructs the force, with the uncertainty of the machine if it is known.
+/// Reconstructs the force; a known uncertainty of the machine is propagated.
 pub fn find(
     request: &Request,
     machine: &Machine,
@@ -142,7 +142,7 @@ fn noise(request: &Request, unknown: Noise) -> Noise {
     if request.noise.is_empty() { unknown } else { Noise::PerChannel(request.noise.clone()) }
 }
 
-/// Reconstructs the force by the equation of motion, sample by sample or from each sample to the
+/// Reconstructs the force by the equation of motion, at each sample or from each sample to the
 /// next.
 pub fn equation(
     request: &Request,
@@ -174,7 +174,7 @@ pub fn equation(
     })
 }
 
-/// Reconstructs the force of a machine with nonlinear terms, from the motion corrected for the
+/// Reconstructs the force of a machine with nonlinear terms, from the response corrected for the
 /// phase of its channels.
 fn with_terms(
     part: &NonlinearPart,
@@ -196,8 +196,8 @@ fn with_terms(
     })?)
 }
 
-/// Returns the stated noise of each channel as the noise of a complete motion; `None` without a
-/// statement.
+/// Returns the stated noise of each channel as the noise of a complete response; `None` if it is
+/// not stated.
 fn motion_noise(
     request: &Request,
     motion: &Measurement,
@@ -271,7 +271,7 @@ fn lines(
 }
 
 /// Returns the source of the noise if it is not stated: the lines without force, if there are
-/// enough. Lines outside a band may have a force that is not reconstructed.
+/// enough. Outside a band a force may act that is not reconstructed.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);
     let needed = mechid_force::MIN_OUTSIDE_LINES;
@@ -340,11 +340,12 @@ fn in_band_of(motion: &Measurement, force: &IdentifiedForce) -> Result<Measureme
     })
 }
 
-/// Minimum share of the power of a response on the given lines; with less, it has another cause.
+/// Minimum share of the power of a response on the given lines; with less, the response has another
+/// cause.
 const FEW: f64 = 0.5;
 
 /// Returns a remark about the channel with the smallest share of its power on the given lines, if
-/// the share is small: the lines may refer to another period than that of the window.
+/// the share is small: the lines may refer to a period other than the window's.
 fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;
     let spectrum = Spectrum::of(motion.record());

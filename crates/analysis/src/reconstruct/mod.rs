@@ -7,7 +7,7 @@
 //! | `method` | the choice of the method, and its result |
 //! | `chunks` | the reconstruction of a record that is not in memory |
 //! | `shown` | the band in which responses without a displacement show a force |
-//! | `unexplained`, `periods`, `kinematics` | doubts about the result |
+//! | `unexplained`, `periods`, `kinematics` | warnings about the result |
 //! | `tally`, `peak_line` | levels and strongest line of the force |
 //! | `summary` | the result: numbers and remarks |
 
@@ -44,7 +44,7 @@ use crate::measurement::Measurement;
 
 /// Reconstructed force on a machine, with its method.
 ///
-/// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
+/// [`Display`](fmt::Display) formats the result for a reader, `serde` for programs.
 #[derive(Debug)]
 pub struct Reconstructed {
     summary: ForceSummary,
@@ -60,15 +60,15 @@ pub struct ForceChunk<'a> {
     pub sampling: Sampling,
     /// The force; `samples` are its new samples.
     pub force: &'a IdentifiedForce,
-    /// Samples of `force` that follow those of the chunk before.
+    /// Samples of `force` after those of the previous chunk.
     pub samples: Range<usize>,
-    /// `true` if its standard error counts the noise of the record.
+    /// `true` if its standard error includes the noise of the record.
     pub counts_noise: bool,
 }
 
 impl ForceChunk<'_> {
-    /// Returns the columns of a table, named: force and, where known, its standard error, which
-    /// without the noise is that of the machine alone, in N.
+    /// Returns the columns of a table with their names: the force and, if known, its standard
+    /// error, in N; without the noise, it includes only the uncertainty of the machine.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         let dofs = self.force.record().channels();
         let name = |base: &str, dof| numbered(base, dof, dofs);
@@ -87,22 +87,22 @@ impl ForceChunk<'_> {
     }
 }
 
-/// Returns `base`, or `base_1`, `base_2` … where there are several degrees of freedom.
+/// Returns `base`, or `base_1`, `base_2` … with several degrees of freedom.
 pub fn numbered(base: &str, dof: usize, dofs: usize) -> String {
     if dofs == 1 { base.into() } else { format!("{base}_{}", dof + 1) }
 }
 
 /// Reconstructs the force on a known machine from its measured response.
 ///
-/// The window is whole periods if the measurement has a period or `lines` are given (they are
-/// averaged), an open record otherwise. The uncertainty of an identified machine counts in the
-/// standard error of the force.
+/// The window is treated as whole periods if the measurement has a period or `lines` are given
+/// (periods are averaged), otherwise as an open record. The standard error of the force includes
+/// the uncertainty of an identified machine.
 ///
 /// # Errors
-/// [`AnalysisError::MotionCount`] or [`AnalysisError::NoMotion`] if the responses do not fit the
-/// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], what the method cannot be
-/// done with ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
-/// [`AnalysisError::KalmanIsOpen`], [`AnalysisError::BandMethod`]), and its own failure.
+/// [`AnalysisError::MotionCount`] or [`AnalysisError::NoMotion`] if the responses do not match the
+/// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], unmet requirements of the
+/// method ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
+/// [`AnalysisError::KalmanIsOpen`], [`AnalysisError::BandMethod`]), and its numerical failure.
 pub fn reconstruct(
     run: &Measurement,
     machine: &Machine,
@@ -128,7 +128,7 @@ pub fn reconstruct_with(
     Ok(Reconstructed { summary, force, forced, lines })
 }
 
-/// Reconstructs the force of a record of any length: it passes the force to `take` chunk by chunk
+/// Reconstructs the force of a record of any length: it passes the force to `take` chunk by chunk,
 /// in order, and stores no more of it than the method needs.
 ///
 /// # Errors
@@ -176,7 +176,7 @@ impl Serialize for Reconstructed {
     }
 }
 
-/// A reconstruction before it is done.
+/// A reconstruction before its computation.
 struct Task {
     recorded: Recorded,
     request: Request,
@@ -190,8 +190,8 @@ impl Task {
         Ok(Self { recorded, request })
     }
 
-    /// Finds the force, chunk by chunk where that will do and all of it is not asked for; only
-    /// otherwise it is returned.
+    /// Reconstructs the force, in chunks if the method allows it and the whole force is not
+    /// requested; only otherwise is the force returned.
     fn find(
         &self,
         machine: &Machine,

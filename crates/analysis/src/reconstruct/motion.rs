@@ -13,11 +13,11 @@ use crate::AnalysisError;
 use crate::measurement::channels::ABSENT;
 use crate::measurement::{self, CHUNK_SAMPLES, RecordSource};
 
-/// The responses in a record, of which no more is held in memory than is asked for.
+/// The responses in a record; they are buffered only on request.
 pub struct Recorded {
     source: Arc<RecordSource>,
     columns: Vec<String>,
-    /// Number of force columns, which stand before those of the responses.
+    /// Number of force columns; they precede the response columns.
     forces: usize,
     /// Degree of freedom and quantity of each column.
     pub channels: Vec<Channel>,
@@ -32,13 +32,13 @@ pub struct Recorded {
 /// The samples of a window, or of its mean period.
 pub struct Held {
     pub motion: Measurement,
-    /// Scatter of the periods about their mean, one per channel; `None` where there is one period.
+    /// Scatter of the periods about their mean, one per channel; `None` with one period.
     pub scatter: Option<Vec<Scatter>>,
 }
 
 impl Recorded {
-    /// Finds the responses and the window of a measurement; a periodic window is averaged over its
-    /// periods.
+    /// Selects the responses and the window of a measurement; a periodic window is averaged over
+    /// its periods.
     pub fn new(
         measured: &measurement::Measurement,
         dofs: usize,
@@ -78,8 +78,8 @@ impl Recorded {
         &self.columns
     }
 
-    /// Returns the levels stated of the columns, in their units, as the held samples have them: in
-    /// SI units, and of the mean of periods.
+    /// Converts stated noise levels of the columns, in their units, to levels of the buffered
+    /// samples: in SI units, and reduced by the averaging of periods.
     pub fn levels(&self, stated: &[f64]) -> Vec<f64> {
         let mean = (self.periods as f64).sqrt();
         let stated = stated.iter().enumerate();
@@ -88,13 +88,13 @@ impl Recorded {
             .collect()
     }
 
-    /// Returns what is to be said about units and time.
+    /// Returns findings and remarks about units and time.
     pub fn unit_notes(&self) -> Vec<String> {
         let findings = self.source.units.findings.iter().map(ToString::to_string);
         findings.chain(self.source.units.remarks.iter().cloned()).collect()
     }
 
-    /// Returns all of the window, or its mean period.
+    /// Returns the whole window, or its mean period.
     pub fn hold(&self) -> Result<Held, AnalysisError> {
         let period = self.sampling.len();
         let mut mean = DMatrix::zeros(period, self.channels.len());
@@ -121,8 +121,8 @@ impl Recorded {
         Ok(Held { motion: self.measurement(mean)?, scatter })
     }
 
-    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples
-    /// after the one before; the last may be shorter.
+    /// Passes the window to the callback in chunks of `samples` samples. Each chunk begins
+    /// `advance` samples after the previous one; the last may be shorter.
     pub fn chunks(
         &self,
         samples: usize,
@@ -132,7 +132,7 @@ impl Recorded {
         self.blocks(samples, advance, &mut |block| take(&self.measurement(block)?))
     }
 
-    /// The same, as samples × channels in SI units.
+    /// Passes the same chunks as samples × channels in SI units.
     fn blocks(
         &self,
         samples: usize,
@@ -153,22 +153,23 @@ impl Recorded {
     }
 }
 
-/// The channels with this quantity of every degree of freedom, if all were measured.
+/// Returns the channels with this quantity for every degree of freedom; `None` unless all were
+/// measured.
 fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Option<Vec<usize>> {
     let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
     (0..dofs).map(find).collect()
 }
 
 /// Returns whether displacement and velocity of every degree of freedom were measured, and, if
-/// asked for, acceleration.
+/// requested, acceleration.
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
     let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];
     needed.extend(with_acceleration.then_some(ResponseQuantity::Acceleration));
     needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
 }
 
-/// Displacement, velocity and acceleration of every degree of freedom, if all were measured;
-/// without accelerations these are zero.
+/// Returns displacement, velocity and acceleration of every degree of freedom; `None` unless all
+/// were measured. Without accelerations these are zero.
 pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
     let record = measured.record();
     let all = |quantity: ResponseQuantity| -> Option<Record> {

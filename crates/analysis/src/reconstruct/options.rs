@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::identify::Band;
 
-/// Settings of the reconstruction of the force that drove a known machine.
+/// Settings for the reconstruction of the unknown force on a known machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Reconstruct {
@@ -14,10 +14,10 @@ pub struct Reconstruct {
     pub method: Method,
     /// Degrees of freedom on which a force acts, counted from 1; empty: all.
     pub forced: Vec<usize>,
-    /// Spectral lines with force; `None`: not known.
+    /// Spectral lines with force; `None` if unknown.
     pub lines: Option<LineSpec>,
-    /// Frequencies between which the force is sought, ends included; `None`: all, or without a
-    /// displacement those at which the responses show a force.
+    /// Frequency band of the reconstructed force, ends included; `None`: all frequencies, or
+    /// without a displacement those at which the responses show a force.
     pub band_hz: Option<Band>,
     /// `true` if an open record begins at rest.
     pub at_rest: bool,
@@ -32,7 +32,7 @@ pub struct Reconstruct {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// The method that suits the record.
+    /// Chosen automatically for the record.
     #[default]
     Auto,
     /// Equation of motion, sample by sample: displacement, velocity and acceleration of every
@@ -58,7 +58,7 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterRule {
-    /// Nearest to the posterior mean of the force.
+    /// Likelihood: closest to the posterior mean of the force.
     #[default]
     Likelihood,
     /// Generalised cross-validation.
@@ -81,7 +81,7 @@ impl ParameterRule {
 }
 
 impl Reconstruct {
-    /// Returns the settings for the method that suits the record.
+    /// Returns the settings for an automatic choice of the method.
     pub fn auto() -> Self {
         Self::default()
     }
@@ -91,13 +91,13 @@ impl Reconstruct {
         Self { method, ..Self::default() }
     }
 
-    /// Seeks the force between two frequencies only.
+    /// Reconstructs the force only between two frequencies.
     #[must_use]
     pub fn band(self, band_hz: Band) -> Self {
         Self { band_hz: Some(band_hz), ..self }
     }
 
-    /// Seeks forces on these degrees of freedom only, counted from 1.
+    /// Reconstructs forces only on these degrees of freedom, counted from 1.
     #[must_use]
     pub fn forced(self, dofs: impl Into<Vec<usize>>) -> Self {
         Self { forced: dofs.into(), ..self }

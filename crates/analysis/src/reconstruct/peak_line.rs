@@ -8,18 +8,18 @@ use nalgebra::DMatrix;
 use crate::AnalysisError;
 use crate::measurement::{CHUNK_SAMPLES, IN_MEMORY_SAMPLES};
 
-/// The lines of a force: of all of it, or their mean power over pieces of a long open record.
+/// Spectrum of a force: of the whole force, or the mean power of segments of a long open record.
 ///
-/// Pieces are spread evenly from its first sample to its last one and cover all of it.
+/// The segments are spaced evenly from the first sample to the last and cover all samples.
 pub struct PeakLine {
     /// Samples of the force.
     samples: usize,
-    /// Time axis of a piece.
+    /// Time axis of a segment.
     piece: Sampling,
     pieces: usize,
-    /// Pieces looked at.
+    /// Number of processed segments.
     done: usize,
-    /// Samples of each channel that a piece to come needs, from sample `first` on.
+    /// Samples of each channel for the next segments, beginning with sample `first`.
     held: Vec<Vec<f64>>,
     first: usize,
     /// Sum of squared amplitudes: lines × channels.
@@ -27,7 +27,7 @@ pub struct PeakLine {
 }
 
 impl PeakLine {
-    /// Starts with no sample of a force with this time axis and this number of channels.
+    /// Creates an empty spectrum for a force with this time axis and number of channels.
     pub fn new(sampling: Sampling, channels: usize, periodic: bool) -> Result<Self, AnalysisError> {
         let samples = sampling.len();
         let pieces = if periodic { 1 } else { samples.div_ceil(IN_MEMORY_SAMPLES) };
@@ -36,12 +36,12 @@ impl PeakLine {
         Ok(Self { samples, piece, pieces, done: 0, held, first: 0, power })
     }
 
-    /// Returns the number of pieces that the spectrum is averaged over.
+    /// Returns the number of segments in the averaged spectrum.
     pub fn pieces(&self) -> usize {
         self.pieces
     }
 
-    /// Takes the samples that follow.
+    /// Adds the next samples.
     pub fn push(&mut self, force: &Record, kept: Range<usize>) -> Result<(), AnalysisError> {
         let mut next = kept.start;
         while next < kept.end {
@@ -55,7 +55,7 @@ impl PeakLine {
         Ok(())
     }
 
-    /// Looks at the pieces that are there, and forgets what no other needs.
+    /// Processes the complete segments, and drops the samples that no later segment needs.
     fn look(&mut self) -> Result<(), AnalysisError> {
         let samples = self.piece.len();
         while self.done < self.pieces {
@@ -77,7 +77,7 @@ impl PeakLine {
         Ok(())
     }
 
-    /// Counts a piece.
+    /// Adds the power of a segment.
     pub fn add(&mut self, piece: &Spectrum) {
         for (power, line) in self.power.iter_mut().zip(piece.lines()) {
             let amplitude = line.norm();
@@ -86,7 +86,7 @@ impl PeakLine {
         self.done += 1;
     }
 
-    /// Frequency, in Hz, and amplitude, in N, of the strongest line of a channel.
+    /// Returns frequency, in Hz, and amplitude, in N, of the strongest line of a channel.
     pub fn line(&self, channel: usize) -> (f64, f64) {
         let column = self.power.column(channel);
         let by_power = column.iter().enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b));

@@ -5,11 +5,12 @@ use mechid_force::Unexplained;
 use super::motion::{Held, Recorded};
 use crate::text::significant;
 
-/// Periods that differ less than this share of their mean count as alike.
+/// Largest ratio of the scatter of periods to their mean that counts as equal periods.
 const ALIKE: f64 = 0.1;
 
-/// Correlation from one sample to the next that white noise does not reach, and the response of a
-/// machine that is sampled five times a period or more is.
+/// Minimum correlation between successive samples that indicates a response rather than noise:
+/// white noise does not reach it, the response of a machine with at least five samples per period
+/// does.
 const NOT_WHITE: f64 = 0.3;
 
 /// Returns a remark on the channel whose periods differ most from their mean, if they do.
@@ -30,8 +31,8 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     ))
 }
 
-/// Adds the scatter of the periods as noise that no force and no machine explains: where none is
-/// stated, it says what the mean of the periods may leave.
+/// Uses the scatter of the periods as the noise of every channel without a known level: it gives the
+/// expected residual of the mean of the periods.
 pub fn tell_noise(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
     let (Some(channels), Some(scatter)) = (unexplained, &held.scatter) else { return };
     for (channel, scatter) in channels.iter_mut().zip(scatter) {

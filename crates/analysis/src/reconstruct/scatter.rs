@@ -5,21 +5,21 @@
 pub struct Scatter {
     /// Standard deviation, in the SI unit of the channel.
     pub deviation: f64,
-    /// Correlation of the difference at a sample with that at the next: 0 of white noise.
+    /// Correlation between successive samples of the scatter; 0 for white noise.
     pub correlation: f64,
 }
 
-/// Sums over a channel as its periods go by.
+/// Running sums over the periods of a channel.
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
     squares: f64,
-    /// Sum of the products of each sample and the next of its period.
+    /// Sum of the products of successive samples of a period.
     products: f64,
     last: f64,
 }
 
 impl Sums {
-    /// Takes the samples that follow, all of one period.
+    /// Adds the next samples, all of one period.
     pub fn push(&mut self, samples: impl Iterator<Item = f64>, begins_period: bool) {
         if begins_period {
             self.last = 0.0;

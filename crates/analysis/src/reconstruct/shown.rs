@@ -7,12 +7,12 @@ use super::method::{How, Request};
 use crate::reconstruct::options::Method;
 use crate::text::significant;
 
-/// Returns a remark on the frequencies at which the responses show less of a force than their
+/// Returns a remark on the frequencies at which the responses contain less of a force than of
 /// noise.
 ///
-/// Displacements show a force down to a constant one; where there is one there is nothing to say.
-/// Dynamic stiffness does not tell where the noise prevails; lines or a band that were asked for
-/// are an answer to that.
+/// A displacement shows even a constant force, so with one there is no remark. Dynamic stiffness
+/// cannot decide where noise prevails. If lines or a band are requested, the user has already
+/// chosen the frequencies.
 pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<String> {
     if channels.iter().any(|channel| channel.quantity == ResponseQuantity::Displacement) {
         return None;

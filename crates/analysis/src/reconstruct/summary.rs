@@ -22,20 +22,20 @@ pub struct ForceSummary {
     pub why: String,
     /// Number of samples.
     pub samples: usize,
-    /// Periods averaged; nothing for an open record.
+    /// Number of averaged periods; `None` for an open record.
     pub periods: Option<usize>,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// `true` if the standard errors count the machine's own uncertainty.
+    /// `true` if the standard errors include the uncertainty of the machine.
     pub machine_uncertainty: bool,
-    /// `true` if they count the noise of the record.
+    /// `true` if they include the noise of the record.
     pub noise_uncertainty: bool,
     /// Parameters that the method chose.
     pub chosen: Vec<Chosen>,
     /// Channels, one each.
     pub channels: Vec<Measured>,
-    /// Lowest and highest frequency, in Hz, between which forces and standard errors hold; `None`:
-    /// at all frequencies.
+    /// Lowest and highest frequency, in Hz, at which forces and standard errors are valid; `None`:
+    /// all frequencies.
     pub band_hz: Option<[f64; 2]>,
     /// Forces, one per degree of freedom.
     pub forces: Vec<ForceRow>,
@@ -59,16 +59,16 @@ pub struct Chosen {
 /// The force on one degree of freedom.
 #[derive(Debug, Serialize)]
 pub struct ForceRow {
-    /// Counted from 1.
+    /// Degree of freedom, counted from 1.
     pub dof: usize,
-    /// `true` if a force was sought here.
+    /// `true` if a force was to be reconstructed here.
     pub sought: bool,
     /// RMS value, in the unit of the channel.
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// RMS of the standard error over the record, in the unit of the channel; `None` where it is
-    /// not known.
+    /// RMS of the standard error over the record, in the unit of the channel; `None` if it is
+    /// unknown.
     pub standard_error: Option<f64>,
     /// Frequency of the strongest line, in Hz.
     pub strongest_hz: f64,
@@ -76,11 +76,13 @@ pub struct ForceRow {
     pub strongest_amplitude: f64,
 }
 
-/// Standard error over the force, RMS values, from which the record hardly determines the force.
+/// Minimum ratio of standard error to force, RMS values, for a remark: the record hardly determines
+/// such a force.
 const UNSURE: f64 = 0.5;
 
 impl ForceRow {
-    /// Returns a remark on a force whose standard error is nearly as large as itself.
+    /// Returns a remark on a force whose standard error is of the order of the force; `None`
+    /// otherwise.
     pub(super) fn doubt(&self) -> Option<String> {
         let share = self.standard_error? / self.rms;
         (self.sought && share > UNSURE).then(|| {
@@ -100,7 +102,7 @@ impl ForceSummary {
         self.machine_uncertainty && !self.noise_uncertainty
     }
 
-    /// Returns the result as a person reads it.
+    /// Returns the result as text for a reader.
     fn text(&self) -> String {
         let rate = compact(self.sample_rate_hz, 8);
         let extent = match self.periods {
@@ -164,7 +166,7 @@ impl fmt::Display for ForceSummary {
     }
 }
 
-/// Returns a value with its unit, to four significant digits unless it is a whole number.
+/// Returns a value with its unit, to four significant digits, or in full if it is a whole number.
 fn with_unit(value: f64, unit: &str) -> String {
     let number = if value.fract() == 0.0 && value.abs() < 1e6 {
         format!("{value}")

@@ -1,4 +1,4 @@
-//! Levels of a force that is found some samples at a time.
+//! Levels of a force that is reconstructed in chunks.
 
 use std::ops::Range;
 
@@ -10,28 +10,28 @@ use super::peak_line::PeakLine;
 use super::summary::ForceRow;
 use crate::AnalysisError;
 
-/// Levels and strongest line of a force whose samples need not be held.
+/// Levels and strongest line of a force that need not be buffered.
 pub struct Tally<'a> {
     sampling: Sampling,
     levels: Vec<Level>,
     strongest: PeakLine,
-    /// Callback for the samples that are found.
+    /// Callback for the reconstructed samples.
     take: &'a mut Take<'a>,
 }
 
-/// Callback for some samples of the force.
+/// Callback for a chunk of the force.
 pub type Take<'a> = dyn FnMut(&ForceChunk<'_>) -> Result<(), AnalysisError> + 'a;
 
 /// Levels of one channel.
 #[derive(Default)]
 struct Level {
     force: RunningStatistics,
-    /// Standard errors; `None` where they are not known.
+    /// Standard errors; `None` if they are unknown.
     error: Option<RunningStatistics>,
 }
 
 impl<'a> Tally<'a> {
-    /// Starts with no sample of a force with this time axis.
+    /// Creates the levels of a force with this time axis, before its first sample.
     pub fn new(
         sampling: Sampling,
         dofs: usize,
@@ -43,7 +43,7 @@ impl<'a> Tally<'a> {
         Ok(Self { sampling, levels, strongest, take })
     }
 
-    /// Takes all samples; `counts_noise` says whether the standard error counts the noise of the
+    /// Adds all samples; `counts_noise` states whether the standard error includes the noise of the
     /// record.
     pub fn push_all(
         &mut self,
@@ -60,7 +60,7 @@ impl<'a> Tally<'a> {
         Ok(())
     }
 
-    /// Takes the samples `kept` of what was found of a chunk.
+    /// Adds the samples `kept` of the force on a chunk.
     pub fn push(
         &mut self,
         force: &IdentifiedForce,
@@ -87,7 +87,7 @@ impl<'a> Tally<'a> {
         (self.take)(&ForceChunk { sampling: self.sampling, force, samples: kept, counts_noise })
     }
 
-    /// Returns the levels on each degree of freedom; `forced` are those where a force was sought.
+    /// Returns the levels on each degree of freedom; `forced` are those with a requested force.
     pub fn forces(&self, forced: &[usize]) -> Vec<ForceRow> {
         self.levels
             .iter()
@@ -96,7 +96,8 @@ impl<'a> Tally<'a> {
                 let (strongest_hz, strongest_amplitude) = self.strongest.line(dof);
                 ForceRow {
                     dof: dof + 1,
-                    // The equations of motion give a force everywhere, asked for or not.
+                    // The equations of motion give a force on every degree of freedom, whether
+                    // requested or not.
                     sought: level.force.peak() > 0.0 || forced.contains(&dof),
                     rms: level.force.rms(),
                     peak: level.force.peak(),
@@ -108,7 +109,7 @@ impl<'a> Tally<'a> {
             .collect()
     }
 
-    /// Returns how the strongest line was found, where that needs saying.
+    /// Returns the remark on how the strongest line was determined; `None` if it needs none.
     pub fn remark(&self) -> Option<String> {
         self.strongest.remark()
     }

@@ -14,27 +14,27 @@ pub struct Measured {
     pub channel: usize,
     /// Name of the column.
     pub column: String,
-    /// Ratio of the RMS of the unexplained part to the RMS of the response; `None` with as many
-    /// forces as measured channels, or without a comparison.
+    /// Ratio of the RMS of the unexplained part to the RMS of the response; `None` if there are as
+    /// many forces as measured channels, or without a comparison.
     pub unexplained: Option<f64>,
-    /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the
-    /// noise is not known apart from the fit.
+    /// Expected unexplained ratio due to noise and the uncertainty of the machine; `None` if the
+    /// noise is known only from the fit.
     pub expected: Option<f64>,
 }
 
-/// Factor over what noise and machine may leave that is too much: noise alone leaves three times
-/// its level of one complex line once in e⁹ times, of more lines more rarely.
+/// Minimum ratio of the unexplained part to its expectation for a remark. One complex line of noise
+/// exceeds three times its level with probability e⁻⁹, several lines even more rarely.
 const TOO_MUCH: f64 = 3.0;
 
-/// Maximum unexplained share whose effect on the force is negligible against the uncertainty of any
-/// machine.
+/// Maximum unexplained share without a remark; its effect on the force is negligible against the
+/// uncertainty of any machine.
 const LITTLE: f64 = 0.01;
 
 /// Maximum unexplained share without a remark if the noise of a sensor is unknown.
 const SELDOM_NOISE: f64 = 0.1;
 
 impl Measured {
-    /// Every channel measured.
+    /// Creates the row of every measured channel.
     pub(crate) fn all(recorded: &Recorded, unexplained: Option<&[Unexplained]>) -> Vec<Self> {
         let columns = recorded.columns().iter().enumerate();
         columns
@@ -59,7 +59,7 @@ impl Measured {
     }
 }
 
-/// Returns the expected unexplained share of the motion due to noise and the uncertainty of the
+/// Returns the expected unexplained share of the response due to noise and the uncertainty of the
 /// machine.
 fn expected(unexplained: &Unexplained) -> Option<f64> {
     let level = unexplained.noise?.hypot(unexplained.machine.unwrap_or(0.0));
@@ -76,7 +76,7 @@ fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
-/// Returns a remark if the unexplained part is larger than noise and machine can explain.
+/// Returns a remark if the unexplained part exceeds what noise and machine explain.
 pub fn remark(
     measured: &[Measured],
     unexplained: Option<&[Unexplained]>,
