@@ -100,13 +100,13 @@ pub struct Measured {
 }
 
 impl Gathered {
-    /// Creates statistics without a sample of a channel that may be drawn, over a window of
-    /// `window` samples.
+    /// Creates statistics before the first sample of a window of `window` samples; `drawn` states
+    /// whether the channel is plotted.
     pub(crate) fn of(window: usize, drawn: bool) -> Self {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }
 
-    /// Adds the next samples and stores the first `hold` of all.
+    /// Adds the next samples; of all samples the first `hold` are stored.
     pub(crate) fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
         if let Some(extremes) = &mut self.extremes {
@@ -119,7 +119,7 @@ impl Gathered {
 }
 
 impl Measured {
-    /// Measures a channel; its time step, in s, may be unknown, and its period may be `given`.
+    /// Measures a channel. Its time step, in s, may be unknown; its period may be `given`.
     pub(crate) fn of(
         column: usize,
         name: String,
@@ -180,7 +180,7 @@ impl AmplitudeSpectrum {
             return Ok(Self { amplitude: Vec::new(), samples, period });
         }
         for (k, value) in values.iter_mut().enumerate() {
-            // The mean of the window is 1, so that a sine keeps its amplitude.
+            // The weights have mean 1, so that a sine keeps its amplitude.
             let weight = match period {
                 Some(_) => 1.0,
                 None => 1.0 - (TAU * k as f64 / samples as f64).cos(),
@@ -193,11 +193,11 @@ impl AmplitudeSpectrum {
         Ok(Self { amplitude, samples, period })
     }
 
-    /// The highest of those that no neighbour surpasses, the strongest first.
+    /// Returns the highest of the lines that exceed their neighbours, the strongest first.
     fn strongest(&self, dt: Option<f64>) -> Vec<SpectrumPeak> {
         let at = |n: usize| self.amplitude.get(n).copied().unwrap_or(0.0);
         let strongest = self.amplitude.iter().skip(1).copied().fold(0.0, f64::max);
-        // Lines of the same amplitude but for rounding stand in order.
+        // Lines with equal amplitudes up to rounding are sorted by frequency.
         let level = |n: usize| (at(n) / strongest / EQUAL).round();
         let is_peak = |n: &usize| level(*n) >= level(n - 1).max(level(n + 1));
         let mut peaks: Vec<usize> = (1..self.amplitude.len())
@@ -218,12 +218,14 @@ impl AmplitudeSpectrum {
         n as f64 / self.samples as f64
     }
 
-    /// Samples of the period whose mean [`points`](Self::points) are of.
+    /// Returns the number of samples of the period averaged in [`points`](Self::points); `None`
+    /// without a period.
     pub fn period(&self) -> Option<usize> {
         self.period
     }
 
-    /// Cycles per sample and amplitudes, without the mean: of the mean period where there is one.
+    /// Returns cycles per sample and amplitudes, without the mean, for a periodic channel from the
+    /// mean period.
     pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         let every = self.period.map_or(1, |period| self.samples / period);
         let lines = self.amplitude.iter().copied().enumerate().step_by(every).skip(1);

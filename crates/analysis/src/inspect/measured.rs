@@ -1,4 +1,4 @@
-//! The columns of a window, gone through once.
+//! Columns of a window, measured in one pass.
 
 use mechid_io::{RecordFile, Unit};
 use mechid_signal::SignalError;
@@ -10,16 +10,16 @@ use crate::extremes::Extremes;
 use crate::limits::{INSPECT_BYTES, check_memory};
 use crate::measurement::IN_MEMORY_SAMPLES;
 
-/// A column to show, and what is taken away from it.
+/// A column to show, and the constant to subtract.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown {
-    /// Place among the columns asked for, counted from 0.
+    /// Index among the requested columns, counted from 0.
     pub place: usize,
     pub column: usize,
     pub offset: f64,
-    /// Whether lines and period are looked for, which bare instants do not have.
+    /// `true` if lines and a period are to be detected; a column of instants has none.
     pub spectral: bool,
-    /// Whether it is in the picture, too.
+    /// `true` if it is also plotted.
     pub drawn: bool,
 }
 
@@ -41,26 +41,26 @@ pub struct Drawn {
 /// The samples of a window.
 #[derive(Debug, Clone, Copy)]
 pub struct Span {
-    /// Counted from 0.
+    /// First sample, counted from 0.
     pub start: usize,
     pub len: usize,
-    /// Number of them, from the first on, that are looked at together.
+    /// Number of samples, beginning with the first, that are analysed together.
     pub hold: usize,
 }
 
 impl Span {
-    /// Start and length of a window of this file.
+    /// Creates the window of a file from its start and length.
     pub fn of((start, len): (usize, usize), file: &RecordFile) -> Self {
         Self { start, len, hold: if file.is_whole() { len } else { len.min(IN_MEMORY_SAMPLES) } }
     }
 
-    /// First and last of the samples that period and lines come from, counted from 1, if these are
-    /// not all.
+    /// Returns the first and the last sample used for period and lines, counted from 1; `None` if
+    /// all are used.
     pub fn held(self) -> Option<(usize, usize)> {
         (self.hold < self.len).then_some((self.start + 1, self.start + self.hold))
     }
 
-    /// The same, in words.
+    /// Returns the same in words.
     pub fn looked_at(self, file: &str) -> Option<String> {
         let end = self.start + self.len;
         self.held().map(|(first, last)| {
@@ -72,24 +72,25 @@ impl Span {
     }
 }
 
-/// Statistics of the columns asked for, gathered while a text is read to its end.
+/// Statistics of the requested columns, computed while a text is read to its end.
 #[derive(Debug)]
 pub struct OnTheWay {
     /// First sample of the window, counted from 0.
     start: usize,
-    /// Most samples to hold of each column.
+    /// Maximum number of samples to store of each column.
     hold: Vec<usize>,
     gathered: Vec<Result<Gathered, SignalError>>,
 }
 
 impl OnTheWay {
-    /// Begins without a sample, with the samples to hold of each column.
+    /// Creates empty statistics, with the number of samples to store of each column.
     pub fn new(start: usize, hold: Vec<usize>) -> Self {
         let gathered = hold.iter().map(|_| Ok(Gathered::default())).collect();
         Self { start, hold, gathered }
     }
 
-    /// Takes the samples of a column from `first` on, those before the window too.
+    /// Adds the samples of a column, beginning with sample `first`; samples before the window are
+    /// accepted, too.
     pub fn push(&mut self, column: usize, first: usize, values: &[f64]) {
         let values = &values[self.start.saturating_sub(first).min(values.len())..];
         let gathered = &mut self.gathered[column];
@@ -98,15 +99,15 @@ impl OnTheWay {
         }
     }
 
-    /// The columns shown, by their places among those asked for.
+    /// Returns the statistics of the shown columns, by their indices among the requested ones.
     fn of(self, places: impl Iterator<Item = usize>) -> Result<Vec<Gathered>, SignalError> {
         let mut all: Vec<_> = self.gathered.into_iter().map(Some).collect();
         places.filter_map(|place| all[place].take()).collect()
     }
 }
 
-/// Measures the window of some columns, with the step and the period if they are known; of those to
-/// be drawn what a picture shows, too.
+/// Measures the window of some columns; time step and period may be known. Plotted columns also get
+/// their curves.
 pub fn measured(
     file: &RecordFile,
     shown: &[Shown],
@@ -117,7 +118,7 @@ pub fn measured(
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
     let held = window.hold.saturating_mul(shown.len());
     check_memory(file.head().file(), held, INSPECT_BYTES, file.memory())?;
-    // A text is read once for all columns; of what is held, a copy for each thread is enough.
+    // A text is read once for all columns. Stored samples need only one copy for each thread.
     let at_once = if file.is_whole() { rayon::current_num_threads() } else { shown.len() };
     let table = file.head();
     let (mut channels, mut drawn) = (Vec::new(), Vec::new());
@@ -147,7 +148,7 @@ pub fn measured(
     Ok((channels, drawn))
 }
 
-/// Goes through the window of some columns.
+/// Reads the window of some columns in one pass.
 fn gathered(
     file: &RecordFile,
     together: &[Shown],

@@ -18,22 +18,22 @@ use crate::AnalysisError;
 use crate::measurement::units::{contradicted_rate, doubtful_time, doubtful_unit};
 use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
 
-/// Number of columns drawn at most.
+/// Maximum number of plotted columns.
 pub const DRAWN_COLUMNS: usize = 8;
 
 /// Settings of an inspection.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InspectSettings {
-    /// Columns to show, by name or number; empty: every column that holds numbers only.
+    /// Columns to show, by name or number; empty: every column that contains only numbers.
     pub columns: Vec<String>,
-    /// `true` to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
+    /// `true` to compute the curves of a plot, for the first [`DRAWN_COLUMNS`] columns.
     pub curves: bool,
 }
 
 /// Result of an inspection: columns, time axis and contents of a record.
 ///
-/// [`Display`](fmt::Display) gives it as a person reads it, `serde` the same for programs.
+/// [`Display`](fmt::Display) formats the result for a reader, `serde` for programs.
 #[derive(Debug)]
 pub struct Inspected {
     summary: RecordSummary,
@@ -44,12 +44,12 @@ pub struct Inspected {
 
 /// Inspects a record file.
 ///
-/// Of a long text the levels are those of all samples of the window; period and spectral lines are
-/// those of its first [`IN_MEMORY_SAMPLES`].
+/// For a long text, the levels include all samples of the window; period and spectral lines come
+/// from its first [`IN_MEMORY_SAMPLES`] samples.
 ///
 /// # Errors
 /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
-/// [`AnalysisError::Window`] if the record does not have all of the window.
+/// [`AnalysisError::Window`] if the window exceeds the record.
 pub fn inspect(
     path: impl AsRef<Path>,
     reading: &Reading,
@@ -65,13 +65,13 @@ impl Inspected {
         &self.summary
     }
 
-    /// Returns the curves of a picture, where they were asked for.
+    /// Returns the curves of a plot; empty unless requested.
     pub fn drawn(&self) -> &[Drawn] {
         &self.drawn
     }
 
-    /// Returns the first and the last sample, counted from 1, that period and lines come from, if
-    /// these are not all.
+    /// Returns the first and the last sample used for period and lines, counted from 1; `None` if
+    /// all are used.
     pub fn spectral_samples(&self) -> Option<(usize, usize)> {
         self.held
     }
@@ -94,13 +94,13 @@ impl Serialize for Inspected {
     }
 }
 
-/// Returns the number in the file, if it is one, that states a time axis.
+/// Returns the number in the file that states the time axis; `None` if the axis has another source.
 fn stated_by(table: &Table, time: &TimeAxis<'_>) -> Option<String> {
     let (name, value) = table.stated_rate().filter(|_| *time == TimeAxis::OfFile)?;
     Some(format!("{} = {}", escaped(name), message::number(*value)))
 }
 
-/// An inspection before it is done.
+/// An inspection before its computation.
 struct Inspection<'a> {
     reading: &'a Reading,
     window: &'a Window,
@@ -161,9 +161,9 @@ impl Inspection<'_> {
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
     }
 
-    /// Gathers the columns of a text while its samples are counted, so that it is read only once:
-    /// where the window ends with the record, and neither its length nor a mean is needed
-    /// beforehand.
+    /// Measures the columns of a text while its samples are counted, so that it is read only once.
+    /// This requires that the window ends with the record, and that neither its length nor a mean
+    /// is needed beforehand.
     fn on_the_way(
         &self,
         file: &RecordFile,
@@ -181,12 +181,12 @@ impl Inspection<'_> {
         })
     }
 
-    /// Whether period and lines of a column are looked for: instants are no signal.
+    /// Returns whether period and lines of a column are to be detected; instants are not a signal.
     fn is_signal(&self, column: usize, instants: Option<usize>) -> bool {
         !self.columns.is_empty() || Some(column) != instants
     }
 
-    /// Chooses the columns that are drawn, and returns a remark on the others.
+    /// Selects the plotted columns, and returns a remark on the others.
     fn choose_drawn(&self, table: &Table, shown: &mut [Shown]) -> Option<String> {
         if !self.how.curves {
             return None;
@@ -202,7 +202,8 @@ impl Inspection<'_> {
         })
     }
 
-    /// Indices of the columns asked for, or of all that are more than a trailing delimiter.
+    /// Returns the indices of the requested columns; by default, all except an empty one after a
+    /// trailing delimiter.
     fn asked(&self, table: &Table) -> Result<Vec<usize>, AnalysisError> {
         match self.columns {
             [] => Ok(table.filled_columns().collect()),
@@ -210,8 +211,8 @@ impl Inspection<'_> {
         }
     }
 
-    /// The columns asked for, or those that are numbers and as long as most; how many samples they
-    /// have; and what is wrong with the others.
+    /// Returns the requested columns, or the numeric ones of the usual length; their number of
+    /// samples; and the reasons why the others are omitted.
     fn shown(
         &self,
         table: &Table,
@@ -245,7 +246,8 @@ impl Inspection<'_> {
         Ok((shown, len, left_out))
     }
 
-    /// The time step, in s. A time axis that nobody asked for may be wrong: that is told, no error.
+    /// Returns the time step, in s. A default time axis may be wrong: then the step is `None`, with
+    /// a remark.
     fn step(
         &self,
         file: &RecordFile,
@@ -257,7 +259,7 @@ impl Inspection<'_> {
         let asked_for = self.reading.time.is_some() || matches!(time, TimeAxis::RateHz(_));
         let sampling = match sampling {
             Some(sampling) if !file.is_whole() => sampling,
-            // Of a text the beginning says it too, and other files bring more to compare.
+            // The beginning of a text is enough; other files offer more samples for comparison.
             _ => file.head().sampling(&time, self.columns),
         };
         match sampling {

@@ -20,11 +20,11 @@ pub struct RecordSummary {
     pub format: String,
     /// Number of columns.
     pub columns: usize,
-    /// Samples that most columns have.
+    /// Number of samples of most columns.
     pub samples: usize,
-    /// `None` if no column can be shown.
+    /// Window; `None` if no column can be shown.
     pub window: Option<WindowRow>,
-    /// `None` without a time axis.
+    /// Time axis; `None` if it is unknown.
     pub sampling: Option<SamplingRow>,
     /// Channels, one each.
     pub channels: Vec<Channel>,
@@ -41,9 +41,9 @@ pub struct RecordSummary {
 /// The samples shown, counted from 1.
 #[derive(Debug, Serialize)]
 pub struct WindowRow {
-    /// Counted from 1.
+    /// First sample, counted from 1.
     pub first_sample: usize,
-    /// Counted from 1.
+    /// Last sample, counted from 1.
     pub last_sample: usize,
 }
 
@@ -57,7 +57,7 @@ pub struct SamplingRow {
     /// Length, in s.
     pub duration_s: f64,
     /// Number in the file that states the rate or the step, such as `Fs = 25600`; `None` if the
-    /// time axis comes from elsewhere.
+    /// time axis has another source.
     pub stated_by: Option<String>,
 }
 
@@ -209,7 +209,7 @@ impl RecordSummary {
 }
 
 impl Channel {
-    /// Number and name of the column, and what the file says of it.
+    /// Returns number and name of the column, and its description in the file.
     pub fn title(&self) -> String {
         let about = if self.about.is_empty() {
             String::new()

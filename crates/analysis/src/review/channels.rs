@@ -11,7 +11,7 @@ pub struct Channel {
     pub column: String,
     /// Quantity that was measured.
     pub quantity: &'static str,
-    /// Counted from 1; nothing where there is one only.
+    /// Degree of freedom, counted from 1; `None` if there is only one.
     pub dof: Option<usize>,
     /// SI unit.
     pub unit: &'static str,
@@ -28,10 +28,10 @@ pub struct Channel {
     pub scatter: Option<f64>,
 }
 
-/// Share of the level below which a number is rounding.
+/// Minimum ratio to the level; a smaller number is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The columns in the order force, displacement, velocity, acceleration.
+/// Returns the columns in the order force, displacement, velocity, acceleration.
 pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
     let period = whole.period(held);
     let force = ("force", "N", &period.force, &whole.force, &names.force);

@@ -26,7 +26,7 @@ pub struct Review<'a> {
     pub identified: &'a Identified,
     /// The records fitted, one by one.
     pub records: Vec<RecordReview<'a>>,
-    /// The receptance that the records show, or why there is none.
+    /// Measured receptance of the records, or the reason why there is none.
     pub receptance: Result<Receptance, String>,
     /// Measured and predicted responses of a record that was not fitted.
     pub validation: Vec<Compared>,
@@ -38,24 +38,24 @@ pub struct RecordReview<'a> {
     pub recorded: &'a Windowed,
     /// Levels, histories and mean period of all samples.
     pub whole: Whole,
-    /// Name of the record, where there are several.
+    /// Name of the record; `None` with one record.
     pub name: Option<&'a str>,
     /// Index of the record, counted from 0.
     pub index: usize,
-    /// Lines of a period, where such were fitted.
+    /// Lines of a period; `None` unless such lines were fitted.
     pub lines: Option<Vec<usize>>,
     /// Levels of the columns used.
     pub channels: Vec<Channel>,
     /// Measures of the forces that act.
     pub excitations: Vec<Excitation>,
-    /// Measured and predicted responses, or why there are none.
+    /// Measured and predicted responses, or the reason why there are none.
     pub residual: Result<Residual, String>,
     /// The force reconstructed with the identified machine.
     pub reconstruction: Option<Reconstruction>,
 }
 
 impl<'a> Review<'a> {
-    /// Computes what a page shows; `reconstruct_force` adds the force reconstructed with the
+    /// Computes the content of a page; `reconstruct_force` adds the force reconstructed with the
     /// identified machine.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ impl<'a> Review<'a> {
         Ok(Self { identified, receptance, records, validation })
     }
 
-    /// Returns the samples held of the record that was not fitted.
+    /// Returns the buffered samples of the record that was not fitted.
     pub fn validated(&self) -> Option<&'a Block> {
         self.identified.validated()
     }
@@ -87,7 +87,7 @@ impl<'a> RecordReview<'a> {
         let recorded = &identified.records()[at];
         let held = &recorded.held;
         let lines = match identified.spectra() {
-            // Lines of segments are not those of the record.
+            // Lines of segments differ from lines of the record.
             Some(_) if identified.prediction() == Prediction::Steady => {
                 let lines = identified.summary().analysis.source.lines();
                 let choice = lines.map_or(&LineChoice::Driven, |lines| &lines.choice);
@@ -116,13 +116,13 @@ impl<'a> RecordReview<'a> {
         })
     }
 
-    /// Returns the samples of the record that are held in memory.
+    /// Returns the buffered samples of the record.
     pub fn held(&self) -> &Block {
         &self.recorded.held
     }
 
-    /// Returns the samples that spectra are of: the mean period where lines of periods were fitted,
-    /// otherwise what is held.
+    /// Returns the samples used for spectra: the mean period if lines of periods were fitted,
+    /// otherwise the buffered samples.
     pub fn period(&self) -> &Block {
         match self.lines {
             Some(_) => self.whole.period(self.held()),

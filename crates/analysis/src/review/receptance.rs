@@ -16,7 +16,7 @@ use crate::identify::spectra::periods;
 use crate::identify::{Identified, ResponseCoherence};
 use crate::measurement::{Block, IN_MEMORY_SAMPLES, Windowed};
 
-/// Ratio of the length of an open record to that of a segment; with half overlap this gives fifteen
+/// Ratio of the lengths of an open record and a segment; with half overlap this gives fifteen
 /// segments. Records too long for memory have more segments of the same length.
 const SEGMENTS: usize = 8;
 
@@ -89,8 +89,8 @@ impl<'a> ActingAlone<'a> {
 }
 
 impl Receptance {
-    /// Returns the data of a fit in the frequency domain; otherwise those of whole periods, or
-    /// averages over segments of open records.
+    /// Returns the data of a fit in the frequency domain. For other fits, returns the spectra of
+    /// whole periods, or averages over segments of open records.
     ///
     /// # Errors
     /// [`AnalysisError`] if the records do not show a receptance.
@@ -100,7 +100,7 @@ impl Receptance {
     }
 }
 
-/// Measured receptance and its origin in words.
+/// Returns the measured receptance and its origin in words.
 fn measured(
     identified: &Identified,
     parts: &[RecordReview<'_>],
