@@ -36,7 +36,7 @@ pub struct FrfSettings {
     /// Segments of the average.
     #[serde(deserialize_with = "words::written::one")]
     pub segments: Segmentation,
-    /// Rule that cuts the record of a hammer test into hits, which are averaged instead of
+    /// Rule for dividing the record of a hammer test into hits, which are averaged instead of
     /// segments.
     #[serde(
         skip_serializing_if = "Option::is_none",
@@ -137,7 +137,7 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
     Ok(records)
 }
 
-/// Maximum ratio of the amplitudes of unexcited forces on a line to that of the exciting force.
+/// Maximum ratio of the amplitudes of unexcited forces to the exciting force on a line.
 const IDLE: f64 = 0.1;
 
 /// Frequency responses to forces with interleaved lines.
@@ -395,7 +395,8 @@ impl Responses {
         let apart: Vec<usize> =
             (0..acting.len()).filter(|at| following.iter().all(|one| one.force != *at)).collect();
         let mut average = average.of_inputs(&apart);
-        // Of periods the scatter has told; lines that were asked for stand.
+        // Lines of periods were selected by the scatter of the periods, requested lines by the
+        // user.
         if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
         {
             average = average.at(&average.driven())?;
@@ -423,8 +424,8 @@ impl Responses {
         format!("{} of {samples}", message::count(self.counts.iter().sum(), piece))
     }
 
-    /// Returns the remarks on force channels that show noise only, or only what another force does,
-    /// of a record that is named or not.
+    /// Returns the remarks on force channels that contain only noise, or only a response to another
+    /// force; `record` names the record.
     pub fn of_channels(&self, record: Option<&str>) -> Vec<String> {
         let listed: Vec<String> = self.idle.iter().map(|dof| (dof + 1).to_string()).collect();
         let of_record = record.map(|record| format!("{record}: ")).unwrap_or_default();

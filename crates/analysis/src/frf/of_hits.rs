@@ -17,8 +17,8 @@ use crate::text::significant;
 /// Number of parts of a window for the test whether the response has decayed.
 pub(super) const PARTS: usize = 20;
 
-/// Maximum ratio of the RMS of the last part of a window, or before the pulse, to that of the
-/// largest part for a response that has decayed.
+/// Maximum RMS of the last part of a window, or before the pulse, relative to the largest part, for
+/// a response that has decayed.
 const DIED_OUT: f64 = 0.02;
 
 /// Frequency responses from hits, with remarks.
@@ -40,17 +40,17 @@ pub(crate) struct AverageOfHits {
     segments: Segments,
     /// Decay rate of the exponential window, in 1/s.
     added_decay: Option<f64>,
-    /// Largest ratio of the RMS of the last part of a window to that of its largest part.
+    /// Largest RMS of the last part of a window relative to its largest part.
     at_end: f64,
-    /// Largest ratio of the RMS before the pulse to that of the largest part.
+    /// Largest RMS before the pulse relative to the largest part.
     before: f64,
 }
 
 /// Averages the responses to some hits, each cut to the length of the shortest.
 ///
 /// With an exponential window exp(−σt) on force and response, M, C and K become exactly M, C + 2σM
-/// and K + σC + σ²M: every eigenvalue is shifted by −σ, and the response at iω is that of the
-/// machine at iω + σ.
+/// and K + σC + σ²M: every eigenvalue is shifted by −σ, and the response at iω equals the response
+/// of the machine at iω + σ.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential
@@ -143,8 +143,8 @@ pub(super) fn responses_of_hits(
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 
-/// Returns the ratio of the RMS of some samples of a response to that of its largest part, the
-/// largest ratio of all channels.
+/// Returns the RMS of some samples of a response relative to its largest part, the largest ratio of
+/// all channels.
 pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()

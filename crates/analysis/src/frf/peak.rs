@@ -2,7 +2,7 @@
 
 use mechid_spectra::frf::Frf;
 
-/// Ratio of the magnitude to that of the peak at the half-power points.
+/// Ratio of the magnitudes at the half-power points and at the peak.
 const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The largest peak of a frequency response.

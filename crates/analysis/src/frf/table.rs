@@ -27,7 +27,7 @@ use crate::text::{compact, paragraph, significant, text_table};
 pub struct FrfTable {
     /// The record.
     pub file: String,
-    /// Counted from 1.
+    /// First sample, counted from 1.
     pub first_sample: usize,
     /// Last sample, counted from 1.
     pub last_sample: usize,
@@ -83,7 +83,7 @@ pub struct AveragedRecord {
 pub struct SegmentRow {
     /// Number of samples.
     pub samples: usize,
-    /// Number of samples from the start of one to that of the next.
+    /// Number of samples between the starts of successive segments.
     pub hop: usize,
     /// `None` for whole periods.
     pub window: Option<Window>,
@@ -260,7 +260,7 @@ impl FrfTable {
         ))
     }
 
-    /// Returns the name of a response and that of the force that it belongs to: `a1 / force`.
+    /// Returns the names of a response and its force: `a1 / force`.
     pub fn pair(&self, response: &Response) -> String {
         let Response { motion, force, .. } = response;
         format!("{} / {}", self.response_names[motion - 1], self.force_names[force - 1])
@@ -365,7 +365,7 @@ impl FrfTable {
         });
         let coherence = self.coherence.iter().map(|c| CoherenceFunction {
             response: point(c.motion),
-            // With one force the multiple coherence is the ordinary one.
+            // The multiple coherence with one force is the ordinary one.
             reference: match self.responses.len() == dofs {
                 true => self.responses.first().map(|r| point(r.force)),
                 false => None,
@@ -384,7 +384,7 @@ impl FrfTable {
         })
     }
 
-    /// Returns whether every force has lines of its own.
+    /// Returns whether every force has separate lines.
     fn is_interleaved(&self) -> bool {
         self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan())
     }
@@ -395,8 +395,8 @@ impl FrfTable {
         AveragedSegments { samples, hop, count, window, sample_rate_hz: self.sample_rate_hz }
     }
 
-    /// One row per frequency; fields are empty where another force has the line to itself. What was
-    /// measured, the decay that an exponential window adds, and the segments are the same numbers
+    /// Returns one row per frequency; fields are empty if another force excites the line. The
+    /// measured quantity, the decay that an exponential window adds, and the segments are repeated
     /// in every row.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
@@ -459,7 +459,7 @@ impl Response {
         }
     }
 
-    /// Returns the values at other places; none where there is no index.
+    /// Returns the values at other indices; a frequency without an index gets no value.
     fn spread(self, places: &[Option<usize>]) -> Self {
         let spread = |values: &[f64]| -> Vec<f64> {
             places.iter().map(|at| at.map_or(f64::NAN, |at| values[at])).collect()

@@ -3,8 +3,8 @@
 use super::of_hits::{PARTS, over_largest};
 use crate::measurement::Windowed;
 
-/// Maximum ratio of the RMS of the last part of a record, including noise, to that of its largest
-/// part for a record that ends at rest.
+/// Maximum RMS of the last part of a record, including noise, relative to its largest part, for a
+/// record that ends at rest.
 const AT_REST: f64 = 0.05;
 
 /// Maximum ratio of the RMS difference of two equal forces, including noise, to their RMS.
