@@ -14,14 +14,14 @@ use crate::identify::summary::{FitRow, IdentificationSummary};
 use crate::modes::{ModalCheck, ModesSummary, modes};
 use crate::{AnalysisError, ElementData, Measurement, identify, identify_elements};
 
-/// Result of one record: a machine with its uncertainty and what speaks against it, or an error.
+/// Result of one record: a machine with its uncertainty and the warnings, or an error.
 ///
-/// Where there is an error, lists are empty and the other numbers `None`.
+/// With an error, lists are empty and the other numbers are `None`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResultRow {
     /// Name of the record: its path, as it was given.
     pub record: String,
-    /// Value of the column that tells the records of a file apart; `None` where the file is the
+    /// Value of the column that distinguishes the records of a file; `None` if the file is one
     /// record.
     pub record_id: Option<String>,
     /// Reason why there is no result.
@@ -36,13 +36,13 @@ pub struct ResultRow {
     pub last_sample: Option<usize>,
     /// Entries of M, C and K, then the parameters of nonlinear terms.
     pub parameters: Vec<ParameterCell>,
-    /// Covariance of the parameters that were estimated, in products of their SI units.
+    /// Covariance of the estimated parameters, in products of their SI units.
     pub covariance: Option<ParameterCovariance>,
     /// Modes, by rising frequency.
     pub modes: Vec<ModeCell>,
-    /// RMS of the residual over the RMS of the quantity fitted, a ratio.
+    /// RMS of the residual over the RMS of the fitted quantity, a ratio.
     pub nrmse: Option<f64>,
-    /// Part of the response that the model leaves unexplained, a ratio of RMS values.
+    /// Part of the response that the model does not explain, a ratio of RMS values.
     pub unexplained_motion: Option<f64>,
     /// Power of the residual over the power that the noise explains, a ratio.
     pub misfit_ratio: Option<f64>,
@@ -78,7 +78,7 @@ pub struct ParameterCell {
     pub unit: String,
     /// Value, in its unit.
     pub value: f64,
-    /// Standard error, in the same unit; `None` for a value that is known.
+    /// Standard error, in the same unit; `None` for a known value.
     pub standard_error: Option<f64>,
 }
 
@@ -102,14 +102,13 @@ pub struct FindingRow {
     pub code: String,
     /// Good, doubtful or bad.
     pub verdict: Verdict,
-    /// Number that decides the verdict, a ratio or a probability; `None` where it is infinite.
+    /// Number that decides the verdict, a ratio or a probability; `None` if it is infinite.
     pub value: Option<f64>,
 }
 
 impl SavedAnalysis {
-    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a
-    /// panic included, is the error of the row; the same record and analysis always make the same
-    /// row.
+    /// Identifies the record that `source` opens, called `record` in the row. Every failure, also a
+    /// panic, becomes the error of the row. The same record and analysis always give the same row.
     pub fn row(
         &self,
         record: &str,
@@ -288,7 +287,7 @@ impl FindingRow {
     }
 }
 
-/// Returns what a panic says.
+/// Returns the message of a panic.
 fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or(panic.downcast_ref::<&str>().copied());

@@ -1,4 +1,4 @@
-//! The settings of an identification together with all that says what a record holds.
+//! Settings of an identification, with everything needed to read its records.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ use twox_hash::XxHash3_128;
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
 use crate::{AnalysisError, Identify, IdentifyElements, ModesSettings};
 
-/// An identification, or a modal test, to be repeated on many records that have the same columns.
+/// An identification, or a modal test, to be repeated on many records with the same columns.
 ///
-/// Everything but the record is in it, so that a record and this value make a result.
+/// It contains everything except the record: a record and this value determine a result.
 ///
 /// ```
 /// use mechid_analysis::{Channels, Measurement, ResponseQuantity, SavedAnalysis, Window};
@@ -25,7 +25,7 @@ use crate::{AnalysisError, Identify, IdentifyElements, ModesSettings};
 /// let row = analysis.row("rig", || analysis.open(rig));
 /// assert_eq!(row.error, None);
 /// assert_eq!(row.parameters[0].name, "m");
-/// // What cannot be identified is a row, too.
+/// A record that cannot be identified gives a row, too.
 /// let row = analysis.row("lost", || analysis.open("lost.csv"));
 /// assert_eq!(row.error.unwrap().code, "io.read");
 /// # Ok::<(), mechid_analysis::AnalysisError>(())
@@ -42,10 +42,10 @@ pub struct SavedAnalysis {
     /// Settings of the identification.
     pub identify: Identify,
     /// Settings of the identification of a machine of named elements, whose sensors and inputs name
-    /// the columns; then `channels` and `identify` are left out.
+    /// the columns; then `channels` and `identify` are not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elements: Option<IdentifyElements>,
-    /// Settings of a modal test, which takes the place of the identification; `None`: none.
+    /// Settings of a modal test, which replaces the identification; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<ModesSettings>,
 }
@@ -54,7 +54,7 @@ impl SavedAnalysis {
     /// Reads an analysis from a JSON file (`-`: standard input) and checks it.
     ///
     /// # Errors
-    /// [`AnalysisError::Io`] if it cannot be read or has a field that is wrong, and those of
+    /// [`AnalysisError::Io`] if it cannot be read or has an invalid field, and the errors of
     /// [`SavedAnalysis::check`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let read: Self = read_json(path)?;
@@ -62,7 +62,7 @@ impl SavedAnalysis {
         Ok(read)
     }
 
-    /// Checks what no record could be identified with.
+    /// Checks for faults that would prevent the identification of every record.
     ///
     /// # Errors
     /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`], and
@@ -95,7 +95,7 @@ impl SavedAnalysis {
     /// Returns the columns of a record.
     ///
     /// # Errors
-    /// Those of [`IdentifyElements::channels`].
+    /// The errors of [`IdentifyElements::channels`].
     pub(crate) fn record_channels(&self) -> Result<Channels, AnalysisError> {
         match &self.elements {
             Some(elements) => elements.channels(),
@@ -117,8 +117,8 @@ impl SavedAnalysis {
         plan.open()
     }
 
-    /// Returns a hash of all settings, in hexadecimal digits, which tells whether two rows come
-    /// from the same analysis.
+    /// Returns a hash of all settings, in hexadecimal digits; rows with equal hashes come from the
+    /// same analysis.
     pub fn hash(&self) -> String {
         // Structs of numbers and texts with named fields always have a JSON form.
         let json = serde_json::to_string(self).unwrap_or_default();

@@ -243,11 +243,11 @@ impl BearingData {
     }
 }
 
-/// Returns the film force f − M a and the displacement at the `keep` rows of two tables of frequency
-/// responses, of the displacement `d` and of the acceleration `a`.
+/// Returns the film force f − M a and the displacement at the `keep` rows of two tables of
+/// frequency responses, of the displacement `d` and of the acceleration `a`.
 ///
-/// `mass` is that of the stator in kg. With `noise` the covariances of both tables give that of the
-/// result, if both have one.
+/// `mass` is the mass of the stator, in kg. With `noise`, the covariance of the result is computed
+/// from the covariances of both tables, if both have one.
 fn film_data(
     d: &FrequencyData,
     a: &FrequencyData,
@@ -284,7 +284,7 @@ fn apart(why: &str) -> AnalysisError {
     AnalysisError::Setting { setting: "frf_table", why: why.into() }
 }
 
-/// Scatter of the periods over the displacement below which it is rounding.
+/// Minimum ratio of the scatter of the periods to the displacement; a smaller scatter is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Returns whether the scatter of the periods is more than rounding.

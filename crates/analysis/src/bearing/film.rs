@@ -1,4 +1,4 @@
-//! Eight or twelve coefficients of a film, minus those of the baseline.
+//! Eight or twelve coefficients of a film, after subtraction of the baseline.
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{

@@ -16,7 +16,7 @@
 //! |---|---|
 //! | `settings` | settings, as values |
 //! | `data` | f − M_s a and d from records or from tables of frequency responses |
-//! | `film` | eight or twelve coefficients, with the baseline subtracted; the likelihood-ratio test |
+//! | `film` | eight or twelve coefficients without the baseline; the likelihood-ratio test |
 //! | `selection` | intervals after the test has chosen twelve |
 //! | `rotation` | the speed of rotation that would explain a misfit |
 //! | `checks` | checks of the records and of the residual |

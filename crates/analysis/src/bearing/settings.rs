@@ -24,7 +24,7 @@ pub struct IdentifyBearing {
     pub coefficients: Coefficients,
     /// Spectral lines to use.
     pub lines: LineChoice,
-    /// Additional lines to exclude, in addition to those of the rotation.
+    /// Lines to exclude in addition to the multiples of the rotation.
     pub without: LeftOut,
     /// Number of independent averages of the coherence of tables of frequency responses, a pure
     /// number that need not be an integer.
@@ -33,7 +33,7 @@ pub struct IdentifyBearing {
     pub points: Vec<String>,
 }
 
-/// Size of a bearing and its oil, as far as it is known.
+/// Size of a bearing and its oil; unknown values are `None`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BearingSize {

@@ -28,7 +28,7 @@ pub struct BearingPlan {
     pub reading: Reading,
     /// Samples to use.
     pub window: Window,
-    /// Settings; the speed and load of each point replace those of the settings.
+    /// Settings; each point replaces their speed and load.
     pub settings: IdentifyBearing,
     /// Baseline tests for every point without other ones.
     pub baseline: Vec<PathBuf>,

@@ -95,7 +95,7 @@ pub struct CoefficientRow {
 /// Dimensionless coefficients: k c/W, c c Ω/W, m c Ω²/W with the clearance c and the load W.
 #[derive(Debug, Clone, Serialize)]
 pub struct Dimensionless {
-    /// Coefficients, a ratio each; without rotation only those of the stiffness.
+    /// Coefficients, a ratio each; without rotation only the stiffnesses.
     pub coefficients: Vec<CoefficientRow>,
     /// Sommerfeld number μ N L D (R/c)²/W, dimensionless; `None` if size or viscosity are unknown.
     pub sommerfeld_number: Option<f64>,
