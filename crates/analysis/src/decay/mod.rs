@@ -48,7 +48,7 @@ impl Default for DecaySettings {
     }
 }
 
-/// Modes of a free response, and the measured response with that of the modes.
+/// Modes of a free response, and the measured response with the modelled one.
 ///
 /// [`Display`](fmt::Display) writes the result for people, `serde` for programs.
 #[derive(Debug)]

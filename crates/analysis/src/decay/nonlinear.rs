@@ -17,7 +17,7 @@ const HARMONIC_REACH: f64 = 0.1;
 /// harmonic.
 const HARMONIC_ERRORS: f64 = 4.0;
 
-/// Mode with a frequency that is a multiple of that of another mode, within their errors.
+/// Mode whose frequency is a multiple of another mode's frequency, within their errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Harmonic {
     /// The other mode, counted from 1.

@@ -179,7 +179,7 @@ fn notes(estimate: &AmbientEstimate) -> Vec<String> {
     notes
 }
 
-/// Measured responses over frequency; nothing is predicted without forces.
+/// Returns the measured responses over frequency, without a prediction: the forces are unknown.
 fn spectrum(data: &LineData) -> ModesSpectrum {
     let outputs = data.outputs();
     let power = |at: usize| outputs.column(at).norm_squared() / data.len() as f64;

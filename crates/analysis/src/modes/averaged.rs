@@ -27,7 +27,7 @@ pub(super) struct Averaged {
     pub spacing_hz: f64,
     /// Minimum distance, in lines, of independent errors.
     step: usize,
-    /// Ratio of the standard error for lines `step` apart to that of independent lines.
+    /// Ratio of the standard errors of lines `step` apart and of independent lines.
     pub inflation: f64,
     /// Weights of the smoothing by the window; empty without smoothing.
     smoothing: Vec<f64>,

@@ -81,7 +81,7 @@ pub struct LoneRow {
 /// Compares two sets of modes at their common points: pairs by frequency and shape, differences
 /// with their standard errors, and modes without a partner.
 ///
-/// Points with the same name are the same. A name without a direction (`3`) stands for the only
+/// Points with the same name are the same. A name without a direction (`3`) matches the only
 /// direction of the other set at this point (`3+Z`). Sets without a common name, but with the same
 /// number of entries, are compared entry by entry if the names of one of them are the numbers from
 /// 1.

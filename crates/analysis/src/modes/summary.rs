@@ -158,8 +158,8 @@ pub struct OutputRow {
     /// ratio; `None` without a validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
-    /// Ratio of the RMS of the sensor noise in the band to that of the response; `None` without
-    /// forces.
+    /// Ratio of the RMS of the sensor noise to the RMS of the response, both in the band; `None`
+    /// without forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_share: Option<f64>,
 }

@@ -96,7 +96,7 @@ impl Tables {
         self.averaged.iter().flatten().any(Averaged::is_smoothed)
     }
 
-    /// Returns the largest ratio of a standard error to that of independent lines.
+    /// Returns the largest ratio of a standard error to the one of independent lines.
     pub fn error_inflation(&self) -> f64 {
         self.averaged.iter().flatten().map(|averaged| averaged.inflation).fold(1.0, f64::max)
     }

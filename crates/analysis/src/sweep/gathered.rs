@@ -1,4 +1,4 @@
-//! The estimators, and what they gather from samples that come a chunk at a time.
+//! Estimators, and the sums that they accumulate chunk by chunk.
 
 use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_estimate::time_domain::Transitions;
@@ -33,7 +33,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// The estimator in words.
+    /// Returns the name of the estimator.
     pub fn name(self) -> &'static str {
         match self {
             Estimator::Euler => "Euler's rule",
@@ -45,23 +45,23 @@ impl Estimator {
         }
     }
 
-    /// Returns whether it takes whole periods.
+    /// Returns whether it needs whole periods.
     pub(crate) fn is_of_spectra(self) -> bool {
         matches!(self, Estimator::LeastSquares | Estimator::MaximumLikelihood)
     }
 
-    /// Returns how much of a record must be held.
+    /// Returns the part of a record to buffer.
     pub(crate) fn hold(self) -> Hold {
         if self.is_of_spectra() { Hold::Periods } else { Hold::Samples(0) }
     }
 
-    /// Samples of a record to take at a time.
+    /// Returns the number of samples to process at a time.
     pub(crate) fn chunk(self, period: usize) -> usize {
         if self.is_of_spectra() { period * (CHUNK_SAMPLES / period).max(1) } else { CHUNK_SAMPLES }
     }
 }
 
-/// Sums that an estimator needs of the samples it has seen.
+/// Sums of an estimator over the processed samples.
 #[derive(Debug)]
 pub(crate) enum Gathered {
     /// Steps from sample to sample.
@@ -73,8 +73,8 @@ pub(crate) enum Gathered {
 }
 
 impl Gathered {
-    /// Starts with no samples; they begin like these, and `period` of them are one of so many
-    /// `periods`.
+    /// Creates empty sums; `beginning` are the first samples, and the record has `periods` periods
+    /// of `period` samples.
     pub(crate) fn new(
         estimator: Estimator,
         beginning: &Samples<'_>,
@@ -98,7 +98,7 @@ impl Gathered {
         Ok(Self::Steps(discretisation, Transitions::new(dof, force.sampling().dt())?))
     }
 
-    /// Takes some samples: of whole periods one or more.
+    /// Adds samples; for whole periods one or more periods.
     pub(crate) fn push(&mut self, samples: &Samples<'_>) -> Result<(), AnalysisError> {
         let force = &samples.force;
         match self {
@@ -119,7 +119,7 @@ impl Gathered {
         Ok(())
     }
 
-    /// The machine behind all of them.
+    /// Returns the estimate from all samples.
     pub(crate) fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, AnalysisError> {
         Ok(match self {
             Self::Steps(discretisation, rows) => {
@@ -134,23 +134,23 @@ impl Gathered {
     }
 }
 
-/// Every n-th sample of a record, gathered as the record goes by.
+/// Every n-th sample of a record, accumulated chunk by chunk.
 #[derive(Debug)]
 pub struct Decimated {
     factor: usize,
-    /// Samples to come before the next one that is taken.
+    /// Number of samples before the next one that is used.
     skip: usize,
-    /// The last sample taken, if the next one is fitted together with it.
+    /// The last used sample, if the next one is fitted together with it.
     last: Option<Samples<'static>>,
     gathered: Gathered,
 }
 
 impl Decimated {
-    /// Starts with no sample of a record of which this is held.
+    /// Creates an empty sum for a record whose buffered samples are `held`.
     ///
     /// # Errors
-    /// [`AnalysisError::DecimatedPeriod`] if one of several periods is no whole number of the
-    /// samples taken, and those of choosing lines.
+    /// [`AnalysisError::DecimatedPeriod`] if one of several periods is not a whole number of the
+    /// used samples, and the errors of choosing lines.
     pub fn new(
         estimator: Estimator,
         factor: usize,
@@ -166,7 +166,7 @@ impl Decimated {
         Ok(Self { factor, skip: 0, last: None, gathered })
     }
 
-    /// Takes its samples from the next chunk of the record.
+    /// Adds its samples from the next chunk of the record.
     pub fn push(&mut self, chunk: &Samples<'_>) -> Result<(), AnalysisError> {
         let len = chunk.force.len();
         if self.skip >= len {
@@ -185,7 +185,7 @@ impl Decimated {
         Ok(())
     }
 
-    /// The machine behind the samples taken.
+    /// Returns the estimate from the used samples.
     pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, AnalysisError> {
         self.gathered.solve(unknowns)
     }

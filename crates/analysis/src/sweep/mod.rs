@@ -36,7 +36,7 @@ pub struct SweepSettings {
     pub settings: Settings,
     /// Estimator.
     pub estimator: Estimator,
-    /// Known masses; `None`: those of a described experiment, none of a record.
+    /// Known masses; `None`: the masses of a described experiment, none for a record.
     pub mass: Option<KnownMass>,
     /// Natural frequency that NPI counts, in Hz; `None`: the lowest of the machine.
     pub natural_frequency_hz: Option<f64>,
@@ -64,7 +64,7 @@ pub type Simulate<'a> = dyn Fn(&Experiment) -> Result<Simulated, String> + Sync 
 ///
 /// # Errors
 /// [`AnalysisError::NoSetting`], [`AnalysisError::EmptySweep`] if no setting gives an estimate, and
-/// whatever is wrong with the description.
+/// [`AnalysisError::Simulation`] if the description is invalid.
 pub fn sweep_experiment(
     experiment: &Experiment,
     how: &SweepSettings,
@@ -96,10 +96,10 @@ pub fn sweep_experiment(
     how.summary(file, samples, &swept, Some(&system), (Some(natural_frequency_hz), &rate_hz))
 }
 
-/// Identifies every n-th sample of a record, with nothing filtered, for every setting.
+/// Identifies every n-th sample of a record, without filtering, for every setting.
 ///
-/// Without a reference the standard errors are compared, which do not include bias. A long text is
-/// gone through once for all settings and not held. `progress` is called after each setting.
+/// Without a reference, the standard errors are compared; they do not include bias. A long text is
+/// read once for all settings and not buffered. `progress` is called after each setting.
 ///
 /// # Errors
 /// [`AnalysisError::NpiOfRecord`], [`AnalysisError::SweepRate`] or [`AnalysisError::Decimation`]
@@ -135,7 +135,7 @@ pub fn sweep_record(
             settings::whole(setting).ok_or(AnalysisError::Decimation { value: setting })
         }
     };
-    // What cannot be taken from this record at all is said before anything runs.
+    // Refuses impossible settings before the computation.
     let factors = how.settings.0.iter().map(|s| decimation(*s)).collect::<Result<Vec<_>, _>>()?;
     let gathered = gather(&recorded, how.estimator, &factors)?;
     let run = |setting: &f64| {
@@ -155,8 +155,8 @@ pub fn sweep_record(
     Ok(summary)
 }
 
-/// Returns what a reader of spectra must know of the record: that its samples are no whole periods,
-/// or which of them were searched for the driven lines.
+/// Returns the note on the spectra: the samples are not whole periods, or only some of them were
+/// searched for driven lines.
 fn spectra_note(measured: &Block) -> Option<String> {
     if let Some(last) = measured.held_to() {
         let (first, file) = (measured.first_sample, &measured.file);
@@ -174,7 +174,7 @@ fn spectra_note(measured: &Block) -> Option<String> {
     })
 }
 
-/// Goes through a record once, for all of these decimations.
+/// Reads a record once, for all of these decimations.
 fn gather(
     recorded: &Windowed,
     estimator: Estimator,
@@ -191,7 +191,7 @@ fn gather(
     recorded.chunks(samples, samples, &mut |chunk| {
         let chunk = Samples::measured(chunk);
         for decimated in gathered.values_mut() {
-            // What goes wrong at one setting leaves the others alone.
+            // A failure at one setting does not affect the others.
             if let Some(Err(reason)) = decimated.as_mut().ok().map(|d| d.push(&chunk)) {
                 *decimated = Err(Arc::new(reason));
             }

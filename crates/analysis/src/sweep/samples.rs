@@ -12,7 +12,7 @@ use super::Simulated;
 use crate::AnalysisError;
 use crate::measurement::{Block, joined};
 
-/// Forces and motions on one time axis.
+/// Forces and responses on one time axis.
 #[derive(Debug)]
 pub struct Samples<'a> {
     pub force: Cow<'a, Record>,
@@ -21,7 +21,7 @@ pub struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// Returns the samples that a simulated experiment gives.
+    /// Creates the samples of a simulated experiment.
     pub fn simulated(simulated: Simulated) -> Self {
         let Simulated { force, response, whole_periods } = simulated;
         let owned = |record: &Record| Cow::Owned(record.clone());
@@ -36,7 +36,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Returns the samples of a record, taken as open.
+    /// Creates the samples of a record, treated as open.
     pub fn measured(measured: &'a Block) -> Self {
         let motions = measured.responses().into_iter();
         Self {
@@ -46,7 +46,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Every `factor`-th sample, from the `first` on, counted from 0.
+    /// Returns every `factor`-th sample, beginning with sample `first`, counted from 0.
     pub fn every(&self, factor: usize, first: usize) -> Result<Samples<'static>, AnalysisError> {
         self.map(|record| {
             let len = (record.len() - first).div_ceil(factor);
@@ -57,12 +57,12 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// The last of them.
+    /// Returns the last sample.
     pub fn last(&self) -> Result<Samples<'static>, AnalysisError> {
         self.map(|record| Ok(record.window(record.len() - 1, 1)?))
     }
 
-    /// Returns these samples followed by those of a later chunk.
+    /// Returns these samples followed by samples of a later chunk.
     pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, AnalysisError> {
         let join = |first, later| Ok::<_, AnalysisError>(Cow::Owned(joined(first, later)?));
         let pairs = self.motions.iter().zip(&later.motions);
@@ -74,7 +74,7 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// One kind of motion.
+    /// Returns one kind of response.
     ///
     /// # Errors
     /// [`AnalysisError::SweepMotion`] if it was not measured.
@@ -83,7 +83,7 @@ impl<'a> Samples<'a> {
         motion.map(|(_, record)| record.as_ref()).ok_or(AnalysisError::SweepMotion { wanted })
     }
 
-    /// The first kind of motion there is.
+    /// Returns the first kind of response that exists.
     pub fn first_motion(&self) -> (ResponseQuantity, &Record) {
         (self.motions[0].0, &self.motions[0].1)
     }

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// Settings in the longest sweep.
+/// Maximum number of settings in a sweep.
 const LONGEST: usize = 100_000;
 
 /// Quantity that is swept.
@@ -21,7 +21,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Name and unit, as above a column and on an axis.
+    /// Returns name and unit for a column or an axis.
     pub fn label(self) -> (&'static str, &'static str) {
         match self {
             Kind::Npi => ("NPI", ""),

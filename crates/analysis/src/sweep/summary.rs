@@ -132,12 +132,12 @@ impl Point {
 }
 
 impl SweepSummary {
-    /// Returns whether the errors are measured against a reference.
+    /// Returns whether the errors refer to a known machine.
     pub fn has_reference(&self) -> bool {
         self.points.iter().flat_map(|p| &p.parameters).any(|p| p.true_value.is_some())
     }
 
-    /// Returns the result as a person reads it: all settings, or the best with its intervals.
+    /// Returns the result as text for a reader: all settings, or the best with its intervals.
     pub fn text(&self, only_best: bool) -> String {
         let mut text = format!(
             "{}: {}, {} in a period",
