@@ -10,8 +10,9 @@ use crate::text::significant;
 
 /// A failure of an analysis.
 ///
-/// Messages write the settings that they name between backticks, as the fields of the option structs
-/// are called, so that each door can show its own spelling (`--sample-rate` on the command line).
+/// Messages put the names of settings, as the fields of the option structs are called, between
+/// backticks, so that each interface can show its own spelling (`--sample-rate` on the command
+/// line).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -21,13 +22,13 @@ pub enum AnalysisError {
     /// A machine of named elements cannot be identified.
     #[error(transparent)]
     Likelihood(#[from] mechid_estimate::likelihood::LikelihoodError),
-    /// The data determine none of the unknowns, or not what a machine needs.
+    /// The data determine none of the unknowns, or too few for a machine.
     #[error(
         "{combinations}: add a sensor or a force, or state a coefficient or its prior; \
          \"candidates\" of the description show what a measurement would add"
     )]
     Undetermined {
-        /// Unknowns and the combinations that are determined, a sentence each.
+        /// Unknowns and the determined combinations, a sentence each.
         combinations: String,
     },
     /// No modes can be identified from the responses alone.
@@ -65,12 +66,12 @@ pub enum AnalysisError {
         /// A time column whose unit is not understood, and the text for that unit.
         unclear: Option<(String, String)>,
     },
-    /// A file of many records does not hold the one asked for, or none is asked for.
+    /// A file of many records does not contain the requested one, or none was requested.
     #[error("{file} holds {} ({available}){}", message::count(*records, "record"), other(id.as_deref()))]
     RecordId {
         /// The file.
         file: String,
-        /// The record asked for.
+        /// The requested record.
         id: Option<String>,
         /// Number of records in the file.
         records: usize,
@@ -80,7 +81,7 @@ pub enum AnalysisError {
     /// An array in memory has no column of this name.
     #[error("there is no column \"{column}\"; the columns are {available}")]
     NoColumn {
-        /// The column asked for.
+        /// The requested column.
         column: String,
         /// Names of the columns.
         available: String,
@@ -101,7 +102,7 @@ pub enum AnalysisError {
     /// No record was given.
     #[error("no record: an identification needs one at least")]
     NoRecord,
-    /// A table of frequency responses has not all that its forces and points need.
+    /// A table of frequency responses does not contain all responses for its forces and points.
     #[error(
         "{file} has no response at {response} to a force at {force}: every point needs one to every \
          force, and every force one at its own point (choose `points`){advice}"
@@ -113,7 +114,7 @@ pub enum AnalysisError {
         response: String,
         /// Point of the force.
         force: String,
-        /// Advice, beginning with its punctuation; may be empty.
+        /// Further advice, beginning with its punctuation; empty if there is none.
         advice: &'static str,
     },
     /// A file is neither a record with named columns nor a table of frequency responses.
@@ -177,7 +178,7 @@ pub enum AnalysisError {
         /// The file.
         file: String,
     },
-    /// The modes in a JSON file are not those of a result.
+    /// The modes in a JSON file are not modes of a result.
     #[error("{file}: its `modes` are not those of a result: {why}")]
     SavedModes {
         /// The file.
@@ -240,7 +241,7 @@ pub enum AnalysisError {
         /// Rate of growth, in 1/s.
         rate: f64,
     },
-    /// A column is in a unit of another quantity than it is used for.
+    /// A column is in a unit of another quantity than required.
     #[error(
         "{file}: column {column} is in {unit}, a unit of {measures}; `{setting}` takes columns of {wanted}{}",
         of_support(*measures, *wanted)
@@ -250,16 +251,16 @@ pub enum AnalysisError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// Unit that its name or the line of units says.
+        /// Unit stated by its name or by the line of units.
         unit: String,
         /// Quantity of that unit.
         measures: Quantity,
         /// Setting that names the column.
         setting: &'static str,
-        /// Quantity that it must hold.
+        /// Required quantity.
         wanted: Quantity,
     },
-    /// The number of response columns is not that of the degrees of freedom of the system.
+    /// The number of response columns differs from the number of degrees of freedom of the system.
     #[error(
         "`{response}` names {}, the system has {}: name one for each, 0 where it was not measured",
         message::count(*got, "column"), message::count(*dofs, "degree of freedom")
@@ -283,7 +284,7 @@ pub enum AnalysisError {
         /// Degrees of freedom of the system.
         dofs: usize,
     },
-    /// The number of noise levels is not that of the measured columns.
+    /// The number of noise levels differs from the number of measured columns.
     #[error(
         "`noise` gives {}, the response has {}: give one for each",
         message::count(*levels, "level"), message::count(*columns, "column")
@@ -310,7 +311,7 @@ pub enum AnalysisError {
     /// The Kalman smoother has no periods.
     #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
     KalmanIsOpen,
-    /// The method has no standard error of a band of frequencies.
+    /// The method has no standard error for a frequency band.
     #[error(
         "the force from sample to sample (`discretised`) cannot be kept within the band from {low_hz} \
          to {high_hz} Hz: leave `band_hz` out, or choose another `method`"
@@ -321,13 +322,13 @@ pub enum AnalysisError {
         /// Upper end of the band, in Hz.
         high_hz: f64,
     },
-    /// A bearing cannot be as described.
+    /// A bearing with an invalid description.
     #[error(transparent)]
     Bearing(#[from] mechid_bearing::BearingError),
     /// The reconstruction failed.
     #[error(transparent)]
     Force(#[from] mechid_force::ForceError),
-    /// The fit failed, and the checks of its data say why.
+    /// The fit failed for reasons shown by the checks of its data.
     #[error("{error}; {reasons}")]
     Unfit {
         /// The failure.
@@ -357,7 +358,8 @@ pub enum AnalysisError {
         /// The value given, in kg.
         value: f64,
     },
-    /// The number of masses fits neither the degrees of freedom nor the entries of their matrix.
+    /// The number of masses differs from both the number of degrees of freedom and the number of
+    /// matrix entries.
     #[error(
         "`mass` gives {}, the record has {}: give one mass for each, or all entries of the \
          {dof}×{dof} matrix row by row", message::count(*got, "value"), message::count(*dof, "degree of freedom")
@@ -382,9 +384,9 @@ pub enum AnalysisError {
         first_hz = message::number_to(*first_hz, 6), last_hz = message::number_to(*last_hz, 6)
     )]
     EmptyBand {
-        /// Lower end asked for, in Hz.
+        /// Requested lower end, in Hz.
         low_hz: f64,
-        /// Upper end asked for, in Hz.
+        /// Requested upper end, in Hz.
         high_hz: f64,
         /// Lowest frequency with force, in Hz.
         first_hz: f64,
@@ -434,7 +436,7 @@ pub enum AnalysisError {
         /// Number of samples in a period.
         period: usize,
     },
-    /// The record that validates a fit has other columns than the records fitted.
+    /// The record for validation has other columns than the fitted records.
     #[error("{file} has {got} degrees of freedom, the identified system has {dofs}")]
     DegreesOfFreedom {
         /// The record, or the file of the system.
@@ -454,7 +456,7 @@ pub enum AnalysisError {
         /// The names there can be.
         known: String,
     },
-    /// The machine has nonlinear terms, and what is known of its motion is not enough for them.
+    /// The machine has nonlinear terms, and the measured responses are not sufficient for them.
     #[error(
         "{file}: this machine has nonlinear terms ({terms}); its force is reconstructed by the equation \
          of motion from displacement, velocity and acceleration of every degree of freedom, all of \
@@ -472,7 +474,7 @@ pub enum AnalysisError {
          whole numbers"
     )]
     SweepRate {
-        /// Rate asked for, in Hz.
+        /// Requested rate, in Hz.
         rate_hz: f64,
         /// Rate of the record, in Hz.
         own_hz: f64,
@@ -489,7 +491,7 @@ pub enum AnalysisError {
         /// Number of samples asked for, a pure number.
         value: f64,
     },
-    /// A period is no whole number of the samples taken.
+    /// A period is not a whole number of the used samples.
     #[error("a period of {} is no whole number of every {} sample", message::count(*period, "sample"), message::ordinal(*factor))]
     DecimatedPeriod {
         /// Number of samples in a period.
@@ -533,7 +535,7 @@ pub enum AnalysisError {
         /// Reasons, hit by hit.
         reasons: String,
     },
-    /// The work takes more memory than a file of this size may ask for.
+    /// The computation needs more memory than the limit for a file of this size.
     #[error(
         "{file}: the work on {numbers} numbers takes about {} GB of memory, and {} GB is the limit for a file of this size; \
          if the record is right and the memory is there, set `memory_gb`: {}",
@@ -544,31 +546,31 @@ pub enum AnalysisError {
     Memory {
         /// The record.
         file: String,
-        /// Numbers that the work holds.
+        /// Numbers that the computation stores.
         numbers: usize,
-        /// Estimate of the memory that it takes, in units of GB.
+        /// Estimate of the required memory, in units of GB.
         needed_gb: f64,
         /// The limit, in units of GB.
         allowed_gb: f64,
     },
-    /// A record of a fleet took more memory than it may.
+    /// A record of a fleet exceeded its memory limit.
     #[error("the record took more than {gb} GB of memory, and the process that worked on it was ended; `record_memory_gb` sets the limit",
         gb = message::number(*gb))]
     RecordMemory {
         /// The limit, in units of GB.
         gb: f64,
     },
-    /// A record of a fleet took more time than it may.
+    /// A record of a fleet exceeded its time limit.
     #[error("the record took more than {seconds} s, and the process that worked on it was ended; `record_seconds` sets the limit",
         seconds = message::number(*seconds))]
     RecordTime {
         /// The limit, in s.
         seconds: f64,
     },
-    /// The process that worked on a record of a fleet has ended.
+    /// The process for a record of a fleet has ended.
     #[error("the process that worked on the record has ended: {how}")]
     RecordProcess {
-        /// Way in which it ended, and what it said.
+        /// Manner in which it ended, and its message.
         how: String,
     },
     /// A setting cannot be understood.
@@ -579,10 +581,10 @@ pub enum AnalysisError {
         /// The reason.
         why: String,
     },
-    /// M, C and K have no scale: the data give the modes alone.
+    /// M, C and K have no scale: the data determine only the modes.
     #[error("{unscaled}")]
     Unscaled {
-        /// Equations that are not given.
+        /// Equations whose entries are not reported.
         unscaled: Unscaled,
     },
     /// The identification failed.
@@ -612,8 +614,9 @@ impl From<mechid_modal::indicators::IndicatorError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Returns which failure it is, such as `io.missing-column` or `analysis.window`: stable, for
-    /// programs. The first word is the crate of the innermost failure, the second its variant.
+    /// Returns a stable identifier of the failure for programs, such as `io.missing-column` or
+    /// `analysis.window`. The first word is the crate of the innermost failure, the second its
+    /// variant.
     ///
     /// ```
     /// use mechid_analysis::{AnalysisError, Machine};
@@ -622,8 +625,7 @@ impl AnalysisError {
     /// assert_eq!(Machine::read("no-such-file").unwrap_err().code(), "io.read");
     /// ```
     pub fn code(&self) -> String {
-        // As a derived `Debug` writes them: a variant that only passes another on has it in
-        // parentheses.
+        // A derived `Debug` writes a variant that wraps another with the inner one in parentheses.
         let written = format!("{self:?}");
         let (mut rest, mut names) = (written.as_str(), vec!["Analysis"]);
         loop {
@@ -649,8 +651,8 @@ impl AnalysisError {
     }
 }
 
-/// Returns the part of the library that the code of a failure names: codes stay when a failure moves to
-/// a crate of its own.
+/// Returns the part of the library named in the code of a failure: codes are unchanged when a
+/// failure moves to another crate.
 fn part_of_library<'a>(part: &'a str, name: &str) -> &'a str {
     match (part, name) {
         ("Numerics", "EntryNotFinite" | "ExponentialOverflow" | "NotConverged" | "NotSquare") => {
@@ -666,8 +668,7 @@ fn two_digits(size: f64) -> f64 {
     format!("{size:.1e}").parse().unwrap_or(size)
 }
 
-/// Returns the name of a variant in lower case, its words joined by hyphens.
-/// Returns what is wrong with the choice of a record.
+/// Returns the reason why no record could be selected.
 fn other(id: Option<&str>) -> String {
     match id {
         Some(id) => format!(", none of which is {}", escaped(id)),
@@ -675,6 +676,7 @@ fn other(id: Option<&str>) -> String {
     }
 }
 
+/// Returns the name of a variant in lower case, its words joined by hyphens.
 fn kebab(name: &str) -> String {
     let mut text = String::new();
     for (at, letter) in name.char_indices() {
@@ -686,7 +688,7 @@ fn kebab(name: &str) -> String {
     text
 }
 
-/// The words about a time column whose unit is not understood.
+/// Returns a remark about a time column with an unknown unit.
 fn unclear_time(unclear: Option<&(String, String)>) -> String {
     unclear.map_or_else(String::new, |(column, text)| {
         format!(
@@ -696,7 +698,7 @@ fn unclear_time(unclear: Option<&(String, String)>) -> String {
     })
 }
 
-/// Returns what to do with a motion among the forces.
+/// Returns advice for a response among the forces.
 fn of_support(measures: Quantity, wanted: Quantity) -> &'static str {
     if wanted == Quantity::Force && matches!(measures, Quantity::Response(_)) {
         return "; the motion of a support is an input of a machine of named elements (`machine`)";

@@ -1,7 +1,6 @@
-//! Minima and maxima of stretches of a long window: as many as a picture has pixels for.
+//! Minima and maxima of sections of a long window, for plots.
 
-/// Stretches of a long window of which a picture shows the extremes: several for each column of its
-/// pixels.
+/// Number of sections of a long window in a plot: several for each column of pixels.
 const CELLS: usize = 4096;
 
 /// Smallest and largest sample of each cell of a window, in the unit of its channel.
@@ -9,17 +8,17 @@ const CELLS: usize = 4096;
 pub struct Extremes {
     cell: usize,
     samples: usize,
-    /// Samples of every cell, counted from 0, with their values.
+    /// Samples of every section, counted from 0, with their values.
     extremes: Vec<[(usize, f64); 2]>,
 }
 
 impl Extremes {
-    /// Creates the extremes, without a sample yet, of a window of `window` samples.
+    /// Creates empty extremes for a window of `window` samples.
     pub(crate) fn of(window: usize) -> Self {
         Self { cell: window.div_ceil(CELLS).max(1), samples: 0, extremes: Vec::new() }
     }
 
-    /// Takes the next samples.
+    /// Adds the next samples.
     pub(crate) fn push(&mut self, values: &[f64]) {
         for point in (self.samples..).zip(values.iter().copied()) {
             match self.extremes.get_mut(point.0 / self.cell) {
@@ -32,7 +31,7 @@ impl Extremes {
         self.samples += values.len();
     }
 
-    /// Returns the numbers of samples, counted from 0, and their values, in the order of time.
+    /// Returns the indices of samples, counted from 0, and their values, in the order of time.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
         self.extremes.iter().flat_map(|cell| {
             let mut cell = *cell;

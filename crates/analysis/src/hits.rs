@@ -1,4 +1,4 @@
-//! Records of a hammer test, cut into their hits.
+//! Division of the records of a hammer test into hits.
 
 use std::fmt;
 use std::ops::Range;
@@ -10,20 +10,20 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Part of the largest force above which a sample belongs to a pulse.
+/// Minimum ratio of a sample to the largest force for a sample of a pulse.
 const PULSE: f64 = 0.05;
 
-/// Part of the samples of a hammer test that belong to pulses, at most.
+/// Maximum share of samples of a hammer test that belong to pulses.
 const RARE: f64 = 0.05;
 
-/// Largest pull of a hammer over its largest push: filters ring, and a hammer does not pull.
+/// Maximum ratio of pull to push of a hammer; ringing filters cause some pull.
 const ONE_SIDED: f64 = 0.2;
 
-/// Power of a channel during the hits over that between them, beyond 1 and in standard deviations
-/// of such a ratio of noise, up to which no force acts there.
+/// Maximum excess of the power of a channel during the hits over the power between them, in
+/// standard deviations of this ratio for noise; with more, a force acts.
 const MOVES: f64 = 6.0;
 
-/// One hit of a record, used or left out.
+/// One hit of a record, used or excluded.
 #[derive(Debug, Clone, Serialize)]
 pub struct HitRow {
     /// The record.
@@ -44,7 +44,7 @@ pub struct HitRow {
     pub peak: f64,
     /// `true` if it was used.
     pub used: bool,
-    /// Reasons why it was left out, a sentence each.
+    /// Reasons for its exclusion, a sentence each.
     pub reasons: Vec<String>,
     /// The same reasons with their numbers.
     pub faults: Vec<HitFault>,
@@ -81,8 +81,7 @@ impl fmt::Display for HitRow {
     }
 }
 
-/// Returns a line for every record with its number of hits, and one for every hit that was left
-/// out.
+/// Returns a line for every record with its number of hits, and a line for every excluded hit.
 pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     let mut text = String::new();
     for of_record in rows.chunk_by(|a, b| a.record == b.record && a.number < b.number) {
@@ -99,7 +98,7 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
     text
 }
 
-/// Returns a remark on a record that looks like a hammer test, of those that are not cut into hits.
+/// Returns a remark on a record that looks like a hammer test but is not divided into hits.
 pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
     records.iter().find_map(|record| {
         let held = &record.held;
@@ -126,7 +125,7 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
     })
 }
 
-/// Good hits of records, each a record of its own, and a row for every hit.
+/// Good hits, each a separate record, and a row for every hit.
 #[derive(Default)]
 pub(crate) struct Cut {
     pub hits: Vec<Windowed>,
@@ -142,13 +141,13 @@ pub(crate) struct Cut {
 struct Struck {
     dof: usize,
     found: Hits,
-    /// Degrees of freedom whose channels show noise alone, also during the hits.
+    /// Degrees of freedom whose channels contain only noise, also during the hits.
     idle: Vec<usize>,
 }
 
 impl Struck {
     /// # Errors
-    /// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act.
+    /// [`AnalysisError::Setting`] for an invalid rule, and if several forces act.
     fn of(held: &Block, rule: &HitRule) -> Result<Self, AnalysisError> {
         let wrong = |why| AnalysisError::Setting { setting: "hits", why };
         let find = |dof: &usize| {
@@ -174,8 +173,8 @@ impl Struck {
     }
 }
 
-/// Returns whether the force on a degree of freedom is no larger during the hits on another than
-/// between them.
+/// Returns whether the force on a degree of freedom during the hits on another one does not exceed
+/// the force between the hits.
 fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
     let force = held.force.channel(dof);
     let mut is_pulse = vec![false; force.len()];
@@ -200,11 +199,11 @@ pub(crate) struct HitNoise {
     pub pulse: Range<usize>,
 }
 
-/// Cuts records that are held as a whole into their hits.
+/// Divides fully buffered records into their hits.
 ///
 /// # Errors
-/// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act,
-/// [`AnalysisError::NoHit`] if a record has none that is good.
+/// [`AnalysisError::Setting`] for an invalid rule, and if several forces act;
+/// [`AnalysisError::NoHit`] if a record has no good hit.
 pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
     let mut all = Cut::default();
     for record in records {
@@ -244,7 +243,7 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
             let mut part = record.part(hit.window.clone(), pulse)?;
             part.held.file = format!("{}, hit {}", held.file, row.number);
             part.held.driven = vec![dof];
-            // Once a record.
+            // The notes on units appear once for each record.
             if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
                 part.held.unit_remarks.clear();
                 part.held.unit_findings.clear();

@@ -35,7 +35,7 @@
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
 //! | What are the modes of this structure? | [`modes()`] | [`ModesSettings`] | [`Modes`] |
 //! | What are the modes of these frequency responses? | [`modes_of_responses()`] | [`ModesSettings`] | [`Modes`] |
-//! | Have the modes changed, or are they those of a model? | [`compare_modes()`] | – | [`ModeComparison`] |
+//! | Have the modes changed, or do they match a model? | [`compare_modes()`] | – | [`ModeComparison`] |
 //! | How does the structure vibrate when left alone? | [`decay()`] | [`DecaySettings`] | [`Decayed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |

@@ -1,4 +1,4 @@
-//! A machine, and how well it is known.
+//! A machine with the uncertainty of its parameters.
 
 use std::path::Path;
 
@@ -17,12 +17,12 @@ use serde::Deserialize;
 use crate::AnalysisError;
 use crate::measurement::Channels;
 
-/// A system with the covariance of its parameters, where it was identified.
+/// A system with the covariance of its parameters, if it was identified.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     /// Name for messages: the file it was read from.
     pub name: String,
-    /// M, C and K, and the covariance of those of their entries that are uncertain.
+    /// M, C and K, and the covariance of their uncertain entries.
     pub uncertain: UncertainSystem,
     /// Degrees of freedom of the variance behind the covariance.
     pub degrees_of_freedom: usize,
@@ -33,16 +33,14 @@ pub struct Machine {
     pub names: Channels,
 }
 
-/// A system with nonlinear terms, as its channels show it.
+/// A system with nonlinear terms, as its channels record it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearPart {
-    /// M, C and K with the terms and their coefficients, and the covariance of those of them that
-    /// are uncertain.
+    /// M, C and K with the terms and their coefficients, and the covariance of the uncertain ones.
     pub uncertain: UncertainNonlinearSystem,
-    /// Delay and phase that the channels add.
+    /// Delay and phase of the channels.
     pub channels: ChannelPhase,
-    /// Largest displacement (m) that a term saw in the data of its identification; `None` if there
-    /// were none.
+    /// Largest displacement (m) of a term in the data of its identification; `None` without terms.
     pub largest_displacement: Option<f64>,
 }
 
@@ -54,7 +52,7 @@ impl NonlinearPart {
 }
 
 impl Machine {
-    /// Takes a system as exactly known.
+    /// Creates an exactly known machine.
     pub fn known(system: SecondOrderSystem) -> Self {
         let uncertain = UncertainSystem::exact(system);
         Self {
@@ -66,10 +64,10 @@ impl Machine {
         }
     }
 
-    /// Takes what was identified, with the covariance of its parameters.
+    /// Creates a machine from an estimate, with the covariance of its parameters.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    /// [`AnalysisError::Estimate`] if the data do not determine a parameter.
     pub fn of_estimate(estimate: &Estimate) -> Result<Self, AnalysisError> {
         Ok(Self {
             name: "the identified system".into(),
@@ -135,15 +133,15 @@ impl Machine {
         Ok(Self { name, uncertain, degrees_of_freedom, nonlinear, names })
     }
 
-    /// Returns the error for a method that would leave out the nonlinear terms.
+    /// Returns the error for a method that ignores nonlinear terms.
     pub(crate) fn not_linear(&self) -> AnalysisError {
         let terms =
             self.nonlinear.as_ref().map_or_else(Terms::none, |p| p.system().terms().clone());
         AnalysisError::NonlinearMachine { file: self.name.clone(), terms: terms.to_string() }
     }
 
-    /// Returns the system with its nonlinear terms, none for a linear one, and what its channels
-    /// add.
+    /// Returns the system with its nonlinear terms (none for a linear one), and the properties of
+    /// its channels.
     pub(crate) fn with_terms(&self) -> Result<NonlinearPart, AnalysisError> {
         match &self.nonlinear {
             Some(part) => Ok(part.clone()),
@@ -159,19 +157,19 @@ impl Machine {
         }
     }
 
-    /// Returns M, C and K; of a nonlinear system, the linear part.
+    /// Returns M, C and K; for a nonlinear system, its linear part.
     pub fn system(&self) -> &SecondOrderSystem {
         self.uncertain.system()
     }
 
-    /// Returns whether the system, its nonlinear terms included, is taken as exactly known.
+    /// Returns whether the system, including its nonlinear terms, is exactly known.
     pub fn is_exact(&self) -> bool {
         let terms = self.nonlinear.as_ref().is_none_or(|p| p.uncertain.parameters().is_empty());
         terms && self.uncertain.parameters().is_empty()
     }
 
     /// Returns natural frequencies, damping ratios and mode shapes with their standard errors,
-    /// which are zero for a system that is taken as exactly known.
+    /// which are zero for an exactly known system.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the system has no modes.
@@ -185,7 +183,7 @@ impl Machine {
 struct Named {
     /// Channels of records.
     channels: Option<Channels>,
-    /// Points of frequency responses measured elsewhere, where force and response share them.
+    /// Points of frequency responses measured elsewhere, if force and response share them.
     points: Option<Vec<String>>,
 }
 
@@ -200,10 +198,10 @@ impl Named {
     }
 }
 
-/// Parameters of the channels, which are none of the system.
+/// Parameters of the channels rather than of the system.
 const CHANNELS: [&str; 3] = ["delay", "p3", "p5"];
 
-/// Returns the covariance of some of the parameters, chosen by name.
+/// Returns the covariance of the parameters selected by name.
 fn part_of(all: &ParameterCovariance, chosen: impl Fn(&str) -> bool) -> ParameterCovariance {
     let kept: Vec<usize> =
         (0..all.parameters.len()).filter(|at| chosen(&all.parameters[*at])).collect();
@@ -213,7 +211,7 @@ fn part_of(all: &ParameterCovariance, chosen: impl Fn(&str) -> bool) -> Paramete
     ParameterCovariance::new(names, &matrix, all.degrees_of_freedom)
 }
 
-/// Returns the error for a name that is no parameter of the system.
+/// Returns the error for a name that is not a parameter of the system.
 fn unknown_parameter(file: &str, name: &str, system: &NonlinearSystem) -> AnalysisError {
     let entries = Parameter::all(system.dof()).map(|entry| entry.to_string());
     let terms = system.terms().iter().map(|term| term.name().to_owned());

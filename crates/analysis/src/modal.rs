@@ -13,7 +13,7 @@ use crate::identify::rows::{CONFIDENCE, ModeRow, Uncertain, mode_cells};
 use crate::machine::Machine;
 use crate::text::{compact, significant, text_table};
 
-/// Modes of a machine, with standard errors and intervals where its parameters have them.
+/// Modes of a machine, with standard errors and intervals if its parameters have them.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModalSummary {
     /// The machine.
@@ -22,7 +22,7 @@ pub struct ModalSummary {
     pub degrees_of_freedom: usize,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Nonlinear terms that the modes, those of the linear part, leave out, if there are any.
+    /// Nonlinear terms, which the modes of the linear part ignore; `None` for a linear system.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear_terms: Option<Terms>,
     /// Names of the responses, one per degree of freedom; empty if they are not known.
@@ -30,8 +30,8 @@ pub struct ModalSummary {
     pub response_names: Vec<String>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ShapedMode>,
-    /// Frequency of each mode without damping over its amplitude, as far as the data reached from
-    /// which nonlinear terms were identified; empty of a linear system.
+    /// Natural frequency of each undamped mode as a function of amplitude, within the amplitudes of
+    /// the data of the nonlinear terms; empty for a linear system.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub backbone: Vec<BackboneRow>,
     /// M, C and K.
@@ -53,9 +53,9 @@ pub struct ShapedMode {
 /// Frequency of a mode at one amplitude.
 #[derive(Debug, Clone, Serialize)]
 pub struct BackboneRow {
-    /// Number of the mode among those of M and K alone, from 1 by rising frequency.
+    /// Number of the mode of the undamped system, counted from 1 by rising frequency.
     pub mode: usize,
-    /// Amplitude of the fundamental where the mode moves most, in m.
+    /// Amplitude of the fundamental at the point of largest motion, in m.
     pub amplitude: f64,
     /// Frequency of the free vibration, in Hz.
     pub frequency_hz: Uncertain,
@@ -66,13 +66,13 @@ pub struct BackboneRow {
 pub struct ShapeEntry {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// Standard errors of real and imaginary part, in the same unit; `None` for a machine that is
-    /// exactly known.
+    /// Standard errors of real and imaginary part, in the same unit; `None` for an exactly known
+    /// machine.
     pub standard_error: Option<[f64; 2]>,
 }
 
 impl ModalSummary {
-    /// Finds the modes of a machine.
+    /// Computes the modes of a machine.
     ///
     /// # Errors
     /// As [`Machine::modes`].
@@ -93,7 +93,7 @@ impl ModalSummary {
 }
 
 impl Machine {
-    /// Returns the names of the responses, one per degree of freedom; none if they are not known.
+    /// Returns the names of the responses, one per degree of freedom; empty if they are unknown.
     fn response_names(&self) -> Vec<String> {
         let of =
             |kind| (0..self.system().dof()).map(move |dof| self.names.response_name(kind, dof));
@@ -101,16 +101,16 @@ impl Machine {
     }
 }
 
-/// Amplitudes of a backbone.
+/// Number of amplitudes of a backbone curve.
 const AMPLITUDES: usize = 10;
 
 impl Machine {
-    /// Returns the frequency of each mode without damping over its amplitude, up to the largest
-    /// displacement that the data of an identification held; nothing of a linear machine or where
-    /// there were no data.
+    /// Returns the natural frequency of each undamped mode as a function of amplitude, up to the
+    /// largest displacement in the data of the identification; empty for a linear machine or
+    /// without data.
     ///
     /// # Errors
-    /// [`AnalysisError::Model`] if the covariance reaches where there is no such machine.
+    /// [`AnalysisError::Model`] if the covariance includes invalid machines.
     pub fn backbone(&self) -> Result<Vec<BackboneRow>, AnalysisError> {
         let mut rows = Vec::new();
         let Some(part) = &self.nonlinear else { return Ok(rows) };
@@ -140,7 +140,7 @@ impl Machine {
 }
 
 impl ShapedMode {
-    /// Returns the modes of an identified system, or of one that is exactly `known`.
+    /// Returns the modes of an identified system, or of an exactly `known` one.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let rows = ModeRow::all(modes, known)?.into_iter().zip(modes);
         Ok(rows.map(|(row, mode)| Self::of(row, mode, known)).collect())
@@ -218,8 +218,8 @@ impl ModalSummary {
         name.map_or_else(|| format!("direction {}", dof + 1), Clone::clone)
     }
 
-    /// Returns a line for each unstable mode; where the interval of its growth rate contains zero,
-    /// the line says so.
+    /// Returns a line for each unstable mode, with a note if the interval of its growth rate
+    /// contains zero.
     fn instability(&self) -> String {
         let line = |(number, mode): (usize, &ShapedMode)| {
             let rate = mode.row.growth_rate?;
@@ -265,7 +265,8 @@ impl ModalSummary {
     }
 }
 
-/// Entries of shapes as a table; `name` tells the channel of an entry, counted from 0.
+/// Returns the entries of shapes as a table; `name` returns the channel of an entry, counted from
+/// 0.
 pub(crate) fn shape_table<'a>(
     modes: impl IntoIterator<Item = &'a ShapedMode>,
     name: impl Fn(usize) -> String,

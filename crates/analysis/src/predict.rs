@@ -20,12 +20,12 @@ use crate::text::{paragraph, significant, text_table};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Predict {
-    /// Number of first samples that the initial state is fitted to, and that do not count in the
-    /// errors; `None`: the machine is at rest before the first sample. For open records.
+    /// Number of initial samples used to estimate the initial state and excluded from the errors;
+    /// `None`: the machine is at rest before the first sample. For open records.
     pub settle: Option<usize>,
 }
 
-/// A predicted response, and its error against what was measured.
+/// A predicted response, and its difference from the measured one.
 #[derive(Debug)]
 pub struct Predicted {
     summary: PredictionSummary,
@@ -43,11 +43,11 @@ pub struct PredictionSummary {
     pub first_sample: usize,
     /// Last sample predicted, counted from 1.
     pub last_sample: usize,
-    /// First sample that counts in the errors, counted from 1.
+    /// First sample included in the errors, counted from 1.
     pub first_judged: usize,
     /// True for the steady state of whole periods.
     pub steady: bool,
-    /// Errors of the channels measured.
+    /// Errors of the measured channels.
     pub channels: Vec<PredictionError>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
@@ -69,15 +69,15 @@ pub struct PredictionError {
     pub unit: &'static str,
     /// RMS of measured minus predicted, in this unit.
     pub rmse: f64,
-    /// The same over the RMS of the measured response about its mean (pure number).
+    /// RMSE over the RMS of the measured response about its mean (pure number).
     pub nrmse: f64,
 }
 
 /// Predicts the response of a machine to the force of a record.
 ///
-/// With a period, the steady state under the mean period; otherwise the whole window from its first
-/// sample on. Between the samples the force is band-limited. Measured responses are compared, if
-/// there are any; a steady state without the means.
+/// With a period, it is the steady state under the mean period; otherwise the response over the
+/// whole window. Between the samples the force is band-limited. Measured responses are compared, if
+/// there are any; for a steady state without their means.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::DegreesOfFreedom`], [`AnalysisError::Setting`] if
@@ -139,17 +139,19 @@ pub fn predict(
     Ok(Predicted { summary, response })
 }
 
-/// Parts of a record of which the first and the last are compared, and their ratio from which a
-/// start is to blame.
+/// Number of parts of a record; the first and the last are compared.
 const PARTS: usize = 8;
+/// Minimum ratio of the errors in the first and the last part that indicates a wrong initial state.
 const DIES_AWAY: f64 = 3.0;
-/// Samples in such a part at least, and those in which the error has to show at once: that of a
-/// machine which is not quite the right one grows with its motion.
+/// Minimum number of samples in such a part, and number of initial samples that must show the
+/// error.
 const SHORTEST: usize = 16;
+/// Minimum ratio of the initial error to the largest one; the error of an inaccurate machine grows
+/// with the response instead.
 const AT_ONCE: f64 = 0.5;
 
-/// Returns whether the error of a channel dies away from the beginning of a record on, as a free
-/// motion does.
+/// Returns whether the error of a channel decays from the beginning of a record, as a free response
+/// does.
 fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
     let error: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p).collect();
     let part = error.len() / PARTS;
@@ -161,7 +163,7 @@ fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
     first > DIES_AWAY * last && largest(&error[..SHORTEST]) > AT_ONCE * largest(&error)
 }
 
-/// Number of samples that the start is fitted to; 0 for a start at rest.
+/// Returns the number of samples used to estimate the initial state; 0 for a start at rest.
 fn settle(
     how: &Predict,
     measured: &Measurement,
@@ -191,7 +193,8 @@ fn settle(
     }
 }
 
-/// Response of an open record from rest, or from the start that fits its first samples best.
+/// Returns the response of an open record from rest, or from the initial state that fits its first
+/// samples best.
 fn open(
     system: &NonlinearSystem,
     phase: ChannelPhase,
@@ -213,7 +216,7 @@ fn open(
     shown(&nonlinear::predict(system, &force, Extent::Open, &start)?, phase, 1)
 }
 
-/// Steady state of periods whose response was not measured.
+/// Returns the steady state of periods without measured responses.
 fn steady_from_rest(
     system: &NonlinearSystem,
     phase: ChannelPhase,
@@ -245,7 +248,7 @@ impl PredictionError {
 }
 
 impl Predicted {
-    /// Returns the errors and how they came about.
+    /// Returns the errors and the settings of the prediction.
     pub fn summary(&self) -> &PredictionSummary {
         &self.summary
     }
@@ -256,8 +259,8 @@ impl Predicted {
         &self.response
     }
 
-    /// Returns the columns of a record of the prediction, with their names: every kind of response
-    /// that was measured, or displacements, in m, m/s or m/s².
+    /// Returns the columns of a record of the prediction, with their names: every measured kind of
+    /// response, or displacements, in m, m/s or m/s².
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         let measured = |kind: &ResponseQuantity| {
             self.summary.channels.iter().any(|channel| channel.quantity == *kind)

@@ -1,6 +1,6 @@
 //! Aligned columns of text, and numbers with a given number of digits.
 
-/// Rows of cells in aligned columns, two blanks apart; the first row is the header.
+/// Formats rows of cells in aligned columns, separated by two blanks; the first row is the header.
 ///
 /// The first column is aligned to the left, the others to the right.
 pub fn text_table(rows: &[Vec<String>]) -> String {
@@ -20,12 +20,12 @@ pub fn text_table(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Columns that fit beside one another on a page.
+/// Maximum width of a table on a page, in characters.
 const PAGE: usize = 100;
 
-/// Formats a table as [`text_table`] does, in several tables one below the other where one would be
-/// too wide; each begins with the first column, and has no rows that say nothing more. The first
-/// table has the first columns, as many as stay `together`.
+/// Formats a table like [`text_table`]; a table that is too wide is divided into several ones below
+/// each other. Each begins with the first column, and omits rows without further content. The first
+/// table contains at least the first `together` columns.
 pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let part = |chosen: &[usize]| {
@@ -61,7 +61,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
-    // The exponent after rounding, which may be one above that of the value.
+    // The exponent after rounding, which may exceed the exponent of the value by one.
     let scientific = format!("{value:.*e}", digits - 1);
     let exponent: i32 = scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
     if !(-4..6.max(digits as i32)).contains(&exponent) {

@@ -1,18 +1,21 @@
-//! Words of settings: the names by which `serde` saves the variants of an enum are those of the
-//! program's options and of Python's keywords.
+//! Words of settings: `serde` saves the variants of an enum by the same names that the options of
+//! the program and the keywords of Python use.
 
 use serde::de::value::Error;
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
 
-/// Returns the words of an enum without fields, in the order of its variants; none of another type.
+/// Returns the words of an enum without fields, in the order of its variants; empty for other
+/// types.
 ///
 /// ```
-/// assert_eq!(mechid_analysis::words::all::<mechid_analysis::frf::Estimator>(), ["h1", "h2", "hv"]);
+/// use mechid_analysis::{frf::Estimator, words};
+///
+/// assert_eq!(words::all::<Estimator>(), ["h1", "h2", "hv"]);
 /// ```
 pub fn all<T: DeserializeOwned>() -> &'static [&'static str] {
     let mut words: &'static [&'static str] = &[];
-    // The deserializer notes the words, and always fails: it has no value to give.
+    // The deserializer records the words, and always fails because it has no value.
     let _ = T::deserialize(Variants(&mut words));
     words
 }
@@ -20,14 +23,14 @@ pub fn all<T: DeserializeOwned>() -> &'static [&'static str] {
 /// Reads the word of a variant.
 ///
 /// # Errors
-/// A sentence that names all words, if it is none of them.
+/// A sentence with all valid words, if `word` is not one of them.
 pub fn read<T: DeserializeOwned>(word: &str) -> Result<T, String> {
     let deserializer: serde::de::value::StrDeserializer<'_, Error> = word.into_deserializer();
     T::deserialize(deserializer)
         .map_err(|_| format!("\"{word}\" is none of {}", all::<T>().join(", ")))
 }
 
-/// Notes the variants of the enum that is asked for.
+/// Records the variants of the requested enum.
 struct Variants<'a>(&'a mut &'static [&'static str]);
 
 impl<'de> Deserializer<'de> for Variants<'_> {
@@ -53,8 +56,8 @@ impl<'de> Deserializer<'de> for Variants<'_> {
     }
 }
 
-/// Readers of settings as they are saved or as a person writes them: a text such as `1024:50:hann`,
-/// a number, or true for the usual values.
+/// Readers of settings as saved or as written by a user: a text such as `1024:50:hann`, a number,
+/// or true for the defaults.
 pub(crate) mod written {
     use std::fmt::Display;
     use std::str::FromStr;
@@ -96,7 +99,7 @@ pub(crate) mod written {
         }
     }
 
-    /// Reads a pair of numbers, too, as if they were written with a colon between them.
+    /// Reads also a pair of numbers, equivalent to a text with a colon between them.
     pub(crate) fn pair<'de, D: Deserializer<'de>, T>(deserializer: D) -> Result<Option<T>, D::Error>
     where
         T: DeserializeOwned + FromStr<Err: Display>,
