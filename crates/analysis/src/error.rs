@@ -244,7 +244,7 @@ pub enum AnalysisError {
     /// A column is in a unit of another quantity than required.
     #[error(
         "{file}: column {column} is in {unit}, a unit of {measures}; `{setting}` takes columns of {wanted}{}",
-        of_support(*measures, *wanted)
+        support_advice(*measures, *wanted)
     )]
     Unit {
         /// The record.
@@ -699,7 +699,7 @@ fn unclear_time(unclear: Option<&(String, String)>) -> String {
 }
 
 /// Returns advice for a response among the forces.
-fn of_support(measures: Quantity, wanted: Quantity) -> &'static str {
+fn support_advice(measures: Quantity, wanted: Quantity) -> &'static str {
     if wanted == Quantity::Force && matches!(measures, Quantity::Response(_)) {
         return "; the motion of a support is an input of a machine of named elements (`machine`)";
     }

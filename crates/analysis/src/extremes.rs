@@ -14,7 +14,7 @@ pub struct Extremes {
 
 impl Extremes {
     /// Creates empty extremes for a window of `window` samples.
-    pub(crate) fn of(window: usize) -> Self {
+    pub(crate) fn new(window: usize) -> Self {
         Self { cell: window.div_ceil(CELLS).max(1), samples: 0, extremes: Vec::new() }
     }
 

@@ -74,10 +74,10 @@ impl fmt::Display for HitRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (peak, time) = (significant(self.peak, 3), significant(self.time_s, 4));
         write!(f, "hit {}, {peak} N at {time} s", self.number)?;
-        match self.used {
-            true => Ok(()),
-            false => write!(f, ", left out: {}", self.reasons.join("; ")),
+        if self.used {
+            return Ok(());
         }
+        write!(f, ", left out: {}", self.reasons.join("; "))
     }
 }
 
@@ -101,9 +101,9 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
 /// Returns a remark on a record that looks like a hammer test but is not divided into hits.
 pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
     records.iter().find_map(|record| {
-        let held = &record.held;
-        let Struck { dof, found, .. } = Struck::of(held, &HitRule::default()).ok()?;
-        let force = held.force.channel(dof);
+        let buffered = &record.held;
+        let Struck { dof, found, .. } = Struck::from_block(buffered, &HitRule::default()).ok()?;
+        let force = buffered.force.channel(dof);
         let (mut pull, mut push, mut pulses) = (0.0_f64, 0.0_f64, 0);
         let largest = found.all.iter().map(|hit| hit.peak.abs()).fold(0.0, f64::max);
         for f in force.iter().map(|f| f - found.offset) {
@@ -118,7 +118,7 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
             format!(
                 "the force of {} is zero but for {}, as that of a hammer: `hits` cuts such a record into its hits, \
                  leaves bad ones out, and fits the others each as a record of its own",
-                held.file,
+                buffered.file,
                 message::count(found.all.len(), "short pulse")
             )
         })
@@ -148,14 +148,15 @@ struct Struck {
 impl Struck {
     /// # Errors
     /// [`AnalysisError::Setting`] for an invalid rule, and if several forces act.
-    fn of(held: &Block, rule: &HitRule) -> Result<Self, AnalysisError> {
+    fn from_block(held: &Block, rule: &HitRule) -> Result<Self, AnalysisError> {
         let wrong = |why| AnalysisError::Setting { setting: "hits", why };
         let find = |dof: &usize| {
-            let found = hits(held.force.channel(*dof), held.force.sampling().dt(), rule);
-            found.map(|found| (*dof, found)).map_err(|error| wrong(error.to_string()))
+            let record_hits = hits(held.force.channel(*dof), held.force.sampling().dt(), rule);
+            record_hits.map(|found| (*dof, found)).map_err(|error| wrong(error.to_string()))
         };
-        let each: Vec<(usize, Hits)> = held.driven.iter().map(find).collect::<Result<_, _>>()?;
-        let (mut with, without): (Vec<_>, Vec<_>) = each
+        let hits_by_dof: Vec<(usize, Hits)> =
+            held.driven.iter().map(find).collect::<Result<_, _>>()?;
+        let (mut with, without): (Vec<_>, Vec<_>) = hits_by_dof
             .into_iter()
             .partition(|(_, found)| !found.all.is_empty() || held.driven.len() == 1);
         let idle: Vec<usize> = without.iter().map(|(dof, _)| *dof).collect();
@@ -205,52 +206,53 @@ pub(crate) struct HitNoise {
 /// [`AnalysisError::Setting`] for an invalid rule, and if several forces act;
 /// [`AnalysisError::NoHit`] if a record has no good hit.
 pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
-    let mut all = Cut::default();
+    let mut cut = Cut::default();
     for record in records {
-        let held = &record.held;
-        let Struck { dof, mut found, idle } = Struck::of(held, rule)?;
-        let force = held.force.channel(dof);
-        all.remarks.extend(idle.iter().map(|dof| {
+        let buffered = &record.held;
+        let Struck { dof, mut found, idle } = Struck::from_block(buffered, rule)?;
+        let force = buffered.force.channel(dof);
+        cut.remarks.extend(idle.iter().map(|dof| {
             format!(
                 "{}: force {} taken as zero: its channel shows noise alone, also during the hits",
-                held.file,
+                buffered.file,
                 dof + 1
             )
         }));
-        for (_, response) in held.responses() {
+        for (_, response) in buffered.responses() {
             found.check_response(response)?;
         }
         let rows = found.all.iter().enumerate();
         let rows: Vec<HitRow> =
             rows.map(|(at, hit)| HitRow::new(record, at + 1, dof, hit)).collect();
-        all.used.push(rows.iter().filter(|row| row.used).count());
+        cut.used.push(rows.iter().filter(|row| row.used).count());
         if rows.iter().all(|row| !row.used) {
-            let reasons = match rows.is_empty() {
-                true => "the force does not rise above its noise".into(),
-                false => rows.iter().map(HitRow::to_string).collect::<Vec<_>>().join("; "),
+            let reasons = if rows.is_empty() {
+                "the force does not rise above its noise".into()
+            } else {
+                rows.iter().map(HitRow::to_string).collect::<Vec<_>>().join("; ")
             };
-            return Err(AnalysisError::NoHit { file: held.file.clone(), reasons });
+            return Err(AnalysisError::NoHit { file: buffered.file.clone(), reasons });
         }
         for (hit, row) in found.all.iter().zip(&rows).filter(|(_, row)| row.used) {
-            let mut pulse = held.force.window(hit.window.start, hit.window.len())?.into_data();
+            let mut pulse = buffered.force.window(hit.window.start, hit.window.len())?.into_data();
             pulse.fill(0.0);
             let alone = found.pulse_alone(force, hit);
             let first = alone.iter().position(|f| *f != 0.0).unwrap_or(0);
             let last = alone.iter().rposition(|f| *f != 0.0).unwrap_or(first);
-            all.noise.push(HitNoise { deviation: found.noise, pulse: first..last + 1 });
+            cut.noise.push(HitNoise { deviation: found.noise, pulse: first..last + 1 });
             pulse.column_mut(dof).copy_from_slice(&alone);
-            let pulse = Record::new(held.force.sampling().with_len(hit.window.len())?, pulse)?;
+            let pulse = Record::new(buffered.force.sampling().with_len(hit.window.len())?, pulse)?;
             let mut part = record.part(hit.window.clone(), pulse)?;
-            part.held.file = format!("{}, hit {}", held.file, row.number);
+            part.held.file = format!("{}, hit {}", buffered.file, row.number);
             part.held.driven = vec![dof];
             // The notes on units appear once for each record.
             if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
                 part.held.unit_remarks.clear();
                 part.held.unit_findings.clear();
             }
-            all.hits.push(part);
+            cut.hits.push(part);
         }
-        all.rows.extend(rows);
+        cut.rows.extend(rows);
     }
-    Ok(all)
+    Ok(cut)
 }

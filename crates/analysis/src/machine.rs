@@ -203,11 +203,11 @@ const CHANNELS: [&str; 3] = ["delay", "p3", "p5"];
 
 /// Returns the covariance of the parameters selected by name.
 fn part_of(all: &ParameterCovariance, chosen: impl Fn(&str) -> bool) -> ParameterCovariance {
-    let kept: Vec<usize> =
+    let selected: Vec<usize> =
         (0..all.parameters.len()).filter(|at| chosen(&all.parameters[*at])).collect();
-    let names = kept.iter().map(|at| all.parameters[*at].clone()).collect();
-    let entry = |row: usize, column: usize| all.matrix[kept[row]][kept[column]];
-    let matrix = DMatrix::from_fn(kept.len(), kept.len(), entry);
+    let names = selected.iter().map(|at| all.parameters[*at].clone()).collect();
+    let entry = |row: usize, column: usize| all.matrix[selected[row]][selected[column]];
+    let matrix = DMatrix::from_fn(selected.len(), selected.len(), entry);
     ParameterCovariance::new(names, &matrix, all.degrees_of_freedom)
 }
 
@@ -229,10 +229,10 @@ fn parameters(
     system: &SecondOrderSystem,
     covariance: &ParameterCovariance,
 ) -> Result<Vec<Parameter>, AnalysisError> {
-    let all = Unknowns::unknown_mass(system.dof())?.free();
+    let entries = Unknowns::unknown_mass(system.dof())?.free();
     let find = |name: &String| {
-        all.iter().find(|p| p.to_string() == *name).copied().ok_or_else(|| {
-            let names: Vec<String> = all.iter().map(Parameter::to_string).collect();
+        entries.iter().find(|p| p.to_string() == *name).copied().ok_or_else(|| {
+            let names: Vec<String> = entries.iter().map(Parameter::to_string).collect();
             AnalysisError::UnknownParameter {
                 file: file.into(),
                 name: name.clone(),

@@ -128,9 +128,10 @@ impl Machine {
                     standard_error: point.standard_error / TAU,
                     degrees_of_freedom: self.degrees_of_freedom,
                 };
-                let frequency_hz = match part.uncertain.parameters().is_empty() {
-                    true => Uncertain::known(frequency.value),
-                    false => Uncertain::of(&frequency)?,
+                let frequency_hz = if part.uncertain.parameters().is_empty() {
+                    Uncertain::known(frequency.value)
+                } else {
+                    Uncertain::from_estimate(&frequency)?
                 };
                 rows.push(BackboneRow { mode: mode + 1, amplitude: point.amplitude, frequency_hz });
             }
@@ -143,7 +144,7 @@ impl ShapedMode {
     /// Returns the modes of an identified system, or of an exactly `known` one.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let rows = ModeRow::all(modes, known)?.into_iter().zip(modes);
-        Ok(rows.map(|(row, mode)| Self::of(row, mode, known)).collect())
+        Ok(rows.map(|(row, mode)| Self::new(row, mode, known)).collect())
     }
 
     /// Returns frequencies, damping and poles of modes, without their shapes.
@@ -170,7 +171,7 @@ impl ShapedMode {
         Self { row, eigenvalue, shape }
     }
 
-    pub(crate) fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
+    pub(crate) fn new(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
         let eigenvalue = mode.mode.eigenvalue();
         let entries = mode.mode.shape().iter().zip(mode.shape_standard_error.iter());
         Self {
@@ -225,9 +226,10 @@ impl ModalSummary {
             let rate = mode.row.growth_rate?;
             let [seconds, growth] = [rate.value.recip(), rate.value].map(|v| significant(v, 3));
             let error = rate.standard_error.map(|error| format!(" ± {}", significant(error, 2)));
-            let doubt = match rate.interval.is_some_and(|[low, _]| low <= 0.0) {
-                true => "; the interval of its growth rate contains zero",
-                false => "",
+            let doubt = if rate.interval.is_some_and(|[low, _]| low <= 0.0) {
+                "; the interval of its growth rate contains zero"
+            } else {
+                ""
             };
             Some(format!(
                 "mode {number} is unstable: its free response grows e-fold every {seconds} s, at \

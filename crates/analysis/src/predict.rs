@@ -114,7 +114,7 @@ pub fn predict(
             if !steady && settle == 0 && is_in_motion(x, p) {
                 in_motion.push(name.clone());
             }
-            errors.push(PredictionError::of((name, kind, dof), x, p, steady));
+            errors.push(PredictionError::new((name, kind, dof), x, p, steady));
         }
     }
     let mut remarks = block.unit_notes();
@@ -185,11 +185,10 @@ fn settle(
         return wrong("the start is fitted to the response of every degree of freedom".into());
     }
     let len = block.force.len();
-    match (2..len).contains(&samples) {
-        true => Ok(samples),
-        false => {
-            wrong(format!("a record of {len} samples settles within 2 to {} of them", len - 1))
-        }
+    if (2..len).contains(&samples) {
+        Ok(samples)
+    } else {
+        wrong(format!("a record of {len} samples settles within 2 to {} of them", len - 1))
     }
 }
 
@@ -224,13 +223,13 @@ fn steady_from_rest(
 ) -> Result<Response, EstimateError> {
     let force = block.force.period_mean(block.period)?;
     let (force, _) = phase.correct(&force, &force)?;
-    let rest = InitialState::rest(system.dof());
-    let steady = nonlinear::predict(system, &force, Extent::WholePeriod, &rest)?;
+    let at_rest = InitialState::rest(system.dof());
+    let steady = nonlinear::predict(system, &force, Extent::WholePeriod, &at_rest)?;
     shown(&steady, phase, block.periods)
 }
 
 impl PredictionError {
-    fn of(
+    fn new(
         (name, quantity, dof): (String, ResponseQuantity, usize),
         measured: &[f64],
         predicted: &[f64],

@@ -114,14 +114,14 @@ impl SavedAnalysis {
         record: &str,
         source: impl FnOnce() -> Result<Measurement, AnalysisError>,
     ) -> ResultRow {
-        ResultRow::of(record, self, source)
+        ResultRow::from_source(record, self, source)
     }
 
     /// Identifies a record whose columns are in memory, as [`SavedAnalysis::row`] does.
     pub fn row_of_table(&self, record: &str, table: Table) -> ResultRow {
         let open = || {
             let file = RecordFile::of_table(table);
-            Measurement::of_file(file, None, &self.record_channels()?, &self.reading)?
+            Measurement::from_file(file, None, &self.record_channels()?, &self.reading)?
                 .window(self.window.clone())
         };
         self.row(record, open)
@@ -129,7 +129,7 @@ impl SavedAnalysis {
 }
 
 impl ResultRow {
-    pub(super) fn of(
+    pub(super) fn from_source(
         record: &str,
         analysis: &SavedAnalysis,
         source: impl FnOnce() -> Result<Measurement, AnalysisError>,
@@ -194,10 +194,10 @@ impl ResultRow {
             // Unknowns without a variance have no covariance in a table.
             covariance: Some(identified.parameter_covariance.clone())
                 .filter(|_| identified.combinations.is_empty()),
-            modes: identified.modes.iter().map(ModeCell::of).collect(),
+            modes: identified.modes.iter().map(ModeCell::from_mode).collect(),
             misfit_ratio: identified.misfit_ratio,
             condition_number: Some(identified.condition_number),
-            findings: identified.checks.iter().map(FindingRow::of).collect(),
+            findings: identified.checks.iter().map(FindingRow::from_check).collect(),
             warnings: conspicuous.map(CheckRow::sentence).chain(open).collect(),
             notes: identified.notes.iter().map(ToString::to_string).collect(),
             ..self.clone()
@@ -222,12 +222,12 @@ impl ResultRow {
             last_sample: Some(last_sample),
             parameters: entries.chain(terms).collect(),
             covariance: identification.covariance.clone(),
-            modes: identification.modes.iter().map(|mode| ModeCell::of(&mode.row)).collect(),
+            modes: identification.modes.iter().map(|mode| ModeCell::from_mode(&mode.row)).collect(),
             nrmse: Some(nrmse),
             unexplained_motion,
             misfit_ratio,
             condition_number: Some(condition_number),
-            findings: identification.checks.iter().map(FindingRow::of).collect(),
+            findings: identification.checks.iter().map(FindingRow::from_check).collect(),
             warnings: conspicuous.map(CheckRow::sentence).collect(),
             notes: identification.remarks.clone(),
             ..self.clone()
@@ -250,7 +250,7 @@ impl ResultRow {
             sample_rate_hz: window.map(|window| window.sample_rate_hz),
             first_sample: window.map(|window| window.first_sample),
             last_sample: window.map(|window| window.last_sample),
-            modes: summary.modes.iter().map(|mode| ModeCell::of(&mode.mode.row)).collect(),
+            modes: summary.modes.iter().map(|mode| ModeCell::from_mode(&mode.mode.row)).collect(),
             nrmse: unexplained,
             unexplained_motion: unexplained,
             findings: summary.checks.iter().map(finding).collect(),
@@ -269,7 +269,7 @@ impl ParameterCell {
 }
 
 impl ModeCell {
-    fn of(mode: &ModeRow) -> Self {
+    fn from_mode(mode: &ModeRow) -> Self {
         Self {
             natural_frequency_hz: mode.natural_frequency_hz.value,
             natural_frequency_standard_error_hz: mode.natural_frequency_hz.standard_error,
@@ -280,7 +280,7 @@ impl ModeCell {
 }
 
 impl FindingRow {
-    fn of(check: &CheckRow) -> Self {
+    fn from_check(check: &CheckRow) -> Self {
         let written = serde_json::to_value(&check.finding).unwrap_or_default();
         let code = written["kind"].as_str().unwrap_or_default().to_owned();
         Self { code, verdict: check.verdict, value: check.value }

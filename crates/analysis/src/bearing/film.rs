@@ -58,8 +58,8 @@ impl Film {
         let base = baseline.map(Fitted::new).transpose()?;
         let (values, covariance) = rig.minus(base.as_ref());
         let fits = std::iter::once(&rig).chain(&base);
-        let each = fits.map(|fitted| fitted.full.estimate.degrees_of_freedom());
-        let degrees_of_freedom = each.min().unwrap_or(0);
+        let freedoms = fits.map(|fitted| fitted.full.estimate.degrees_of_freedom());
+        let degrees_of_freedom = freedoms.min().unwrap_or(0);
         let mut film = Self {
             values,
             covariance,

@@ -85,9 +85,9 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
             let weight = (two(data.displacement(), *row).adjoint() * inverse).transpose();
             let powers = error_powers(noise.covariance(*row), &h);
             for (at, (a, b)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
-                let each = 0.5 * powers[a] * weight[b].norm_sqr();
-                variance[0][at] += each;
-                variance[1][at] += each;
+                let power = 0.5 * powers[a] * weight[b].norm_sqr();
+                variance[0][at] += power;
+                variance[1][at] += power;
             }
         }
         variance

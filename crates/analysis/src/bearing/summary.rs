@@ -145,7 +145,7 @@ impl BearingSummary {
         let error_scale = (film.excess <= DISTURBED_ALONE).then(|| film.excess.sqrt());
         let uncertain = |value: f64, variance: f64| match error_scale {
             None => Ok(Uncertain::known(value)),
-            Some(_) => Uncertain::of(&mechid_numerics::Uncertain {
+            Some(_) => Uncertain::from_estimate(&mechid_numerics::Uncertain {
                 value,
                 standard_error: variance.max(0.0).sqrt(),
                 degrees_of_freedom: film.degrees_of_freedom,

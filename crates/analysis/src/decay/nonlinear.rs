@@ -57,8 +57,8 @@ impl BackboneRow {
             Ok(BackbonePointRow {
                 time_s: point.time,
                 amplitude: point.amplitude,
-                frequency_hz: Uncertain::of(&point.frequency_hz)?,
-                damping_ratio: Uncertain::of(&point.damping_ratio)?,
+                frequency_hz: Uncertain::from_estimate(&point.frequency_hz)?,
+                damping_ratio: Uncertain::from_estimate(&point.damping_ratio)?,
             })
         });
         Ok(Self {

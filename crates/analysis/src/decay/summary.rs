@@ -117,8 +117,8 @@ impl DecaySummary {
         let rows = ModeRow::all(&identified, false)?;
         let modes = rows.into_iter().zip(estimate.modes()).map(|(row, mode)| {
             Ok(DecayModeRow {
-                mode: ShapedMode::of(row, &mode.mode, false),
-                amplitude: Uncertain::of(&mode.amplitude)?,
+                mode: ShapedMode::new(row, &mode.mode, false),
+                amplitude: Uncertain::from_estimate(&mode.amplitude)?,
                 phase_deg: mode.phase.to_degrees(),
                 energy_share: mode.energy_share,
                 decays: mode.decays(),

@@ -21,7 +21,7 @@ pub struct FailureCount {
 
 impl FailureCount {
     /// Counts the failures of some rows.
-    pub(super) fn of(rows: &[ResultRow]) -> Vec<Self> {
+    pub(super) fn from_rows(rows: &[ResultRow]) -> Vec<Self> {
         let failed = rows.iter().filter_map(|row| {
             let error = row.error.clone()?;
             let (code, message) = (error.code, error.message);

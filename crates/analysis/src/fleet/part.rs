@@ -147,7 +147,7 @@ impl Part {
         let done = PartDone {
             file_name: self.file_name.clone(),
             records: rows.len(),
-            failures: FailureCount::of(&rows),
+            failures: FailureCount::from_rows(&rows),
             computed: true,
         };
         // The file has the values for a later run.

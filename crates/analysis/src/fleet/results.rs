@@ -130,8 +130,8 @@ impl Cells {
     fn findings(&mut self) -> Vec<FindingRow> {
         let codes = self.texts("finding").into_iter().zip(self.texts("finding_verdict"));
         let verdict = |written: &str| {
-            let mut all = [Verdict::Good, Verdict::Doubtful].into_iter();
-            all.find(|verdict| verdict.to_string() == written).unwrap_or(Verdict::Bad)
+            let mut verdicts = [Verdict::Good, Verdict::Doubtful].into_iter();
+            verdicts.find(|verdict| verdict.to_string() == written).unwrap_or(Verdict::Bad)
         };
         let rows = codes
             .zip(self.numbers("finding_value"))

@@ -48,11 +48,11 @@ impl FleetSummary {
         elapsed_s: f64,
     ) -> Result<Self, AnalysisError> {
         let ours: BTreeSet<&str> = parts.iter().map(|part| part.file_name.as_str()).collect();
-        let other = |path: &PathBuf| {
+        let is_other = |path: &PathBuf| {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             name.starts_with("part-") && name.ends_with(".parquet") && !ours.contains(name)
         };
-        let other_parts = files_of(folder)?.iter().filter(|path| other(path)).count();
+        let other_parts = files_of(folder)?.iter().filter(|path| is_other(path)).count();
         let computed = || parts.iter().filter(|part| part.computed);
         let failures = FailureCount::merged(parts.iter().flat_map(|part| part.failures.clone()));
         Ok(Self {

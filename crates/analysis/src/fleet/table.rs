@@ -38,7 +38,7 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
     let findings = |value: &dyn Fn(&FindingRow) -> String| {
         texts(rows, |row| row.findings.iter().map(value).collect())
     };
-    let all = [
+    let columns = [
         ("record", text(&|row| Some(row.record.clone()))),
         ("record_id", text(&|row| row.record_id.clone())),
         ("error_code", text(&|row| row.error.as_ref().map(|error| error.code.clone()))),
@@ -73,7 +73,7 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ("analysis_hash", text(&|row| Some(row.analysis_hash.clone()))),
         ("version", text(&|row| Some(row.version.clone()))),
     ];
-    all.into_iter().map(|(name, values)| ParquetColumn { name, values }).collect()
+    columns.into_iter().map(|(name, values)| ParquetColumn { name, values }).collect()
 }
 
 fn texts(rows: &[ResultRow], list: impl Fn(&ResultRow) -> Vec<String>) -> ParquetValues {

@@ -121,12 +121,12 @@ impl Trends {
     /// As [`read_results`].
     pub fn read(folder: impl AsRef<Path>, over: TrendAxis) -> Result<Self, AnalysisError> {
         let Results { rows, superseded } = read_results(folder)?;
-        Ok(Self { superseded, ..Self::of(&rows, over) })
+        Ok(Self { superseded, ..Self::from_rows(&rows, over) })
     }
 
     /// Computes the trends of rows, in the order given.
-    pub fn of(rows: &[ResultRow], over: TrendAxis) -> Self {
-        let failures = FailureCount::of(rows);
+    pub fn from_rows(rows: &[ResultRow], over: TrendAxis) -> Self {
+        let failures = FailureCount::from_rows(rows);
         let mut placed: Vec<(f64, &ResultRow)> = Vec::new();
         let mut without_number = 0;
         for (position, row) in (1..).zip(rows) {
@@ -398,19 +398,19 @@ impl fmt::Display for Trends {
         for (series, change) in self.changes() {
             writeln!(f, "{}", series.sentence(change))?;
         }
-        let all =
+        let outliers =
             || self.series.iter().flat_map(|one| one.outliers().map(move |point| (one, point)));
-        if all().next().is_some() {
+        if outliers().next().is_some() {
             writeln!(
                 f,
                 "\noutliers, more than {OUTLIER} standard deviations from the level of their records:"
             )?;
         }
-        for (series, point) in all().take(LISTED) {
+        for (series, point) in outliers().take(LISTED) {
             let value = format!("{} {}", significant(point.value, 6), series.unit);
             writeln!(f, "  {} of {}: {}", series.name, point.record, value.trim_end())?;
         }
-        match all().count().saturating_sub(LISTED) {
+        match outliers().count().saturating_sub(LISTED) {
             0 => Ok(()),
             more => writeln!(f, "  … ({more} more)"),
         }

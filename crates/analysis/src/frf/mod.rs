@@ -155,37 +155,37 @@ fn interleaved(
     how: &FrfSettings,
     rule: LineRule<'_>,
 ) -> Result<Option<Interleaved>, AnalysisError> {
-    let held = &recorded.held;
-    let segments = how.segments.segments(held.period)?;
-    let whole = held.force.len() >= held.period;
+    let buffered = &recorded.held;
+    let segments = how.segments.segments(buffered.period)?;
+    let whole = buffered.force.len() >= buffered.period;
     let Segments::Periods(period) = segments else { return Ok(None) };
-    if held.driven.len() < 2 || !whole {
+    if buffered.driven.len() < 2 || !whole {
         return Ok(None);
     }
-    let chosen = rule.lines(&held.force, period)?;
-    let spectrum = Spectrum::of(&held.force.period_mean(period)?);
+    let chosen = rule.lines(&buffered.force, period)?;
+    let spectrum = Spectrum::of(&buffered.force.period_mean(period)?);
     let driver = |line: &usize| -> Option<usize> {
         let amplitude = |dof: &usize| spectrum.line(*line, *dof).norm();
         let by_size = |a: &&usize, b: &&usize| amplitude(a).total_cmp(&amplitude(b));
-        let shaker = *held.driven.iter().max_by(by_size)?;
+        let shaker = *buffered.driven.iter().max_by(by_size)?;
         let idle = |dof: &usize| *dof == shaker || amplitude(dof) <= IDLE * amplitude(&shaker);
-        held.driven.iter().all(idle).then_some(shaker)
+        buffered.driven.iter().all(idle).then_some(shaker)
     };
     let Some(drivers) = chosen.iter().map(driver).collect::<Option<Vec<usize>>>() else {
         return Ok(None);
     };
-    if !held.driven.iter().all(|dof| drivers.contains(dof)) {
+    if !buffered.driven.iter().all(|dof| drivers.contains(dof)) {
         return Ok(None);
     }
-    let sampling = held.force.sampling().with_len(period)?;
-    let averages = held.driven.iter().map(|dof| {
+    let sampling = buffered.force.sampling().with_len(period)?;
+    let averages = buffered.driven.iter().map(|dof| {
         let of_force = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
         let lines = Lines::new(sampling, of_force.map(|(line, _)| *line))?;
         average(recorded, &lines, segments)
     });
     let averages: Vec<FrfAverage> = averages.collect::<Result<_, AnalysisError>>()?;
     let OwnLines { responses, crosstalk } = OwnLines::of(&averages, how.estimator.estimator())?;
-    let parts = responses.into_iter().zip(&averages).zip(&held.driven);
+    let parts = responses.into_iter().zip(&averages).zip(&buffered.driven);
     let parts = parts.map(|((frf, average), dof)| {
         let (lines, counts) = (average.lines().clone(), vec![average.pieces()]);
         let (idle, following) = (Vec::new(), Vec::new());
@@ -365,8 +365,8 @@ impl Responses {
         estimator: Estimator,
         rule: LineRule<'_>,
     ) -> Result<Self, AnalysisError> {
-        let held = &records[0].held;
-        let segments = segments.segments(held.period)?;
+        let first_record = &records[0].held;
+        let segments = segments.segments(first_record.period)?;
         let len = segments.samples();
         let (mut driven, mut chosen) = (Vec::new(), Vec::new());
         for Windowed { held, .. } in records {
@@ -380,7 +380,7 @@ impl Responses {
             list.sort_unstable();
             list.dedup();
         }
-        let lines = Lines::new(held.force.sampling().with_len(len)?, chosen)?;
+        let lines = Lines::new(first_record.force.sampling().with_len(len)?, chosen)?;
         let mut average = average_of(&records[0], &lines, segments, &driven)?;
         let mut counts = vec![average.pieces()];
         for recorded in &records[1..] {

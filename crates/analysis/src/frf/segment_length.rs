@@ -40,21 +40,21 @@ impl Segmentation {
         recorded: &Windowed,
         rule: LineRule<'_>,
     ) -> Result<Option<(Self, String)>, AnalysisError> {
-        let held = &recorded.held;
+        let buffered = &recorded.held;
         if self.segment.is_some() {
             return Ok(None);
         }
         let mut tried: Vec<(usize, f64, bool)> = Vec::new();
         let mut len = SHORTEST;
-        while 2 * len <= held.force.len() {
+        while 2 * len <= buffered.force.len() {
             let how = Self { segment: Some(len), ..self.clone() };
-            let segments = how.segments(held.period)?;
-            let lines = rule.lines(&held.force.window(0, len)?, len)?;
-            let lines = Lines::new(held.force.sampling().with_len(len)?, lines)?;
-            let average = average_of(recorded, &lines, segments, &held.driven)?;
+            let segments = how.segments(buffered.period)?;
+            let lines = rule.lines(&buffered.force.window(0, len)?, len)?;
+            let lines = Lines::new(buffered.force.sampling().with_len(len)?, lines)?;
+            let average = average_of(recorded, &lines, segments, &buffered.driven)?;
             // Longer segments may separate two forces that this segment cannot separate.
             if let Ok(frf) = average.frf(FrfEstimator::H1) {
-                if frf.averages() < AVERAGES + held.driven.len() as f64 {
+                if frf.averages() < AVERAGES + buffered.driven.len() as f64 {
                     break;
                 }
                 let peak = Peak::narrowest(&frf);

@@ -366,10 +366,9 @@ impl FrfTable {
         let coherence = self.coherence.iter().map(|c| CoherenceFunction {
             response: point(c.motion),
             // The multiple coherence with one force is the ordinary one.
-            reference: match self.responses.len() == dofs {
-                true => self.responses.first().map(|r| point(r.force)),
-                false => None,
-            },
+            reference: (self.responses.len() == dofs)
+                .then(|| self.responses.first().map(|r| point(r.force)))
+                .flatten(),
             values: c.values.clone(),
         });
         Ok(FrequencyResponses {
@@ -408,12 +407,12 @@ impl FrfTable {
             let _ = write!(text, ",coherence_{}", c.motion);
         }
         let order = self.quantity.parse().ok().map(derivative);
-        let alike = [(DERIVATIVE, order), (ADDED_DECAY, self.added_decay)];
-        let alike = alike.into_iter().filter_map(|(name, value)| Some((name, value?)));
-        let alike =
-            alike.chain(AveragedSegments::COLUMNS.into_iter().zip(self.averaged().numbers()));
+        let constants = [(DERIVATIVE, order), (ADDED_DECAY, self.added_decay)];
+        let constants = constants.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        let constants =
+            constants.chain(AveragedSegments::COLUMNS.into_iter().zip(self.averaged().numbers()));
         let mut ending = String::new();
-        for (name, value) in alike {
+        for (name, value) in constants {
             let _ = write!(text, ",{name}");
             let _ = write!(ending, ",{value:?}");
         }
@@ -421,10 +420,8 @@ impl FrfTable {
             let _ = write!(text, "\n{hz:?}");
             for r in &self.responses {
                 for value in [r.real[at], r.imaginary[at], r.standard_error[at]] {
-                    let _ = match value.is_nan() {
-                        true => write!(text, ","),
-                        false => write!(text, ",{value:?}"),
-                    };
+                    let _ =
+                        if value.is_nan() { write!(text, ",") } else { write!(text, ",{value:?}") };
                 }
             }
             for c in &self.coherence {

@@ -74,15 +74,15 @@ impl Acquisition {
         }
         let (names, kind) = (&held.names, held.response().1);
         for AcCoupling { channel, corner_hz } in &self.ac_coupling {
-            let place = |names: &[String]| names.iter().position(|name| name == channel);
-            let (response, force) = (place(names.response(kind)), place(&names.force));
+            let index = |names: &[String]| names.iter().position(|name| name == channel);
+            let (response, force) = (index(names.response(kind)), index(&names.force));
             if response.is_none() && force.is_none() {
-                let all: Vec<&str> =
+                let channels: Vec<&str> =
                     names.force.iter().chain(names.response(kind)).map(String::as_str).collect();
                 let why = format!(
                     "{} has no channel {channel} among those that are fitted: {}",
                     held.file,
-                    all.join(", ")
+                    channels.join(", ")
                 );
                 return Err(AnalysisError::Setting { setting: "ac_coupling", why });
             }

@@ -13,7 +13,7 @@ use crate::AnalysisError;
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] if they differ.
-pub(crate) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
+pub(crate) fn common_rate(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
     let Some(first) = tables.first() else { return Ok(None) };
     match tables.iter().find(|table| table.added_decay != first.added_decay) {
         None => Ok(first.added_decay),

@@ -64,9 +64,9 @@ pub(crate) fn rows(
     records: &[&Block],
     Scope { scaled, hits, unexplained }: Scope,
 ) -> Result<Vec<CheckRow>, AnalysisError> {
-    let mut all: Vec<(When, Option<usize>, Finding)> = Vec::new();
+    let mut rows: Vec<(When, Option<usize>, Finding)> = Vec::new();
     let mut add = |when, at: Option<usize>, findings: &[Finding]| {
-        all.extend(findings.iter().map(|finding| (when, at, finding.clone())));
+        rows.extend(findings.iter().map(|finding| (when, at, finding.clone())));
     };
     add(When::Before, None, &fitted.before_all);
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
@@ -95,22 +95,22 @@ pub(crate) fn rows(
     }
     for (at, residual) in fitted.residuals.iter().enumerate() {
         let checks = match residual {
-            Residual::Samples(residual) => of_samples(residual)?,
+            Residual::Samples(residual) => sample_findings(residual)?,
             Residual::Lines(residual) => residual.findings(),
         };
         add(When::After, Some(at), &checks);
     }
     // A nonlinearity disturbs the lines at the resonances most; no outside disturbance acts there.
-    if all.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion(_))) {
-        all.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
+    if rows.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion(_))) {
+        rows.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
     }
-    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    adjust_p_values(rows.iter_mut().map(|(_, _, finding)| finding));
     let name = |at: usize| (records.len() > 1).then(|| records[at].file.clone());
     let row = |(when, at, finding): &(When, Option<usize>, Finding)| {
         let names = &records[at.unwrap_or(0)].names;
         CheckRow::new(*when, at.and_then(name), finding, names)
     };
-    Ok(all.iter().map(row).collect())
+    Ok(rows.iter().map(row).collect())
 }
 
 /// Returns the finding that a fit attributes the residual to unmeasured forces, which no other
@@ -150,7 +150,7 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
 }
 
 /// Returns the tests of a residual; none if it has too few samples.
-fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> {
+fn sample_findings(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> {
     let SampleResidual { samples, fitted, force, noise_span } = residual;
     match residual.lags() {
         0 => Ok(Vec::new()),

@@ -56,7 +56,7 @@ impl Identified {
             return Ok(Some(fitted.clone()));
         }
         let rule = LineRule { choice: &LineChoice::Driven, without: &LeftOut::default() };
-        let all = if self.is_hammer_test() {
+        let coherence = if self.is_hammer_test() {
             let averaged = average_of_hits(&self.records, rule, None)?;
             let hits = self.records.len();
             if hits <= averaged.driven.len() {
@@ -78,7 +78,7 @@ impl Identified {
             let hz = || data.omega().iter().map(|omega| omega / TAU);
             [hz().fold(f64::INFINITY, f64::min), hz().fold(0.0, f64::max)]
         });
-        let inside = all.between(band);
+        let inside = coherence.between(band);
         Ok(Some(inside).filter(|inside| !inside.frequency_hz.is_empty()))
     }
 

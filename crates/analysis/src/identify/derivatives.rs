@@ -38,7 +38,10 @@ impl Prepared {
     /// # Errors
     /// [`AnalysisError::TimeDomainMotions`] if a kind of response is missing,
     /// [`AnalysisError::NothingToDerive`] if none is missing.
-    pub fn of(measured: &Block, derivatives: Option<Derivatives>) -> Result<Self, AnalysisError> {
+    pub fn from_block(
+        measured: &Block,
+        derivatives: Option<Derivatives>,
+    ) -> Result<Self, AnalysisError> {
         let force = &measured.force;
         let filter = derivatives.map(Derivatives::filter).transpose()?.flatten();
         let responses = (&measured.displacement, &measured.velocity, &measured.acceleration);

@@ -105,6 +105,6 @@ fn intervals(estimate: &Estimate) -> String {
         let (value, error) = (significant(p.value, 3), significant(p.standard_error, 2));
         format!("{} = {value} ± {error} {}", p.parameter, p.parameter.matrix().unit())
     };
-    let all: Vec<String> = estimate.parameters().map(of).collect();
-    format!("the intervals of all parameters ({})", message::list(&all, ", ", NAMED))
+    let intervals: Vec<String> = estimate.parameters().map(of).collect();
+    format!("the intervals of all parameters ({})", message::list(&intervals, ", ", NAMED))
 }

@@ -84,9 +84,11 @@ impl ForceNoise {
                 "give one level, or one for each of {dofs} forces, not {got}"
             )));
         }
-        let level = |dof: usize| match held.driven.contains(&dof) {
-            true => stated[if stated.len() == 1 { 0 } else { dof }],
-            false => 0.0,
+        let level = |dof: usize| {
+            if !held.driven.contains(&dof) {
+                return 0.0;
+            }
+            stated[if stated.len() == 1 { 0 } else { dof }]
         };
         Ok((0..dofs).map(|dof| Some(level(dof))).collect())
     }
@@ -112,9 +114,11 @@ impl ForceNoise {
         let driven = |(held, noise): &(&Block, &Self)| -> Vec<(Option<f64>, f64)> {
             held.driven.iter().map(|dof| (noise.levels_n[*dof], rms(held, *dof))).collect()
         };
-        let all: Vec<(Option<f64>, f64)> = records.iter().flat_map(driven).collect();
+        let levels_and_rms: Vec<(Option<f64>, f64)> = records.iter().flat_map(driven).collect();
         let source = records.first().map(|(_, noise)| noise.source);
-        let Some(levels) = all.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>() else {
+        let Some(levels) =
+            levels_and_rms.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>()
+        else {
             return "the noise of the force is not known, for above the band that it drives its spectrum has no \
                     even floor (it drives all lines or falls off slowly, or the record is too short): the noise is \
                     taken for none, and biases the estimate if there is any; state it (`force_noise`)"
@@ -133,11 +137,12 @@ impl ForceNoise {
                 _ => "the force shows no noise of its own, and was taken as exact".into(),
             };
         }
-        let range = match significant(low, 3) == significant(high, 3) {
-            true => significant(high, 3),
-            false => format!("{} to {}", significant(low, 3), significant(high, 3)),
+        let range = if significant(low, 3) == significant(high, 3) {
+            significant(high, 3)
+        } else {
+            format!("{} to {}", significant(low, 3), significant(high, 3))
         };
-        let parts = all.iter().filter_map(|(level, rms)| Some(100.0 * (*level)? / rms));
+        let parts = levels_and_rms.iter().filter_map(|(level, rms)| Some(100.0 * (*level)? / rms));
         let part = significant(parts.fold(0.0, f64::max), 2);
         let most = if levels.len() > 1 { "at most " } else { "" };
         format!("noise of the force: {range} N, {of} ({most}{part} % of the RMS force)")

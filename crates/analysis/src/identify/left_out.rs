@@ -61,10 +61,8 @@ impl Disturbance {
     /// Returns whether the disturbance affects a line at this frequency (Hz) of a spectrum with
     /// lines `spacing_hz` apart.
     pub fn reaches(&self, line_hz: f64, spacing_hz: f64) -> bool {
-        let multiple = match self.multiples {
-            true => (line_hz / self.frequency_hz).round().max(1.0),
-            false => 1.0,
-        };
+        let multiple =
+            if self.multiples { (line_hz / self.frequency_hz).round().max(1.0) } else { 1.0 };
         let apart = (line_hz - multiple * self.frequency_hz).abs();
         match self.half_width_hz {
             // A frequency between two lines affects both.
@@ -137,7 +135,7 @@ impl LeftOut {
 pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
     let driven = rule.lines(&held.force, held.period)?;
-    let all = match rule.choice {
+    let lines = match rule.choice {
         LineChoice::Lines(_) => driven,
         LineChoice::Band(band) => lines::band(sampling, band.low_hz, band.high_hz),
         LineChoice::Driven => {
@@ -145,7 +143,7 @@ pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, 
             (1..=last).collect()
         }
     };
-    rule.without.keep(all, sampling)
+    rule.without.keep(lines, sampling)
 }
 
 #[cfg(test)]

@@ -77,7 +77,7 @@ pub struct ExtrapolationRow {
 }
 
 impl ExtrapolationRow {
-    fn of(found: Extrapolation) -> Self {
+    fn new(found: Extrapolation) -> Self {
         let poor = found.is_poor();
         let Extrapolation { term, order, relative_error, share } = found;
         Self { term, order, share, relative_error, poor }
@@ -164,7 +164,7 @@ fn fitted(
     let estimated = estimated(&data, unknowns, how, &stepped, &mut selection)?;
     let experiments: Vec<[&Record; 2]> =
         records.iter().map(|r| [&r.held.force, r.held.response().0]).collect();
-    let seen = distortion(&band, &experiments, kind, unknowns)?;
+    let distortion_levels = distortion(&band, &experiments, kind, unknowns)?;
     let model = Model::Nonlinear { system: estimated.system()?, channels: estimated.channels() };
     let (before, spectra) = driven_spectra(records, &band, rule)?;
     let before_all = match &spectra {
@@ -193,9 +193,9 @@ fn fitted(
         remarks: remarks(first, &estimated),
         nonlinear: Some(WithTerms {
             estimate: estimated,
-            distortion: Some(seen),
+            distortion: Some(distortion_levels),
             restoring: Some(restoring),
-            selection: selection.map(|selection| SelectionSummary::of(selection, how)),
+            selection: selection.map(|selection| SelectionSummary::new(selection, how)),
         }),
         ..Fitted::new(Domain::Frequency, name, Prediction::Steady, linear)
     })
@@ -238,11 +238,11 @@ fn driven_spectra(
 ) -> Result<(Vec<Vec<Finding>>, Option<FrequencyData>), AnalysisError> {
     let (mut findings, mut spectra) = (Vec::new(), None::<FrequencyData>);
     for recorded in records {
-        let held = &recorded.held;
-        let chosen =
-            LineRule { choice: &LineChoice::Driven, ..rule }.lines(&held.force, held.period)?;
+        let buffered = &recorded.held;
+        let chosen = LineRule { choice: &LineChoice::Driven, ..rule }
+            .lines(&buffered.force, buffered.period)?;
         let driven = Lines::new(band.sampling(), chosen)?;
-        findings.push(steady_periods(&held.force, held.response().0, held.period)?);
+        findings.push(steady_periods(&buffered.force, buffered.response().0, buffered.period)?);
         let spectrum = periods(recorded, &driven)?.mean()?;
         spectra = Some(match spectra {
             None => spectrum,
@@ -317,8 +317,10 @@ fn estimated(
                 let has_constants = |term: &Term| !term.law().constants().is_empty();
                 let is_open = !how.search.laws && terms.iter().any(has_constants);
                 let options = EquationErrorOptions { shape, ..options };
-                let other = is_open.then(|| equation_error(data, unknowns, terms, &options).ok());
-                let starts: Vec<_> = [start].into_iter().chain(other.flatten()).collect();
+                let from_equation_error =
+                    is_open.then(|| equation_error(data, unknowns, terms, &options).ok());
+                let starts: Vec<_> =
+                    [start].into_iter().chain(from_equation_error.flatten()).collect();
                 best_output_error(stepped, data.measured(), &starts)?.estimate
             }
         };
@@ -350,7 +352,7 @@ impl NonlinearSummary {
         let ranges = fit.ranges().iter().map(|range| Some(*range));
         let rows = fit.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
         let row = |(parameter, largest): (&mechid_nonlinear::NamedParameter, _)| {
-            let estimate = Uncertain::of(&parameter.estimate)?;
+            let estimate = Uncertain::from_estimate(&parameter.estimate)?;
             let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
             Ok(TermRow { name, unit, largest, estimate })
         };
@@ -374,7 +376,7 @@ impl NonlinearSummary {
                 linear_leaves: distortion.linear_leaves,
                 text: distortion.to_string(),
             }),
-            extrapolation: fit.extrapolations()?.into_iter().map(ExtrapolationRow::of).collect(),
+            extrapolation: fit.extrapolations()?.into_iter().map(ExtrapolationRow::new).collect(),
             selection: selection.clone(),
         })
     }

@@ -56,7 +56,7 @@ pub(super) fn better_model_of(
             model.into_iter().for_each(|model| add(Cause::Quantity { quantity, stated }, model));
         }
         for sign in [1.0, -1.0] {
-            let model = of_levels(tables, how, stated, estimate, sign);
+            let model = level_responses(tables, how, stated, estimate, sign);
             model.into_iter().for_each(|model| add(Cause::Decibels, model));
         }
     }
@@ -128,12 +128,12 @@ fn refitted(
 ) -> Option<ModelledResponses> {
     let how = IdentifyResponses { quantity: Some(quantity), ..how.clone() };
     let one = |table: &FrequencyResponses| {
-        let mut other = table.clone();
-        for function in &mut other.functions {
+        let mut modified = table.clone();
+        for function in &mut modified.functions {
             function.quantity = Some(quantity);
             function.values.iter_mut().for_each(|z| *z = number(*z));
         }
-        Tabulated::of(&other, &how).ok()
+        Tabulated::new(&modified, &how).ok()
     };
     let measured = tables.iter().map(one).collect::<Option<Vec<_>>>()?;
     let data = joined(&measured).ok()?;
@@ -142,7 +142,7 @@ fn refitted(
 }
 
 /// Returns the responses of a fit to tables whose magnitudes are levels in dB with the given sign.
-fn of_levels(
+fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
     quantity: ResponseQuantity,

@@ -127,14 +127,13 @@ impl ModeRow {
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
         let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
         let rounding = EIGENVALUE_ROUNDING * largest;
-        modes.iter().map(|mode| Self::of(mode, known, rounding)).collect()
+        modes.iter().map(|mode| Self::new(mode, known, rounding)).collect()
     }
 
     /// Creates the row of a mode; growth rates up to `rounding` (1/s) count as rounding errors.
-    fn of(mode: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
-        let uncertain = |value: &mechid_numerics::Uncertain| match known {
-            true => Ok(Uncertain::known(value.value)),
-            false => Uncertain::of(value),
+    fn new(mode: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
+        let uncertain = |value: &mechid_numerics::Uncertain| {
+            if known { Ok(Uncertain::known(value.value)) } else { Uncertain::from_estimate(value) }
         };
         let grows = !mode.is_rigid_body && mode.growth_rate.value > rounding;
         // Two real eigenvalues of opposite sign have no common natural frequency.
@@ -144,12 +143,11 @@ impl ModeRow {
         Ok(Self {
             oscillates: mode.mode.oscillates(),
             is_rigid_body: mode.is_rigid_body,
-            natural_frequency_hz: match known {
-                true => Uncertain::known(frequency.value),
-                false => {
-                    let interval = mode.natural_frequency_interval_hz(CONFIDENCE)?;
-                    Uncertain::new(frequency.value, frequency.standard_error, interval)
-                }
+            natural_frequency_hz: if known {
+                Uncertain::known(frequency.value)
+            } else {
+                let interval = mode.natural_frequency_interval_hz(CONFIDENCE)?;
+                Uncertain::new(frequency.value, frequency.standard_error, interval)
             },
             damped_frequency_hz: uncertain(&mode.damped_frequency_hz)?,
             damping_ratio: uncertain(&mode.damping_ratio)?,
@@ -169,17 +167,17 @@ impl ModeRow {
     /// `damped`, damping ratio, and the poles of those that do not oscillate; an overdamped pair is
     /// reported once.
     pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
-        let mut all = Vec::new();
+        let mut quantities = Vec::new();
         for (at, mode) in modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at)) {
             let this_mode = (at + 1, mode.pole);
-            let other = mode.partner.map(|number| (number, modes[number - 1].pole));
-            let numbers = [Some(this_mode), other].into_iter().flatten();
+            let partner = mode.partner.map(|number| (number, modes[number - 1].pole));
+            let numbers = [Some(this_mode), partner].into_iter().flatten();
             for (number, pole) in numbers.clone() {
-                all.extend(pole.map(|pole| (format!("{number} real pole"), pole, "1/s")));
+                quantities.extend(pole.map(|pole| (format!("{number} real pole"), pole, "1/s")));
             }
             let name: Vec<String> = numbers.map(|(number, _)| number.to_string()).collect();
             let mut add = |what: &str, value: Uncertain, unit| {
-                all.push((format!("{} {what}", name.join(", ")), value, unit));
+                quantities.push((format!("{} {what}", name.join(", ")), value, unit));
             };
             if mode.is_rigid_body {
                 add("rigid-body mode, frequency", mode.natural_frequency_hz, "Hz");
@@ -192,7 +190,7 @@ impl ModeRow {
                 add("damping ratio", mode.damping_ratio, "–");
             }
         }
-        all
+        quantities
     }
 }
 
@@ -214,7 +212,9 @@ impl Uncertain {
     }
 
     /// Creates a value derived from the estimate.
-    pub(crate) fn of(uncertain: &mechid_numerics::Uncertain) -> Result<Self, AnalysisError> {
+    pub(crate) fn from_estimate(
+        uncertain: &mechid_numerics::Uncertain,
+    ) -> Result<Self, AnalysisError> {
         Ok(Self::new(uncertain.value, uncertain.standard_error, uncertain.interval(CONFIDENCE)?))
     }
 
@@ -264,11 +264,11 @@ pub(super) fn parameters(
     let mut estimated = estimate.parameters().peekable();
     for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
-        let found = estimated.next_if(|p| p.parameter == parameter);
+        let estimated_entry = estimated.next_if(|p| p.parameter == parameter);
         if !is_given(&parameter) {
             continue;
         }
-        let value = match found {
+        let value = match estimated_entry {
             Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
             None => {
                 Uncertain::known(estimate.unknowns().fixed(matrix, row, column).unwrap_or_default())
@@ -291,9 +291,9 @@ pub(super) fn parameters(
 /// omitted.
 pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> ParameterCovariance {
     let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
-    let all = estimate.parameters().map(|p| p.parameter).enumerate();
+    let parameters = estimate.parameters().map(|p| p.parameter).enumerate();
     let (given, names): (Vec<usize>, Vec<String>) =
-        all.filter(|(_, p)| is_given(p)).map(|(at, p)| (at, p.to_string())).unzip();
+        parameters.filter(|(_, p)| is_given(p)).map(|(at, p)| (at, p.to_string())).unzip();
     let mut covariance = estimate.covariance();
     if given.len() < covariance.nrows() {
         covariance = covariance.select_rows(&given).select_columns(&given);
@@ -348,7 +348,10 @@ impl ProportionalDamping {
     /// Returns the factors of an estimate with proportional damping; `None` for another damping.
     pub(super) fn of(estimate: &Estimate) -> Result<Option<Self>, AnalysisError> {
         let Some([alpha, beta]) = estimate.proportional_damping() else { return Ok(None) };
-        Ok(Some(Self { alpha: Uncertain::of(&alpha)?, beta: Uncertain::of(&beta)? }))
+        Ok(Some(Self {
+            alpha: Uncertain::from_estimate(&alpha)?,
+            beta: Uncertain::from_estimate(&beta)?,
+        }))
     }
 
     /// Returns name, value, standard error, interval and unit of both factors.

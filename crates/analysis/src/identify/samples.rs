@@ -38,7 +38,7 @@ impl SampleFit {
         unknowns: &Unknowns,
     ) -> Result<Fitted, AnalysisError> {
         let between = self.between_samples;
-        let prepare = |r: &Windowed| Prepared::of(&r.held, self.derivatives);
+        let prepare = |r: &Windowed| Prepared::from_block(&r.held, self.derivatives);
         let prepared: Vec<Prepared> = records.iter().map(prepare).collect::<Result<_, _>>()?;
         if between.is_some() && prepared.iter().any(|p| p.twice_differentiated) {
             return Err(AnalysisError::TwiceDifferentiated);
@@ -59,19 +59,19 @@ impl SampleFit {
         recorded: &Windowed,
         take: &mut dyn FnMut(Prepared, bool) -> Result<(), AnalysisError>,
     ) -> Result<(), AnalysisError> {
-        let held = &recorded.held;
+        let window = &recorded.held;
         let advance = match self.hold() {
-            Hold::Whole => held.force.len(),
+            Hold::Whole => window.force.len(),
             _ => (CHUNK_SAMPLES / self.refine.map_or(1, |refine| refine.factor.max(1))).max(1),
         };
         // A sliding polynomial needs neighbours on both sides of each sample.
         let margin = self.noise_span() / 2;
         recorded.chunks(advance + 1 + 2 * margin, advance, &mut |chunk| {
             let len = chunk.force.len();
-            let first = chunk.first_sample == held.first_sample;
-            let last = chunk.first_sample + len - 1 == held.last_sample();
+            let first = chunk.first_sample == window.first_sample;
+            let last = chunk.first_sample + len - 1 == window.last_sample();
             let inside = if first { 0 } else { margin }..if last { len } else { len - margin };
-            take(Prepared::of(chunk, self.derivatives)?.window(inside)?, last)
+            take(Prepared::from_block(chunk, self.derivatives)?.window(inside)?, last)
         })
     }
 

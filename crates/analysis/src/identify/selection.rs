@@ -36,7 +36,7 @@ pub struct SelectionRow {
 
 impl SelectionSummary {
     /// Creates the summary of a selection with the settings `how`.
-    pub(super) fn of(selection: Selection, how: &Nonlinear) -> Self {
+    pub(super) fn new(selection: Selection, how: &Nonlinear) -> Self {
         let row = |step: SelectionStep| SelectionRow {
             added: step.added,
             score: step.score,

@@ -53,8 +53,8 @@ pub fn identify_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
 ) -> Result<IdentifiedResponses, AnalysisError> {
-    let added_decay = added_decay::of_tables(tables)?;
-    let measured = tables.iter().map(|table| Tabulated::of(table, how));
+    let added_decay = added_decay::common_rate(tables)?;
+    let measured = tables.iter().map(|table| Tabulated::new(table, how));
     let mut measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
     let mut data = joined(&measured)?;
     let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
@@ -63,7 +63,7 @@ pub fn identify_responses(
             Some(rate) => &added_decay::unknowns(unknowns, rate)?,
             None => unknowns,
         };
-        let fit = Fit::of(&data, windowed, &measured, how.method)?;
+        let fit = Fit::new(&data, windowed, &measured, how.method)?;
         let of_machine = match added_decay {
             Some(rate) => fit.estimate.without_added_decay(rate, unknowns.clone())?,
             None => fit.estimate.clone(),
@@ -97,7 +97,7 @@ pub fn identify_responses(
         quantity: data.measured().to_string(),
         points: first.points.clone(),
         forces: first.driven.iter().map(|dof| first.points[*dof].clone()).collect(),
-        frequencies: FrequencyRow::of(first),
+        frequencies: FrequencyRow::from_table(first),
         confidence: CONFIDENCE,
         parameters: parameters(estimate, unscaled.as_ref())?,
         proportional_damping: ProportionalDamping::of(estimate)?,
@@ -279,7 +279,7 @@ pub struct FrequencyRow {
 }
 
 impl FrequencyRow {
-    fn of(table: &Tabulated) -> Self {
+    fn from_table(table: &Tabulated) -> Self {
         let hz = table.data.omega().iter().map(|omega| omega / TAU);
         Self {
             count: table.data.len() / table.driven.len(),
@@ -416,8 +416,10 @@ impl Fit {
     ) -> FitRow {
         // Least squares minimises the residual of the force, maximum likelihood the residual of the
         // response.
-        let each = of_machine.residual_nrmse();
-        let of_force = || (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt();
+        let residual_nrmse = of_machine.residual_nrmse();
+        let of_force = || {
+            (residual_nrmse.iter().map(|e| e * e).sum::<f64>() / residual_nrmse.len() as f64).sqrt()
+        };
         let of_response = unexplained.filter(|_| method != Some(Method::LeastSquares));
         FitRow {
             nrmse: of_response.unwrap_or_else(of_force),
@@ -433,7 +435,7 @@ impl Fit {
         }
     }
 
-    fn of(
+    fn new(
         data: &FrequencyData,
         unknowns: &Unknowns,
         measured: &[Tabulated],

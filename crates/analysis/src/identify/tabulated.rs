@@ -51,10 +51,11 @@ struct Layout<'a> {
 
 impl<'a> Layout<'a> {
     /// Finds the responses at the `chosen` points, or at all of them if none is chosen.
-    fn of(table: &'a FrequencyResponses, chosen: &[String]) -> Result<Self, AnalysisError> {
-        let points = match chosen.is_empty() {
-            true => distinct(table.functions.iter().map(|f| &f.response)),
-            false => chosen.to_vec(),
+    fn new(table: &'a FrequencyResponses, chosen: &[String]) -> Result<Self, AnalysisError> {
+        let points = if chosen.is_empty() {
+            distinct(table.functions.iter().map(|f| &f.response))
+        } else {
+            chosen.to_vec()
         };
         let mut forces = distinct(table.functions.iter().map(|f| &f.reference));
         if !chosen.is_empty() {
@@ -66,11 +67,11 @@ impl<'a> Layout<'a> {
             force: force.into(),
             advice: reciprocity(table, force),
         };
-        let place = |force: &String| {
+        let index = |force: &String| {
             let at = points.iter().position(|point| point == force);
             at.ok_or_else(|| missing(force, force))
         };
-        let driven: Vec<usize> = forces.iter().map(place).collect::<Result<_, _>>()?;
+        let driven: Vec<usize> = forces.iter().map(index).collect::<Result<_, _>>()?;
         if driven.is_empty() {
             return Err(missing(&points.join(", "), &points.join(", ")));
         }
@@ -118,21 +119,21 @@ fn with_reciprocal<'a>(
     if !is_symmetric || !how.points.is_empty() || forces.iter().all(|force| is_whole(&force)) {
         return (table, None);
     }
-    let mut all = functions.clone();
+    let mut completed = functions.clone();
     for function in functions {
-        if !is_there(&all, &function.reference, &function.response) {
+        if !is_there(&completed, &function.reference, &function.response) {
             let mut reciprocal = function.clone();
             std::mem::swap(&mut reciprocal.response, &mut reciprocal.reference);
-            all.push(reciprocal);
+            completed.push(reciprocal);
         }
     }
-    let points = distinct(all.iter().map(|f| &f.response));
-    let is_whole = |force: &String| points.iter().all(|point| is_there(&all, point, force));
+    let points = distinct(completed.iter().map(|f| &f.response));
+    let is_whole = |force: &String| points.iter().all(|point| is_there(&completed, point, force));
     let whole: Vec<String> = forces.into_iter().filter(is_whole).collect();
     if whole.is_empty() {
         return (table, None);
     }
-    all.retain(|f| whole.contains(&f.reference));
+    completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
         "{}: by reciprocity the responses at {} to forces at other points are those at these points to a force there",
         table.file,
@@ -147,7 +148,7 @@ fn with_reciprocal<'a>(
             std::mem::swap(response, reference);
         }
     }
-    reciprocal.functions = all;
+    reciprocal.functions = completed;
     (Cow::Owned(reciprocal), Some(remark))
 }
 
@@ -170,7 +171,7 @@ pub(super) struct Tabulated {
 }
 
 impl Tabulated {
-    pub(super) fn of(
+    pub(super) fn new(
         table: &FrequencyResponses,
         how: &IdentifyResponses,
     ) -> Result<Self, AnalysisError> {
@@ -182,7 +183,7 @@ impl Tabulated {
             Some(rate) => Cow::Owned(added_decay::as_derivatives(table, measured, rate)),
             None => Cow::Borrowed(table),
         };
-        let Layout { points, forces, driven, functions } = Layout::of(table, &how.points)?;
+        let Layout { points, forces, driven, functions } = Layout::new(table, &how.points)?;
         let rows = rows(table, how.band)?;
         let omega: Vec<f64> = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
         let response: Vec<DMatrix<Complex<f64>>> = rows
@@ -193,7 +194,7 @@ impl Tabulated {
             .collect();
         let errors = standard_errors(&functions, &rows);
         let stated = errors.is_some();
-        let averaged = Averaged::of(table, &rows)?;
+        let averaged = Averaged::from_table(table, &rows)?;
         let unused = |why: &str| {
             format!("{}: {why}: what a window blunts stays in the responses", table.file)
         };
@@ -336,8 +337,8 @@ pub(crate) fn with_positive_directions<'a>(
             node.is_ok() && ["X", "Y", "Z", "RX", "RY", "RZ"].contains(&direction)
         })
     };
-    let mut all = table.functions.iter().flat_map(|f| [&f.response, &f.reference]);
-    if !all.any(is_negative) || points.iter().any(is_negative) {
+    let mut directions = table.functions.iter().flat_map(|f| [&f.response, &f.reference]);
+    if !directions.any(is_negative) || points.iter().any(is_negative) {
         return Cow::Borrowed(table);
     }
     let mut positive = table.clone();
@@ -372,7 +373,7 @@ pub(crate) fn response_data(
         let why = format!("{} is of an exponential window, which is for `identify`", table.file);
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
     }
-    let tabulated = Tabulated::of(table, how)?;
+    let tabulated = Tabulated::new(table, how)?;
     Ok((tabulated.data, tabulated.noise.source()))
 }
 
@@ -452,7 +453,10 @@ const OF_LINE: f64 = 1e-3;
 impl Averaged {
     /// Returns the stated segments of a table; `None` if it states none, or if its frequencies are
     /// not their lines.
-    fn of(table: &FrequencyResponses, rows: &[usize]) -> Result<Option<Self>, AnalysisError> {
+    fn from_table(
+        table: &FrequencyResponses,
+        rows: &[usize],
+    ) -> Result<Option<Self>, AnalysisError> {
         let Some(stated) = table.segments else { return Ok(None) };
         let per_line_hz = stated.sample_rate_hz / stated.samples as f64;
         let lines = rows.iter().map(|row| table.frequency_hz[*row] / per_line_hz);
@@ -521,10 +525,10 @@ impl Columns<'_> {
             table.coherence.iter().find(fits).map(|c| &c.values)
         };
         let columns = |force: Option<&String>| -> Option<DMatrix<f64>> {
-            let each: Option<Vec<&Vec<f64>>> =
+            let coherences: Option<Vec<&Vec<f64>>> =
                 points.iter().map(|point| of(point, force)).collect();
-            each.map(|each| {
-                DMatrix::from_fn(rows.len(), points.len(), |row, at| each[at][rows[row]])
+            coherences.map(|coherences| {
+                DMatrix::from_fn(rows.len(), points.len(), |row, at| coherences[at][rows[row]])
             })
         };
         let together = columns(None);
@@ -545,14 +549,14 @@ impl Columns<'_> {
         let dof = |force: &String| points.iter().position(|point| point == force);
         let driven: Vec<usize> = forces.iter().filter_map(dof).collect();
         if let Some(apart) = apart {
-            let each = apart.into_iter().enumerate().map(|(force, coherence)| {
+            let separate = apart.into_iter().enumerate().map(|(force, coherence)| {
                 let column = response.iter().map(|h| h.columns(force, 1).into_owned()).collect();
                 let errors: Option<Vec<_>> = errors.map(|errors| {
                     errors.iter().map(|e| e.columns(force, 1).into_owned()).collect()
                 });
                 Ok((frf(column, coherence, errors.as_deref())?, vec![driven[force]]))
             });
-            return Ok(Some(each.collect::<Result<_, AnalysisError>>()?));
+            return Ok(Some(separate.collect::<Result<_, AnalysisError>>()?));
         }
         match together {
             Some(coherence) => Ok(Some(vec![(frf(response.to_vec(), coherence, errors)?, driven)])),
@@ -563,11 +567,11 @@ impl Columns<'_> {
 
 /// Returns the distinct texts, in the order of their first appearance.
 fn distinct<'a>(texts: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut all: Vec<String> = Vec::new();
+    let mut distinct: Vec<String> = Vec::new();
     for text in texts {
-        if !all.contains(text) {
-            all.push(text.clone());
+        if !distinct.contains(text) {
+            distinct.push(text.clone());
         }
     }
-    all
+    distinct
 }

@@ -48,9 +48,9 @@ impl Unscaled {
                         free.push(dof - 1);
                         free.sort_unstable();
                     }
-                    let found;
-                    (found, normalised) = Self::normalised(unknowns, &free)?;
-                    unscaled = Some(found);
+                    let without_scale;
+                    (without_scale, normalised) = Self::normalised(unknowns, &free)?;
+                    unscaled = Some(without_scale);
                 }
                 fitted => return Ok((fitted?, unscaled)),
             }

@@ -141,26 +141,26 @@ fn in_stretches(
     system: &SecondOrderSystem,
     discretisation: Discretisation,
 ) -> Result<Vec<(ResponseQuantity, Vec<f64>)>, AnalysisError> {
-    let held = &recorded.held;
+    let buffered = &recorded.held;
     let model = Model::Linear(system.clone());
-    let failure = |reason| failed(reason, &model, held);
+    let failure = |reason| failed(reason, &model, buffered);
     let mut start = StartFit::new(system, discretisation)?;
     recorded.chunks(CHUNK_SAMPLES + 1, CHUNK_SAMPLES, &mut |chunk| {
         start.push(&chunk.force, &chunk.responses()).map_err(failure)
     })?;
     let mut state = start.start().map_err(failure)?;
-    let motions = held.responses();
+    let motions = buffered.responses();
     let mut levels: Vec<_> =
         motions.iter().map(|(kind, _)| (*kind, vec![Level::default(); system.dof()])).collect();
     recorded.chunks(CHUNK_SAMPLES + 1, CHUNK_SAMPLES, &mut |chunk| {
         let response = predict(system, &chunk.force, discretisation, Extent::Open, &state);
         let response = response.map_err(failure)?;
         // The next chunk begins with the last sample of this one.
-        let seen = usize::from(chunk.first_sample > held.first_sample);
+        let overlap = usize::from(chunk.first_sample > buffered.first_sample);
         for ((kind, levels), (_, measured)) in levels.iter_mut().zip(chunk.responses()) {
             for (c, level) in levels.iter_mut().enumerate() {
                 let predicted = channels(&response, *kind).channel(c);
-                level.add(&measured.channel(c)[seen..], &predicted[seen..])?;
+                level.add(&measured.channel(c)[overlap..], &predicted[overlap..])?;
             }
         }
         let row = |kind| channels(&response, kind).data().row(chunk.force.len() - 1).transpose();

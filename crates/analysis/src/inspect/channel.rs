@@ -102,8 +102,8 @@ pub struct Measured {
 impl Gathered {
     /// Creates statistics before the first sample of a window of `window` samples; `drawn` states
     /// whether the channel is plotted.
-    pub(crate) fn of(window: usize, drawn: bool) -> Self {
-        Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
+    pub(crate) fn new(window: usize, drawn: bool) -> Self {
+        Self { extremes: drawn.then(|| Extremes::new(window)), ..Self::default() }
     }
 
     /// Adds the next samples; of all samples the first `hold` are stored.
@@ -120,7 +120,7 @@ impl Gathered {
 
 impl Measured {
     /// Measures a channel. Its time step, in s, may be unknown; its period may be `given`.
-    pub(crate) fn of(
+    pub(crate) fn new(
         column: usize,
         name: String,
         about: String,
@@ -132,7 +132,7 @@ impl Measured {
         let (spectral, repeats, cut) = (!held.is_empty(), repetition(&held), clipping(&held));
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
         let mean = held.iter().sum::<f64>() / held.len() as f64;
-        let lines = AmplitudeSpectrum::of(held, mean, period)?;
+        let lines = AmplitudeSpectrum::new(held, mean, period)?;
         let channel = Channel {
             column,
             name,
@@ -171,7 +171,7 @@ pub struct AmplitudeSpectrum {
 }
 
 impl AmplitudeSpectrum {
-    fn of(mut values: Vec<f64>, mean: f64, period: Option<usize>) -> Result<Self, SignalError> {
+    fn new(mut values: Vec<f64>, mean: f64, period: Option<usize>) -> Result<Self, SignalError> {
         if let Some(period) = period {
             values.truncate(values.len() / period * period);
         }

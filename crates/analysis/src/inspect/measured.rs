@@ -50,7 +50,7 @@ pub struct Span {
 
 impl Span {
     /// Creates the window of a file from its start and length.
-    pub fn of((start, len): (usize, usize), file: &RecordFile) -> Self {
+    pub fn new((start, len): (usize, usize), file: &RecordFile) -> Self {
         Self { start, len, hold: if file.is_whole() { len } else { len.min(IN_MEMORY_SAMPLES) } }
     }
 
@@ -74,7 +74,7 @@ impl Span {
 
 /// Statistics of the requested columns, computed while a text is read to its end.
 #[derive(Debug)]
-pub struct OnTheWay {
+pub struct ReadingStatistics {
     /// First sample of the window, counted from 0.
     start: usize,
     /// Maximum number of samples to store of each column.
@@ -82,7 +82,7 @@ pub struct OnTheWay {
     gathered: Vec<Result<Gathered, SignalError>>,
 }
 
-impl OnTheWay {
+impl ReadingStatistics {
     /// Creates empty statistics, with the number of samples to store of each column.
     pub fn new(start: usize, hold: Vec<usize>) -> Self {
         let gathered = hold.iter().map(|_| Ok(Gathered::default())).collect();
@@ -100,9 +100,9 @@ impl OnTheWay {
     }
 
     /// Returns the statistics of the shown columns, by their indices among the requested ones.
-    fn of(self, places: impl Iterator<Item = usize>) -> Result<Vec<Gathered>, SignalError> {
-        let mut all: Vec<_> = self.gathered.into_iter().map(Some).collect();
-        places.filter_map(|place| all[place].take()).collect()
+    fn statistics(self, places: impl Iterator<Item = usize>) -> Result<Vec<Gathered>, SignalError> {
+        let mut columns: Vec<_> = self.gathered.into_iter().map(Some).collect();
+        places.filter_map(|place| columns[place].take()).collect()
     }
 }
 
@@ -111,27 +111,29 @@ impl OnTheWay {
 pub fn measured(
     file: &RecordFile,
     shown: &[Shown],
-    on_the_way: Option<OnTheWay>,
+    while_reading: Option<ReadingStatistics>,
     window: Span,
     dt: Option<f64>,
     period: Option<usize>,
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
-    let held = window.hold.saturating_mul(shown.len());
-    check_memory(file.head().file(), held, INSPECT_BYTES, file.memory())?;
+    let stored = window.hold.saturating_mul(shown.len());
+    check_memory(file.head().file(), stored, INSPECT_BYTES, file.memory())?;
     // A text is read once for all columns. Stored samples need only one copy for each thread.
     let at_once = if file.is_whole() { rayon::current_num_threads() } else { shown.len() };
     let table = file.head();
     let (mut channels, mut drawn) = (Vec::new(), Vec::new());
-    let mut on_the_way = on_the_way;
+    let mut while_reading = while_reading;
     for together in shown.chunks(at_once) {
-        let gathered = match on_the_way.take() {
-            Some(on_the_way) => on_the_way.of(together.iter().map(|shown| shown.place))?,
+        let gathered = match while_reading.take() {
+            Some(while_reading) => {
+                while_reading.statistics(together.iter().map(|shown| shown.place))?
+            }
             None => gathered(file, together, window)?,
         };
         let of_columns = together.par_iter().zip(gathered).map(|(shown, gathered)| {
             let column = shown.column;
             let (name, about) = (table.names()[column].clone(), table.about(column).into());
-            Measured::of(column + 1, name, about, gathered, dt, period)
+            Measured::new(column + 1, name, about, gathered, dt, period)
         });
         let of_columns: Vec<_> = of_columns.collect::<Result<_, _>>()?;
         for (shown, Measured { channel, lines, extremes }) in together.iter().zip(of_columns) {
@@ -156,7 +158,7 @@ fn gathered(
 ) -> Result<Vec<Gathered>, AnalysisError> {
     let columns: Vec<usize> = together.iter().map(|s| s.column).collect();
     let mut gathered: Vec<Gathered> =
-        together.iter().map(|s| Gathered::of(window.len, s.drawn)).collect();
+        together.iter().map(|s| Gathered::new(window.len, s.drawn)).collect();
     let samples = window.start..window.start + window.len;
     file.blocks_at(&columns, samples, IN_MEMORY_SAMPLES, IN_MEMORY_SAMPLES, &mut |block| {
         let values = block.as_slice().chunks(block.nrows());

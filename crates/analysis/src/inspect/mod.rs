@@ -12,7 +12,7 @@ use mechid_signal::{self as signal, message};
 use serde::{Deserialize, Serialize, Serializer};
 
 pub use self::measured::Drawn;
-use self::measured::{OnTheWay, Shown, Span, measured};
+use self::measured::{ReadingStatistics, Shown, Span, measured};
 pub use self::summary::RecordSummary;
 use crate::AnalysisError;
 use crate::measurement::units::{contradicted_rate, doubtful_time, doubtful_unit};
@@ -119,9 +119,9 @@ impl Inspection<'_> {
             _ => None,
         };
         let asked = self.asked(table)?;
-        let mut on_the_way = self.on_the_way(&file, &asked, instants);
+        let mut while_reading = self.while_reading(&file, &asked, instants);
         let mut inventory = file.inventory(&asked, instants, &mut |column, first, values| {
-            if let Some(gathered) = &mut on_the_way {
+            if let Some(gathered) = &mut while_reading {
                 gathered.push(column, first, values);
             }
         })?;
@@ -132,7 +132,7 @@ impl Inspection<'_> {
         let dt = self.step(&file, time, sampling, &mut left_out)?;
         let window = match len {
             0 => None,
-            len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
+            len => Some(Span::new(self.window.span(table.file(), len)?, &file)),
         };
         let sampling = dt.zip(time.map(|time| stated_by(table, &time)));
         let mut summary =
@@ -150,7 +150,7 @@ impl Inspection<'_> {
             summary.remarks.extend(window.looked_at(table.file()));
             summary.remarks.extend(self.choose_drawn(table, &mut shown));
             let period = self.window.period;
-            (summary.channels, drawn) = measured(&file, &shown, on_the_way, window, dt, period)?;
+            (summary.channels, drawn) = measured(&file, &shown, while_reading, window, dt, period)?;
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
@@ -164,20 +164,22 @@ impl Inspection<'_> {
     /// Measures the columns of a text while its samples are counted, so that it is read only once.
     /// This requires that the window ends with the record, and that neither its length nor a mean
     /// is needed beforehand.
-    fn on_the_way(
+    fn while_reading(
         &self,
         file: &RecordFile,
         asked: &[usize],
         instants: Option<usize>,
-    ) -> Option<OnTheWay> {
+    ) -> Option<ReadingStatistics> {
         let to_the_end = self.window.period.is_none() && self.window.periods.is_none();
         let at_once = to_the_end && self.reading.detrend == Detrend::None && !self.how.curves;
         (at_once && !file.is_whole()).then(|| {
-            let hold = |column: &usize| match self.is_signal(*column, instants) {
-                true => IN_MEMORY_SAMPLES,
-                false => 0,
+            let hold = |column: &usize| {
+                if self.is_signal(*column, instants) { IN_MEMORY_SAMPLES } else { 0 }
             };
-            OnTheWay::new(self.window.start.saturating_sub(1), asked.iter().map(hold).collect())
+            ReadingStatistics::new(
+                self.window.start.saturating_sub(1),
+                asked.iter().map(hold).collect(),
+            )
         })
     }
 
@@ -193,11 +195,11 @@ impl Inspection<'_> {
         }
         let mut wanted = shown.iter_mut().filter(|s| s.spectral);
         wanted.by_ref().take(DRAWN_COLUMNS).for_each(|s| s.drawn = true);
-        let others: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
-        (!others.is_empty()).then(|| {
+        let omitted: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
+        (!omitted.is_empty()).then(|| {
             format!(
                 "the picture shows {DRAWN_COLUMNS} columns; not drawn, unless `columns` chooses them: {}",
-                others.join(", ")
+                omitted.join(", ")
             )
         })
     }

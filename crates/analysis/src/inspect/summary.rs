@@ -71,13 +71,13 @@ pub struct Scalar {
 }
 
 impl WindowRow {
-    fn of(start: usize, len: usize) -> Self {
+    fn new(start: usize, len: usize) -> Self {
         Self { first_sample: start + 1, last_sample: start + len }
     }
 }
 
 impl SamplingRow {
-    fn of(dt: f64, len: usize, stated_by: Option<String>) -> Self {
+    fn new(dt: f64, len: usize, stated_by: Option<String>) -> Self {
         Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt, stated_by }
     }
 }
@@ -98,10 +98,10 @@ impl RecordSummary {
             format: table.format(),
             columns: table.width(),
             samples,
-            window: window.map(|window| WindowRow::of(window.start, window.len)),
+            window: window.map(|window| WindowRow::new(window.start, window.len)),
             sampling: sampling
                 .zip(window)
-                .map(|((dt, stated_by), window)| SamplingRow::of(dt, window.len, stated_by)),
+                .map(|((dt, stated_by), window)| SamplingRow::new(dt, window.len, stated_by)),
             channels: Vec::new(),
             scalars: scalars
                 .map(|(name, value)| Scalar { name: name.clone(), value: *value })

@@ -85,7 +85,7 @@ impl Channels {
 
     /// Returns the same channels with other names.
     pub(crate) fn renamed(&self, mut name: impl FnMut(&String) -> String) -> Self {
-        let mut each = |columns: &[String]| -> Vec<String> {
+        let mut renamed = |columns: &[String]| -> Vec<String> {
             let of = |column: &String| match column.as_str() {
                 ABSENT => ABSENT.into(),
                 _ => name(column),
@@ -93,10 +93,10 @@ impl Channels {
             columns.iter().map(of).collect()
         };
         Self {
-            force: each(&self.force),
-            displacement: each(&self.displacement),
-            velocity: each(&self.velocity),
-            acceleration: each(&self.acceleration),
+            force: renamed(&self.force),
+            displacement: renamed(&self.displacement),
+            velocity: renamed(&self.velocity),
+            acceleration: renamed(&self.acceleration),
         }
     }
 
@@ -122,23 +122,24 @@ impl Channels {
     /// first record in which it acts; a force that acts at several points in turn, as of a roving
     /// hammer, is also named after the point: `force at a1`.
     pub(crate) fn together(records: &[&Self]) -> Self {
-        let mut all = records.first().map(|first| Self::clone(first)).unwrap_or_default();
-        for (dof, name) in all.force.iter_mut().enumerate() {
+        let mut common = records.first().map(|first| Self::clone(first)).unwrap_or_default();
+        for (dof, name) in common.force.iter_mut().enumerate() {
             let mut acting = records.iter().filter_map(|record| record.force.get(dof));
             if let Some(found) = acting.find(|name| *name != ABSENT) {
                 name.clone_from(found);
             }
         }
-        let Some(kind) = all.first_response() else { return all };
-        let force = (0..all.force.len()).map(|dof| {
-            let name = &all.force[dof];
-            let roves = all.force.iter().filter(|other| *other == name).count() > 1;
-            match roves && name != ABSENT {
-                true => format!("{name} at {}", all.response_name(kind, dof)),
-                false => name.clone(),
+        let Some(kind) = common.first_response() else { return common };
+        let force = (0..common.force.len()).map(|dof| {
+            let name = &common.force[dof];
+            let roves = common.force.iter().filter(|other| *other == name).count() > 1;
+            if roves && name != ABSENT {
+                format!("{name} at {}", common.response_name(kind, dof))
+            } else {
+                name.clone()
             }
         });
-        Self { force: force.collect(), ..all.clone() }
+        Self { force: force.collect(), ..common.clone() }
     }
 
     /// Returns the columns of records with a roving force, one set per record; `dofs` are the
@@ -156,15 +157,15 @@ impl Channels {
             let given = message::count(dofs.len(), "degree of freedom");
             return Err(wrong(format!("{given} for {}", message::count(records, "record"))));
         }
-        let all = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
-        let all = all.unwrap_or(0);
-        if let Some(dof) = dofs.iter().find(|dof| !(1..=all).contains(*dof)) {
-            let responses = message::count(all, "response");
+        let count = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
+        let count = count.unwrap_or(0);
+        if let Some(dof) = dofs.iter().find(|dof| !(1..=count).contains(*dof)) {
+            let responses = message::count(count, "response");
             return Err(wrong(format!("degree of freedom {dof} of {responses}")));
         }
         let column = |dof: usize, at: usize| if at + 1 == dof { force.as_str() } else { ABSENT };
         let of = |dof: &usize| Self {
-            force: (0..all).map(|at| column(*dof, at).to_owned()).collect(),
+            force: (0..count).map(|at| column(*dof, at).to_owned()).collect(),
             ..self.clone()
         };
         Ok(dofs.iter().map(of).collect())

@@ -69,7 +69,7 @@ pub(crate) fn open_all(
         let reading = Reading { record_id: Some(record.id.clone()), ..reading.clone() };
         let mut record = RecordFile::of_table(table).with_memory(file.memory());
         reading.state_units(&mut record)?;
-        Measurement::of_file(record, Some(path), channels, &reading)
+        Measurement::from_file(record, Some(path), channels, &reading)
     });
     Ok(opened.collect())
 }

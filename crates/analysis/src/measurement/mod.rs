@@ -138,17 +138,17 @@ impl Measurement {
         reading: &Reading,
     ) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
-        Self::of_file(reading.open(path, IN_MEMORY_SAMPLES)?, Some(path), channels, reading)
+        Self::from_file(reading.open(path, IN_MEMORY_SAMPLES)?, Some(path), channels, reading)
     }
 
     /// Creates a measurement from columns of an open file.
-    pub(crate) fn of_file(
+    pub(crate) fn from_file(
         mut file: RecordFile,
         path: Option<&Path>,
         channels: &Channels,
         reading: &Reading,
     ) -> Result<Self, AnalysisError> {
-        let units = ToSi::of_table(file.head(), &channels.roles())?;
+        let units = ToSi::from_table(file.head(), &channels.roles())?;
         let time = reading.time_axis(file.head()).ok_or_else(|| AnalysisError::NoTimeAxis {
             file: file.head().file().into(),
             available: file.head().available(),
@@ -165,8 +165,8 @@ impl Measurement {
         units.findings.extend(doubtful_time);
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let name = |column: &String| {
-            let place = file.head().find(column);
-            place.map_or_else(|_| column.clone(), |place| file.head().short_name(place))
+            let index = file.head().find(column);
+            index.map_or_else(|_| column.clone(), |index| file.head().short_name(index))
         };
         let source = RecordSource {
             names: Arc::new(channels.renamed(name)),
@@ -209,8 +209,8 @@ impl Measurement {
                 let name = kind.to_string();
                 return Err(AnalysisError::ArrayShape { name, got: [samples, dofs], expected });
             }
-            let all: Vec<String> = names(&kind.to_string());
-            channels = channels.and(kind, &all.join(","));
+            let kind_names: Vec<String> = names(&kind.to_string());
+            channels = channels.and(kind, &kind_names.join(","));
             columns.extend((0..dofs).map(|dof| record.channel(dof)));
         }
         let named = channels.used().into_iter().map(String::as_str).zip(columns);
@@ -333,8 +333,8 @@ impl Measurement {
     /// # Errors
     /// If the file cannot be read again.
     pub fn responses(&self) -> Result<Vec<(ResponseQuantity, Record)>, AnalysisError> {
-        let held = self.hold(Hold::Whole)?.held;
-        Ok(held.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
+        let window = self.hold(Hold::Whole)?.held;
+        Ok(window.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
     }
 
     /// Returns the settings that open the record again; `None` for a record from memory.
@@ -398,7 +398,7 @@ impl Measurement {
     /// # Errors
     /// As [`Measurement::hold`].
     pub(crate) fn hold_any(&self) -> Result<Windowed, AnalysisError> {
-        Windowed::of_any_layout(self, Hold::Whole)
+        Windowed::from_any_layout(self, Hold::Whole)
     }
 }
 
@@ -539,8 +539,8 @@ impl Block {
 
     /// Returns the last buffered sample, counted from 1; `None` if the whole window is buffered.
     pub fn held_to(&self) -> Option<usize> {
-        let held = self.first_sample + self.force.len() - 1;
-        (held < self.last_sample()).then_some(held)
+        let last_buffered = self.first_sample + self.force.len() - 1;
+        (last_buffered < self.last_sample()).then_some(last_buffered)
     }
 }
 

@@ -69,7 +69,7 @@ impl ToSi {
     ///
     /// # Errors
     /// As [`ToSi::new`], and if there is no such column.
-    pub fn of_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
+    pub fn from_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
         let places = roles.iter().map(|role| Ok((table.find(role.column)?, role.quantity)));
         let places: Vec<_> = places.collect::<Result<_, AnalysisError>>()?;
         let columns = places

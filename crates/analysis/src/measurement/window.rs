@@ -42,11 +42,11 @@ impl Window {
             return Err(AnalysisError::Setting { setting: "period", why });
         }
         let start = self.start.saturating_sub(1);
-        let rest = samples.saturating_sub(start);
-        let period = self.period.unwrap_or(rest);
-        let periods = self.periods.unwrap_or(rest.checked_div(period).unwrap_or(0)).max(1);
+        let available = samples.saturating_sub(start);
+        let period = self.period.unwrap_or(available);
+        let periods = self.periods.unwrap_or(available.checked_div(period).unwrap_or(0)).max(1);
         let len = period.max(1).saturating_mul(periods);
-        if len > rest {
+        if len > available {
             return Err(AnalysisError::Window {
                 file: file.into(),
                 first: self.start,
@@ -72,12 +72,12 @@ pub enum Hold {
 impl Hold {
     /// Returns the number of samples to buffer for a window of `len` samples with period `period`.
     fn samples(self, len: usize, period: usize) -> usize {
-        let held = match self {
+        let buffered = match self {
             Hold::Whole => len,
             Hold::Periods => period * (IN_MEMORY_SAMPLES / period).max(1),
             Hold::Samples(least) => least.max(IN_MEMORY_SAMPLES),
         };
-        held.min(len)
+        buffered.min(len)
     }
 
     /// Returns the memory, in bytes, for each buffered number.
@@ -102,11 +102,11 @@ pub struct Windowed {
 impl Windowed {
     pub(super) fn new(measurement: &Measurement, hold: Hold) -> Result<Self, AnalysisError> {
         measurement.source().channels.check_pairs()?;
-        Self::of_any_layout(measurement, hold)
+        Self::from_any_layout(measurement, hold)
     }
 
     /// Reads a window in which forces and responses may belong to different degrees of freedom.
-    pub(super) fn of_any_layout(
+    pub(super) fn from_any_layout(
         measurement: &Measurement,
         hold: Hold,
     ) -> Result<Self, AnalysisError> {
@@ -157,27 +157,27 @@ impl Windowed {
     /// # Errors
     /// [`AnalysisError::Signal`] if the range exceeds the window.
     pub(crate) fn part(&self, samples: Range<usize>, force: Record) -> Result<Self, AnalysisError> {
-        let held = &self.held;
+        let buffered = &self.held;
         let part = |record: &Option<Record>| {
             record.as_ref().map(|r| r.window(samples.start, samples.len())).transpose()
         };
-        let held = Block {
-            displacement: part(&held.displacement)?,
-            velocity: part(&held.velocity)?,
-            acceleration: part(&held.acceleration)?,
-            first_sample: held.first_sample + samples.start,
+        let block = Block {
+            displacement: part(&buffered.displacement)?,
+            velocity: part(&buffered.velocity)?,
+            acceleration: part(&buffered.acceleration)?,
+            first_sample: buffered.first_sample + samples.start,
             period: samples.len(),
             periods: 1,
             force,
-            file: held.file.clone(),
-            driven: held.driven.clone(),
-            unit_remarks: held.unit_remarks.clone(),
-            unit_findings: held.unit_findings.clone(),
-            names: Arc::clone(&held.names),
+            file: buffered.file.clone(),
+            driven: buffered.driven.clone(),
+            unit_remarks: buffered.unit_remarks.clone(),
+            unit_findings: buffered.unit_findings.clone(),
+            names: Arc::clone(&buffered.names),
         };
         let start = self.window.start;
         let window = start + samples.start..start + samples.end;
-        Ok(Self { held, source: Arc::clone(&self.source), window })
+        Ok(Self { held: block, source: Arc::clone(&self.source), window })
     }
 
     /// Returns the number of samples to process at a time: the whole window if it is buffered.
@@ -214,9 +214,9 @@ fn driven(source: &RecordSource, held: &Block) -> Vec<usize> {
     let mut peaks = source.peaks.iter();
     let acts = |(dof, column): (usize, &String)| {
         let peak = if column == ABSENT { None } else { peaks.next() };
-        let seen = held.force.channel(dof).iter().any(|f| *f != 0.0);
+        let acts = held.force.channel(dof).iter().any(|f| *f != 0.0);
         let beyond = held.held_to().is_some() && peak.is_some_and(|peak| *peak > 0.0);
-        (seen || beyond).then_some(dof)
+        (acts || beyond).then_some(dof)
     };
     source.channels.force.iter().enumerate().filter_map(acts).collect()
 }

@@ -186,8 +186,8 @@ fn spectrum(data: &LineData) -> ModesSpectrum {
     let powers: Vec<f64> =
         (0..outputs.ncols()).map(|at| power(at).max(f64::MIN_POSITIVE)).collect();
     let measured = |row: usize| {
-        let each = outputs.row(row);
-        each.iter().zip(&powers).map(|(z, power)| z.norm_sqr() / power).sum::<f64>().sqrt()
+        let output = outputs.row(row);
+        output.iter().zip(&powers).map(|(z, power)| z.norm_sqr() / power).sum::<f64>().sqrt()
     };
     ModesSpectrum {
         frequency_hz: data.omega().iter().map(|omega| omega / TAU).collect(),

@@ -157,8 +157,12 @@ fn named(error: ModalError, inputs: &[String], outputs: &[Output]) -> AnalysisEr
             AnalysisError::DeadForces { columns }
         }
         ModalError::DependentInputs { input, own_share } => {
-            let others = list(&(0..input).collect::<Vec<_>>(), &|at| inputs[at].clone());
-            AnalysisError::DependentForces { force: inputs[input].clone(), others, own_share }
+            let preceding = list(&(0..input).collect::<Vec<_>>(), &|at| inputs[at].clone());
+            AnalysisError::DependentForces {
+                force: inputs[input].clone(),
+                others: preceding,
+                own_share,
+            }
         }
         other => other.into(),
     }

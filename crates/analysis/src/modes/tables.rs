@@ -42,7 +42,7 @@ impl Tables {
         if tables.is_empty() {
             return Err(AnalysisError::NoRecord);
         }
-        let added_decay = added_decay::of_tables(tables)?;
+        let added_decay = added_decay::common_rate(tables)?;
         let prepared = |table: &FrequencyResponses| prepare(table, quantity, added_decay);
         let tables = tables.iter().map(prepared).collect::<Result<Vec<_>, AnalysisError>>()?;
         let points = |point: fn(&ResponseFunction) -> &String| {

@@ -40,15 +40,15 @@ pub fn find(
     }
     // The force at a sample is the mean of the values from the step before and the step after. At
     // the ends of a chunk one of these steps is missing, so the chunks overlap.
-    let beside = usize::from(!with_acceleration);
-    let advance = CHUNK_SAMPLES - 2 * beside;
+    let overlap = usize::from(!with_acceleration);
+    let advance = CHUNK_SAMPLES - 2 * overlap;
     let (len, mut first) = (recorded.sampling.len(), 0);
     recorded.chunks(CHUNK_SAMPLES, advance, &mut |chunk| {
         let solved = equation(request, machine, chunk, method);
-        let force = solved.map_err(|error| of_the_window(error, first))?;
+        let force = solved.map_err(|error| in_window(error, first))?;
         let samples = force.record().len();
-        let start = if first == 0 { 0 } else { beside };
-        let end = if first + samples == len { samples } else { samples - beside };
+        let start = if first == 0 { 0 } else { overlap };
+        let end = if first + samples == len { samples } else { samples - overlap };
         first += advance;
         take(chunk, &force, start..end)
     })
@@ -56,7 +56,7 @@ pub fn find(
 
 /// Returns the error with its sample counted from the beginning of the window rather than of the
 /// chunk, whose first sample is `first`.
-fn of_the_window(error: AnalysisError, first: usize) -> AnalysisError {
+fn in_window(error: AnalysisError, first: usize) -> AnalysisError {
     match error {
         AnalysisError::Force(ForceError::Signal(SignalError::NotFinite {
             sample,

@@ -30,7 +30,7 @@ const ANOTHER_UNIT: f64 = 3.0;
 
 impl KinematicConsistency {
     /// Creates the pairs among these channels.
-    pub fn of(channels: &[Channel]) -> Self {
+    pub fn new(channels: &[Channel]) -> Self {
         let find = |dof: usize, quantity: ResponseQuantity| {
             channels.iter().position(|c| *c == Channel { dof, quantity })
         };
@@ -62,10 +62,10 @@ impl KinematicConsistency {
     /// Returns a remark for each inconsistent pair.
     pub fn remarks(&self, columns: &[String]) -> Vec<String> {
         let mismatch = |pair: &Pair| {
-            let alike = pair.product / (pair.changes * pair.by_rate).sqrt();
-            let ratio = (pair.by_rate / pair.changes).sqrt() * alike.signum();
+            let correlation = pair.product / (pair.changes * pair.by_rate).sqrt();
+            let ratio = (pair.by_rate / pair.changes).sqrt() * correlation.signum();
             let right = (1.0 / ANOTHER_UNIT..ANOTHER_UNIT).contains(&ratio);
-            (alike.abs() > ALIKE && !right).then(|| {
+            (correlation.abs() > ALIKE && !right).then(|| {
                 format!(
                     "{} is {} times the rate of {}: one of them is in another unit, of another \
                      sign, or another column",

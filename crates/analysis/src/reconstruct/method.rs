@@ -111,7 +111,7 @@ pub fn find(
     match method {
         Method::Continuous | Method::Discretised => {
             let force = equation(request, machine, motion, method)?;
-            Ok(Found { force, how: How::of_equation(method, why, request, machine) })
+            Ok(Found { force, how: How::from_equation(method, why, request, machine) })
         }
         Method::FrequencyDomain => lines(request, known, motion, why),
         Method::Kalman => smoothed(request, known, motion, why),
@@ -156,7 +156,7 @@ pub fn equation(
     let ends = if request.periodic { Extent::WholePeriod } else { Extent::Open };
     let linear = Discretisation::FirstOrderHold;
     let noise = motion_noise(request, motion, machine.system().dof())?;
-    let kept = |force: IdentifiedForce| match request.band_hz {
+    let in_band = |force: IdentifiedForce| match request.band_hz {
         Some(band_hz) => force.white_in_band(band_hz, ends),
         None => Ok(force),
     };
@@ -164,11 +164,11 @@ pub fn equation(
         return Err(AnalysisError::BandMethod { low_hz, high_hz });
     }
     if let Some(part) = &machine.nonlinear {
-        return with_terms(part, &response, noise.as_ref(), &kept);
+        return with_terms(part, &response, noise.as_ref(), &in_band);
     }
     with_machine(&machine.uncertain, &|system| match (with_acceleration, &noise) {
-        (true, None) => continuous(system, &response).and_then(kept),
-        (true, Some(noise)) => continuous_with_noise(system, &response, noise).and_then(kept),
+        (true, None) => continuous(system, &response).and_then(in_band),
+        (true, Some(noise)) => continuous_with_noise(system, &response, noise).and_then(in_band),
         (false, None) => discretised(system, &response, linear, ends),
         (false, Some(noise)) => discretised_with_noise(system, &response, linear, ends, noise),
     })
@@ -222,7 +222,12 @@ fn motion_noise(
 
 impl How {
     /// Describes the method of [`equation`].
-    pub fn of_equation(method: Method, why: String, request: &Request, machine: &Machine) -> Self {
+    pub fn from_equation(
+        method: Method,
+        why: String,
+        request: &Request,
+        machine: &Machine,
+    ) -> Self {
         let method = if machine.nonlinear.is_some() {
             "equation of motion with nonlinear terms, sample by sample"
         } else if method == Method::Continuous {
@@ -262,7 +267,7 @@ fn lines(
     let counts_noise = noise != Noise::Unknown;
     let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = "dynamic stiffness, line by line";
-    let remarks = elsewhere(motion, request).into_iter().collect();
+    let remarks = little_power_remark(motion, request).into_iter().collect();
     let (seen_from_hz, band_hz) = (None, force.band_hz());
     Ok(Found {
         force,
@@ -323,7 +328,7 @@ fn filtered(
         Filter::TruncatedSvd(_) => "truncated singular value decomposition",
         _ => "mean of the force given the measurement (shrinkage)",
     };
-    let remarks = elsewhere(motion, request).into_iter().collect();
+    let remarks = little_power_remark(motion, request).into_iter().collect();
     let (seen_from_hz, band_hz, counts_noise) = (regular.seen_from_hz, force.band_hz(), true);
     Ok(Found {
         force,
@@ -346,7 +351,7 @@ const FEW: f64 = 0.5;
 
 /// Returns a remark about the channel with the smallest share of its power on the given lines, if
 /// the share is small: the lines may refer to a period other than the window's.
-fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
+fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;
     let spectrum = Spectrum::of(motion.record());
     let power = |lines: &mut dyn Iterator<Item = usize>, channel: usize| -> f64 {

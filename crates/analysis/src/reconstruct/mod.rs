@@ -203,23 +203,23 @@ impl Task {
         let dofs = machine.system().dof();
         let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
         let (method, why) = method::choose(request, machine, &recorded.channels)?;
-        let mut rates = KinematicConsistency::of(&recorded.channels);
+        let mut rates = KinematicConsistency::new(&recorded.channels);
         let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request, machine) {
             chunks::find(request, machine, recorded, method, &mut |chunk, force, kept| {
                 rates.push(chunk);
                 tally.push(force, kept, !request.noise.is_empty())
             })?;
-            (How::of_equation(method, why, request, machine), None)
+            (How::from_equation(method, why, request, machine), None)
         } else {
-            let mut held = recorded.hold()?;
+            let mut window = recorded.hold()?;
             if let Some(band_hz) = request.band_hz {
-                held.motion = held.motion.in_band(band_hz)?;
+                window.motion = window.motion.in_band(band_hz)?;
             }
-            rates.push(&held.motion);
-            let Found { force, mut how } = method::find(request, machine, &held.motion)?;
+            rates.push(&window.motion);
+            let Found { force, mut how } = method::find(request, machine, &window.motion)?;
             tally.push_all(&force, how.counts_noise)?;
-            how.remarks.extend(periods::remark(recorded, &held));
-            periods::tell_noise(how.unexplained.as_mut(), recorded, &held);
+            how.remarks.extend(periods::remark(recorded, &window));
+            periods::add_scatter(how.unexplained.as_mut(), recorded, &window);
             (how, Some(force))
         };
         how.remarks.extend(shown::remark(&recorded.channels, request, &how));

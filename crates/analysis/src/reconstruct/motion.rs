@@ -155,7 +155,7 @@ impl Recorded {
 
 /// Returns the channels with this quantity for every degree of freedom; `None` unless all were
 /// measured.
-fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Option<Vec<usize>> {
+fn columns_of(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Option<Vec<usize>> {
     let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
     (0..dofs).map(find).collect()
 }
@@ -165,21 +165,22 @@ fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Opti
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
     let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];
     needed.extend(with_acceleration.then_some(ResponseQuantity::Acceleration));
-    needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
+    needed.into_iter().all(|quantity| columns_of(channels, quantity, dofs).is_some())
 }
 
 /// Returns displacement, velocity and acceleration of every degree of freedom; `None` unless all
 /// were measured. Without accelerations these are zero.
 pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
     let record = measured.record();
-    let all = |quantity: ResponseQuantity| -> Option<Record> {
-        let columns = of_all(measured.channels(), quantity, dofs)?;
+    let record_of = |quantity: ResponseQuantity| -> Option<Record> {
+        let columns = columns_of(measured.channels(), quantity, dofs)?;
         let data = DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
         Record::new(record.sampling(), data).ok()
     };
-    let (x, v) = (all(ResponseQuantity::Displacement)?, all(ResponseQuantity::Velocity)?);
+    let (x, v) =
+        (record_of(ResponseQuantity::Displacement)?, record_of(ResponseQuantity::Velocity)?);
     let a = if with_acceleration {
-        all(ResponseQuantity::Acceleration)?
+        record_of(ResponseQuantity::Acceleration)?
     } else {
         Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
     };

@@ -19,8 +19,8 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     let samples = record.len();
     let size = |channel: usize| record.column(channel).norm() / (samples as f64).sqrt();
     let scatter = held.scatter.iter().flatten().enumerate();
-    let other = scatter.filter(|(_, scatter)| scatter.correlation.abs() > NOT_WHITE);
-    let shares = other.map(|(channel, scatter)| (channel, scatter.deviation / size(channel)));
+    let correlated = scatter.filter(|(_, scatter)| scatter.correlation.abs() > NOT_WHITE);
+    let shares = correlated.map(|(channel, scatter)| (channel, scatter.deviation / size(channel)));
     let far = shares.filter(|(_, share)| *share > ALIKE);
     let (channel, share) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
@@ -33,7 +33,7 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
 
 /// Uses the scatter of the periods as the noise of every channel without a known level: it gives the
 /// expected residual of the mean of the periods.
-pub fn tell_noise(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
+pub fn add_scatter(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
     let (Some(channels), Some(scatter)) = (unexplained, &held.scatter) else { return };
     for (channel, scatter) in channels.iter_mut().zip(scatter) {
         let level = scatter.deviation / (recorded.periods as f64).sqrt();

@@ -33,14 +33,14 @@ impl Sums {
 
     /// Returns the scatter about the mean of `periods` periods.
     pub fn about(&self, mean: &[f64], periods: usize) -> Scatter {
-        let all = periods as f64;
+        let count = periods as f64;
         let in_mean: f64 = mean.iter().map(|m| m * m).sum();
         let beside: f64 = mean.windows(2).map(|w| w[0] * w[1]).sum();
-        let squares = (self.squares - all * in_mean).max(0.0);
+        let squares = (self.squares - count * in_mean).max(0.0);
         let freedom = ((periods - 1) * mean.len()) as f64;
         Scatter {
             deviation: (squares / freedom).sqrt(),
-            correlation: (self.products - all * beside) / squares,
+            correlation: (self.products - count * beside) / squares,
         }
     }
 }

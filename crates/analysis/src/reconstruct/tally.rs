@@ -50,12 +50,12 @@ impl<'a> Tally<'a> {
         force: &IdentifiedForce,
         counts_noise: bool,
     ) -> Result<(), AnalysisError> {
-        let all = 0..force.record().len();
-        self.push_samples(force, all.clone(), counts_noise)?;
+        let all_samples = 0..force.record().len();
+        self.push_samples(force, all_samples.clone(), counts_noise)?;
         if self.strongest.pieces() == 1 {
             self.strongest.add(force.spectrum());
         } else {
-            self.strongest.push(force.record(), all)?;
+            self.strongest.push(force.record(), all_samples)?;
         }
         Ok(())
     }

@@ -39,12 +39,12 @@ impl Measured {
         let columns = recorded.columns().iter().enumerate();
         columns
             .map(|(at, column)| {
-                let left = unexplained.map(|all| &all[at]);
+                let residual = unexplained.map(|all| &all[at]);
                 Self {
                     channel: at + 1,
                     column: column.clone(),
-                    unexplained: left.map(Unexplained::share),
-                    expected: left.and_then(expected),
+                    unexplained: residual.map(Unexplained::share),
+                    expected: residual.and_then(expected),
                 }
             })
             .collect()
@@ -83,13 +83,13 @@ pub fn remark(
     request: &Request,
     dofs: usize,
 ) -> Option<String> {
-    let all = measured.iter().zip(unexplained?);
+    let channels = measured.iter().zip(unexplained?);
     let excessive: Vec<&Measured> =
-        all.filter(|(_, unexplained)| is_too_much(unexplained)).map(|m| m.0).collect();
+        channels.filter(|(_, unexplained)| is_too_much(unexplained)).map(|m| m.0).collect();
     if excessive.is_empty() {
         return None;
     }
-    let each = excessive.iter().map(|m| {
+    let named = excessive.iter().map(|m| {
         let share = percent(m.unexplained.unwrap_or_default());
         let expected = m.expected.map(|share| format!("; expected {}", percent(share)));
         let expected = expected.unwrap_or_default();
@@ -102,7 +102,7 @@ pub fn remark(
     };
     Some(format!(
         "the force found leaves unexplained {}: {unless}{}; do not believe its standard error",
-        listed(&each.collect::<Vec<_>>()),
+        listed(&named.collect::<Vec<_>>()),
         causes(request, dofs).join(", or ")
     ))
 }

@@ -17,7 +17,7 @@ const POOR_FIT: f64 = 50.0;
 /// Returns the evidence against the numbers, the worst first.
 pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.identified.summary();
-    let mut doubts = found_out(&report.checks, Verdict::Bad);
+    let mut doubts = sentences_with(&report.checks, Verdict::Bad);
     doubts.extend(report.doubts());
     // The checks report a residual that is too large.
     if let Some(misfit) =
@@ -27,13 +27,13 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
         doubts.push(format!("{misfit}: {why}"));
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
-    doubts.extend(found_out(&report.checks, Verdict::Doubtful));
+    doubts.extend(sentences_with(&report.checks, Verdict::Doubtful));
     doubts.extend(of_least_squares(contents.identified.fitted(), &report.checks));
     doubts
 }
 
 /// Returns the checks with this verdict, one sentence for each subject.
-fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
+fn sentences_with(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
     let mut sentences: Vec<(Subject, String)> = Vec::new();
     for check in checks.iter().filter(|check| check.verdict == verdict) {
         let subject = check.subject;

@@ -85,19 +85,19 @@ impl<'a> RecordReview<'a> {
         reconstruct_force: bool,
     ) -> Result<Self, AnalysisError> {
         let recorded = &identified.records()[at];
-        let held = &recorded.held;
+        let buffered = &recorded.held;
         let lines = match identified.spectra() {
             // Lines of segments differ from lines of the record.
             Some(_) if identified.prediction() == Prediction::Steady => {
                 let lines = identified.summary().analysis.source.lines();
                 let choice = lines.map_or(&LineChoice::Driven, |lines| &lines.choice);
-                Some(choose_lines(&held.force, held.period, choice)?)
+                Some(choose_lines(&buffered.force, buffered.period, choice)?)
             }
             _ => None,
         };
         let whole = Whole::new(recorded)?;
         let mean = whole.mean.as_ref().filter(|_| lines.is_some());
-        let period = mean.unwrap_or(held);
+        let period = mean.unwrap_or(buffered);
         let reconstruction = if reconstruct_force {
             Some(Reconstruction::new(identified, period, lines.clone())?)
         } else {
@@ -105,9 +105,9 @@ impl<'a> RecordReview<'a> {
         };
         Ok(Self {
             recorded,
-            name: (identified.records().len() > 1).then_some(held.file.as_str()),
+            name: (identified.records().len() > 1).then_some(buffered.file.as_str()),
             index: at,
-            channels: channels::channels(held, &whole, &held.names),
+            channels: channels::channels(buffered, &whole, &buffered.names),
             excitations: excitation::excitations(&period.force)?,
             residual: Residual::new(identified, at, mean).map_err(|reason| reason.to_string()),
             reconstruction,

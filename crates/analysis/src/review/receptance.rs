@@ -61,9 +61,11 @@ impl<'a> ActingAlone<'a> {
             let driven = |row: &usize| {
                 let amplitude = data.force()[(*row, j)].norm();
                 let limit = ALONE_WITH_NOISE * amplitude;
-                let others = (0..n).filter(|other| *other != j);
+                let other_forces = (0..n).filter(|other| *other != j);
                 amplitude > 0.0
-                    && others.into_iter().all(|other| data.force()[(*row, other)].norm() <= limit)
+                    && other_forces
+                        .into_iter()
+                        .all(|other| data.force()[(*row, other)].norm() <= limit)
             };
             // The ratio gives every line the same weight.
             let part = |row: usize| data.force()[(row, k)] / data.force()[(row, j)];
@@ -152,13 +154,16 @@ fn measured(
 }
 
 fn period_spectra(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {
-    let held = part.held();
+    let buffered = part.held();
     // The scatter of several periods is their noise; a period longer than the memory has only its
     // mean.
-    let force =
-        if held.force.len() < held.period { &part.whole.period(held).force } else { &held.force };
-    let chosen = choose_lines(force, held.period, &LineChoice::Driven)?;
-    let lines = Lines::new(force.sampling().with_len(held.period)?, chosen)?;
+    let force = if buffered.force.len() < buffered.period {
+        &part.whole.period(buffered).force
+    } else {
+        &buffered.force
+    };
+    let chosen = choose_lines(force, buffered.period, &LineChoice::Driven)?;
+    let lines = Lines::new(force.sampling().with_len(buffered.period)?, chosen)?;
     Ok(periods(part.recorded, &lines)?.mean()?)
 }
 
@@ -167,10 +172,10 @@ fn segment(measured: &Block) -> usize {
 }
 
 fn segment_spectra(recorded: &Windowed) -> Result<FrequencyData, AnalysisError> {
-    let held = &recorded.held;
-    let len = segment(held);
+    let buffered = &recorded.held;
+    let len = segment(buffered);
     let segments = Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann };
-    let sampling = held.force.sampling().with_len(len)?;
+    let sampling = buffered.force.sampling().with_len(len)?;
     let lines = Lines::new(sampling, lines::full(sampling))?;
     let responses = average(recorded, &lines, segments)?.frf(FrfEstimator::H1)?;
     let explained =
@@ -179,5 +184,5 @@ fn segment_spectra(recorded: &Windowed) -> Result<FrequencyData, AnalysisError> 
     if clear.is_empty() {
         return Err(AnalysisError::NoReceptance);
     }
-    Ok(responses.at(&clear).data(&held.driven)?)
+    Ok(responses.at(&clear).data(&buffered.driven)?)
 }

@@ -32,10 +32,13 @@ pub struct Gathered {
 impl Whole {
     /// Reads the window once.
     pub(crate) fn new(recorded: &Windowed) -> Result<Self, AnalysisError> {
-        let held = &recorded.held;
-        let mut force = Gathered::new(held, &held.force);
-        let mut motions: Vec<Gathered> =
-            held.responses().iter().map(|(_, motion)| Gathered::new(held, motion)).collect();
+        let buffered = &recorded.held;
+        let mut force = Gathered::new(buffered, &buffered.force);
+        let mut motions: Vec<Gathered> = buffered
+            .responses()
+            .iter()
+            .map(|(_, motion)| Gathered::new(buffered, motion))
+            .collect();
         recorded.chunks(CHUNK_SAMPLES, CHUNK_SAMPLES, &mut |chunk| {
             force.push(&chunk.force)?;
             for (gathered, (_, motion)) in motions.iter_mut().zip(chunk.responses()) {
@@ -43,7 +46,7 @@ impl Whole {
             }
             Ok(())
         })?;
-        let mean = mean(held, &force, &motions)?;
+        let mean = mean(buffered, &force, &motions)?;
         Ok(Self { force, motions, mean })
     }
 
@@ -89,7 +92,7 @@ impl Gathered {
         let channels = record.channels();
         let window = held.period * held.periods;
         let extremes = match held.held_to() {
-            Some(_) => vec![Extremes::of(window); channels],
+            Some(_) => vec![Extremes::new(window); channels],
             None => Vec::new(),
         };
         let periods = (held.periods > 1).then(|| Periods::new(held.period, record));

@@ -180,14 +180,14 @@ fn gather(
     estimator: Estimator,
     factors: &[usize],
 ) -> Result<BTreeMap<usize, Result<Decimated, Failure>>, AnalysisError> {
-    let held = &recorded.held;
-    let beginning = Samples::measured(held);
+    let buffered = &recorded.held;
+    let beginning = Samples::measured(buffered);
     let start = |factor: &usize| {
-        let none = Decimated::new(estimator, *factor, held, &beginning);
+        let none = Decimated::new(estimator, *factor, buffered, &beginning);
         (*factor, none.map_err(Arc::new))
     };
     let mut gathered: BTreeMap<_, _> = factors.iter().map(start).collect();
-    let samples = estimator.chunk(held.period);
+    let samples = estimator.chunk(buffered.period);
     recorded.chunks(samples, samples, &mut |chunk| {
         let chunk = Samples::measured(chunk);
         for decimated in gathered.values_mut() {

@@ -52,7 +52,7 @@ impl FromStr for Settings {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut all = Vec::new();
+        let mut settings = Vec::new();
         for part in text.split(',') {
             let numbers: Vec<f64> = part
                 .split(':')
@@ -69,12 +69,12 @@ impl FromStr for Settings {
             if !(positive(first) && positive(step) && positive(last) && steps >= 0.0) {
                 return Err(format!("settings are positive and ranges go upwards, got {part}"));
             }
-            if steps >= (LONGEST - all.len().min(LONGEST)) as f64 {
+            if steps >= (LONGEST - settings.len().min(LONGEST)) as f64 {
                 return Err(format!("more than {LONGEST} settings"));
             }
-            all.extend((0..=steps as usize).map(|k| first + k as f64 * step));
+            settings.extend((0..=steps as usize).map(|k| first + k as f64 * step));
         }
-        Ok(Self(all))
+        Ok(Self(settings))
     }
 }
 

@@ -156,12 +156,11 @@ impl SweepSummary {
                 text += &format!("{name} {}: {failure}\n", compact(point.setting, 6));
             }
         }
-        text += match self.has_reference() {
-            true => "\nThe error is that of the worst entry, relative to the largest of its matrix",
-            false => {
-                "\nThe error is the largest standard error, relative to the largest entry of its \
-                 matrix: it knows nothing of bias"
-            }
+        text += if self.has_reference() {
+            "\nThe error is that of the worst entry, relative to the largest of its matrix"
+        } else {
+            "\nThe error is the largest standard error, relative to the largest entry of its \
+             matrix: it knows nothing of bias"
         };
         text += if only_best { ".\n" } else { "; ± is one standard error.\n" };
         let (name, unit) = self.setting.label();

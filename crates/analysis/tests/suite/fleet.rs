@@ -281,7 +281,7 @@ fn trends_find_what_stands_out_and_nothing_else() {
             }
         })
         .collect();
-    let trends = Trends::of(&rows, TrendAxis::Number);
+    let trends = Trends::from_rows(&rows, TrendAxis::Number);
     assert_eq!(
         (trends.records, trends.failed, trends.analyses, trends.series.len()),
         (2000, 0, 1, 1)
@@ -298,6 +298,6 @@ fn trends_find_what_stands_out_and_nothing_else() {
     let interval = mass.points[0].interval.unwrap();
     let error = mass.points[0].standard_error.unwrap();
     assert!(interval[1] - interval[0] > 3.9 * error);
-    assert_eq!(Trends::of(&rows, TrendAxis::Order).series[0].points[0].at, 1.0);
-    assert_eq!(Trends::of(&[rig], TrendAxis::Number).without_number, 1);
+    assert_eq!(Trends::from_rows(&rows, TrendAxis::Order).series[0].points[0].at, 1.0);
+    assert_eq!(Trends::from_rows(&[rig], TrendAxis::Number).without_number, 1);
 }
