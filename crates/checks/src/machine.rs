@@ -11,14 +11,12 @@ use super::limits::FREE_RESIDUALS;
 use super::line_correlation::correlation_of_lines;
 use super::misfit::{Misfit, NoiseSource};
 use super::p_value::{CorrelationTest, PValue};
-use super::parts::agreement_of_lines;
 use super::prior::PriorAgreement;
 use super::search::SearchAgreement;
 use super::whiteness::{Residual, Whiteness};
 
 /// Tests the power of the residual against the noise if `source` states the origin of the noise
-/// power ([`Finding::Misfit`]), the parts of the data against one another
-/// ([`Finding::PartsAgreement`]), priors against the data ([`Finding::PriorAgreement`]), and whether
+/// power ([`Finding::Misfit`]), priors against the data ([`Finding::PriorAgreement`]), and whether
 /// several searches agree ([`Finding::SearchAgreement`]).
 ///
 /// # Source
@@ -31,7 +29,6 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
     findings.extend(misfit.map(|((ratio, p_value), source)| {
         Finding::Misfit(Misfit { ratio, p_value: PValue::of(p_value), source, concentration: None })
     }));
-    findings.extend(agreement_of_lines(likelihood));
     for parameter in &likelihood.parameters {
         let tested = parameter.prior.and_then(|prior| Some((prior, prior.p_value?)));
         findings.extend(tested.map(|(prior, p_value)| {

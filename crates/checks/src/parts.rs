@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use mechid_estimate::frequency_domain::{self, PartsComparison, PartsOfFit, Split};
-use mechid_estimate::likelihood::LikelihoodEstimate;
+use mechid_model::Parameter;
 
 use super::digits::{line_hz, six_digits, three_digits};
 use super::finding::{Check, Names};
@@ -22,8 +22,9 @@ pub struct PartsAgreement {
     pub p_value: PValue,
     /// The part that differs most from the others.
     pub part: DataPart,
-    /// Name of the parameter in which it does.
-    pub parameter: String,
+    /// Parameter in which it does.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::serialised::as_text"))]
+    pub parameter: Parameter,
     /// Value by the part (unit of the parameter).
     pub by_part: f64,
     /// Value by the other parts (unit of the parameter).
@@ -102,28 +103,12 @@ pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) ->
     Some(Finding::PartsAgreement(PartsAgreement {
         p_value: PValue::of((count * worst.p_value).min(1.0)),
         part: DataPart::new(difference.part, rows),
-        parameter: difference.parameter.to_string(),
+        parameter: difference.parameter,
         by_part: difference.by_part,
         by_others: difference.by_others,
         standard_error: difference.standard_error,
         scatter,
         degrees_of_freedom,
-    }))
-}
-
-/// Returns the agreement of records and bands of lines about the unknowns of a machine
-/// ([`Finding::PartsAgreement`]); `None` where they were not compared.
-pub(crate) fn agreement_of_lines(likelihood: &LikelihoodEstimate) -> Option<Finding> {
-    let parts = likelihood.parts.as_ref()?;
-    Some(Finding::PartsAgreement(PartsAgreement {
-        p_value: PValue::of(parts.p_value),
-        part: DataPart::new(parts.part, RowParts::Records),
-        parameter: likelihood.parameters.get(parts.parameter)?.name.clone(),
-        by_part: parts.by_part,
-        by_others: parts.by_others,
-        standard_error: parts.standard_error,
-        scatter: parts.scatter,
-        degrees_of_freedom: parts.degrees_of_freedom,
     }))
 }
 

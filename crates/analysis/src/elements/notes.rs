@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use mechid_checks::Subject;
 use serde::Serialize;
 
 use crate::text::{compact, scaled_errors, significant};
@@ -23,8 +22,6 @@ pub enum ElementNote {
     ScaledErrors {
         /// Factor.
         factor: f64,
-        /// Checks that disagree beyond the noise.
-        because: Vec<Subject>,
     },
     /// Most of the information on a parameter comes from its prior.
     FromPrior {
@@ -64,10 +61,7 @@ impl fmt::Display for ElementNote {
                 "{parameter} lies at its bound {}: the data would have it beyond; its interval is one-sided",
                 compact(*bound, 6)
             ),
-            Self::ScaledErrors { factor, because } => {
-                let names: Vec<String> = because.iter().map(Subject::to_string).collect();
-                f.write_str(&scaled_errors(*factor, &names.join(", ")))
-            }
+            Self::ScaledErrors { factor } => f.write_str(&scaled_errors(*factor, "misfit")),
             Self::FromPrior { parameter, share } => write!(
                 f,
                 "{} % of the information on {parameter} comes from its prior",

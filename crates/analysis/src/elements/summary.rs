@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_checks::{Finding, Subject, adjust_p_values, after_machine_fit, whiteness_of_lines};
+use mechid_checks::{Finding, adjust_p_values, after_machine_fit, whiteness_of_lines};
 use mechid_estimate::likelihood::machine::{Candidate, CandidateGain, MachineEstimate};
 use mechid_estimate::likelihood::{
     Combination, FoundMinimum, IntervalKind, ParameterEstimate, PriorReport,
@@ -151,7 +151,6 @@ impl ElementSummary {
         let (likelihood, lines) = (&estimate.likelihood, &data.lines);
         let equations = 2 * lines.outputs().len();
         let StatedMachine { system, covariance, notes } = machine::stated(estimate, equations)?;
-        let checks = checks(data, estimate);
         let remarks = data.remarks.iter().map(|text| ElementNote::Read { text: text.clone() });
         Ok(Self {
             tests: data.tests.clone(),
@@ -176,8 +175,8 @@ impl ElementSummary {
             condition_number: likelihood.condition,
             candidates: candidates(data, estimate, how)?,
             modes: modes(estimate, equations)?,
-            notes: notes_of(estimate, &checks).into_iter().chain(notes).chain(remarks).collect(),
-            checks,
+            checks: checks(data, estimate),
+            notes: notes_of(estimate).chain(notes).chain(remarks).collect(),
             system: system.as_ref().map(SystemMatrices::from),
             covariance,
             analysis: how.clone(),
@@ -286,15 +285,11 @@ fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
     all.iter().map(row).collect()
 }
 
-fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> Vec<ElementNote> {
+fn notes_of(estimate: &MachineEstimate) -> impl Iterator<Item = ElementNote> {
     let likelihood = &estimate.likelihood;
     let mut notes = Vec::new();
     if likelihood.error_scale > 1.0 {
-        let told = |subject: &Subject| {
-            checks.iter().any(|check| check.subject == *subject && check.is_conspicuous())
-        };
-        let because = [Subject::Misfit, Subject::Parts].into_iter().filter(told).collect();
-        notes.push(ElementNote::ScaledErrors { factor: likelihood.error_scale, because });
+        notes.push(ElementNote::ScaledErrors { factor: likelihood.error_scale });
     }
     for parameter in &likelihood.parameters {
         let name = || parameter.name.clone();
@@ -308,5 +303,5 @@ fn notes_of(estimate: &MachineEstimate, checks: &[CheckRow]) -> Vec<ElementNote>
     if likelihood.parameters.iter().any(|parameter| parameter.at_bound) {
         notes.push(ElementNote::BoundInSystem);
     }
-    notes
+    notes.into_iter()
 }

@@ -5,6 +5,7 @@ use mechid_analysis::{
     AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
 use mechid_checks::{DataPart, Finding, OmittedTerm, PartsAgreement, Power, Subject};
+use mechid_model::Matrix;
 use mechid_problems::FaultyOscillator;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 
@@ -69,7 +70,7 @@ fn a_weight_added_for_one_record_is_named_and_in_the_interval() {
     let parts = agreement(&found);
     assert!(parts.p_value.adjusted < 1e-6, "{found}");
     assert!(matches!(parts.part, DataPart::Records { .. }), "{found}");
-    assert_eq!(parts.parameter, "m");
+    assert_eq!(parts.parameter.matrix(), Matrix::Mass);
     let difference = (parts.by_part - parts.by_others).abs();
     assert!((difference / (0.02 * linear.mass) - 1.0).abs() < 0.2, "{found}");
     let scale = found.summary().fit.error_scale;

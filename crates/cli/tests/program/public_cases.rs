@@ -21,8 +21,7 @@ fn json(folder: &Path, arguments: &str) -> Value {
 
 /// Value and standard error of a parameter, by its place in the list.
 fn parameter(report: &Value, at: usize) -> [f64; 2] {
-    ["value", "standard_error"]
-        .map(|part| report["parameters"][at][part].as_f64().unwrap())
+    ["value", "standard_error"].map(|part| report["parameters"][at][part].as_f64().unwrap())
 }
 
 /// A dataset 58 of even spacing: type, first abscissa, spacing, type and label of the ordinate, response and reference as

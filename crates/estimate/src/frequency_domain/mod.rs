@@ -76,7 +76,6 @@ pub use parts::{
     Difference, OmittedTerm, OmittedTerms, Part, PartsComparison, PartsOfFit, Power, SampledRows,
     Split,
 };
-pub(crate) use parts::{Level, PartDifference, ScoreComparison, Scores};
 pub use sampled_force::equivalent_force;
 pub use structural_damping::{StructuralDamping, structural_damping};
 pub use whitened::Whitened;

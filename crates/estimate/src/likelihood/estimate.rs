@@ -7,7 +7,6 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::fit::Fit;
 use super::limits::{COMMON_FACTOR, WEAK};
-use super::parts::ComparedParts;
 use super::profile;
 use super::response_model::ResponseModel;
 
@@ -171,9 +170,6 @@ pub struct LikelihoodEstimate {
     /// Factor on the standard errors and intervals from the noise, because model and data differ by
     /// more than the noise; otherwise 1.
     pub error_scale: f64,
-    /// Agreement of the parts of the data about the parameters; `None` where they are not compared.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub parts: Option<ComparedParts>,
     /// `true` if the noise of all outputs was found white; `None` where it is stated.
     pub white_noise: Option<bool>,
     /// Ratio of the root mean squares of residual and output, per output.
@@ -228,7 +224,6 @@ impl LikelihoodEstimate {
             parameters: (0..names.len()).map(parameter).collect(),
             covariance: &fit.information.covariance * fit.error_scale().powi(2),
             error_scale: fit.error_scale(),
-            parts: fit.parts.clone(),
             log_likelihood: fit.log_likelihood().unwrap_or(f64::NAN),
             misfit_ratio: fit.misfit_ratio,
             misfit_p_value: fit.misfit_p_value,

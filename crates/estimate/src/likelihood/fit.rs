@@ -10,14 +10,12 @@ use super::limits::{
     CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, MISFIT_SIGNIFICANCE, PLAUSIBLE,
 };
 use super::multi_start::{self, Minima, starts};
-use super::parts::{self, ComparedParts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum};
 use super::unknown_noise::{UnknownNoise, WeightedMinimum};
 use super::weights::Weights;
 use super::{LikelihoodError, NoiseSource, Settings};
-use crate::frequency_domain::Level;
 
 /// Initial values, bounds and priors of the parameters of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +43,6 @@ pub(super) struct Fit<'a, M> {
     /// Probability of a larger misfit under a correct model.
     pub(super) misfit_p_value: Option<f64>,
     pub(super) is_white: Option<bool>,
-    /// Agreement of the parts of the data; `None` where they are not compared.
-    pub(super) parts: Option<ComparedParts>,
 }
 
 /// Fits `model` to `data`.
@@ -127,10 +123,7 @@ fn with_known_noise<'a, M: ResponseModel>(
     let minima = searched(&residual, space, settings, agreeing)?;
     let minimum = minima.best().minimum.clone();
     let information = Information::new(&residual, &minimum, inflation)?;
-    let level = Level::Known { inflation, degrees_of_freedom: (2.0 * total).min(1e6) };
-    let parts = parts::compare(&residual, &minimum, &information, &level);
     Ok(Fit {
-        parts,
         model,
         data,
         space,
@@ -213,11 +206,7 @@ fn with_unknown_noise<'a, M: ResponseModel>(
         let of_weights = information.add_weight_uncertainty(data, &jacobian, &bases);
         freedom = of_weights.map_or(freedom, |of_weights| of_weights.clamp(1.0, freedom));
     }
-    let free = residual.len().saturating_sub(unknowns) as f64;
-    let level = Level::Residual { inflation: 1.0, cost: minimum.cost, free };
-    let parts = parts::compare(&residual, &minimum, &information, &level);
     Ok(Fit {
-        parts,
         model,
         data,
         space,
@@ -270,27 +259,23 @@ impl<'a, M: ResponseModel> Fit<'a, M> {
         }
     }
 
-    /// Returns the ratio of the standard errors to those of the noise alone: the larger one of the
-    /// Birge ratio, if the misfit is too large for the noise, and the scatter of the parts of the
-    /// data, if they disagree; otherwise 1.
+    /// Returns the ratio of the standard errors to those of the noise alone: the Birge ratio if the
+    /// misfit is too large for the noise, otherwise 1.
     ///
     /// # Source
-    /// Birge (1932), Physical Review 40, 207–227; Liang & Zeger (1986), Biometrika 73, 13–22.
+    /// Birge (1932), Physical Review 40, 207–227.
     pub(super) fn error_scale(&self) -> f64 {
         let is_misfit = self.misfit_p_value.is_some_and(|p_value| p_value < MISFIT_SIGNIFICANCE);
-        let of_misfit = self.misfit_ratio.filter(|_| is_misfit).map_or(1.0, f64::sqrt);
-        self.disagreement().map_or(1.0, |parts| parts.scatter).max(of_misfit).max(1.0)
-    }
-
-    fn disagreement(&self) -> Option<&ComparedParts> {
-        self.parts.as_ref().filter(|parts| parts.disagree())
+        match self.misfit_ratio.filter(|_| is_misfit) {
+            Some(ratio) => ratio.sqrt().max(1.0),
+            None => 1.0,
+        }
     }
 
     /// Returns a quantile of the error of an estimate in units of its standard error without
     /// [`Fit::error_scale`].
     pub(super) fn quantile(&self, probability: f64) -> f64 {
-        let of_parts = self.disagreement().map_or(1e6, |parts| parts.degrees_of_freedom as f64);
-        let freedom = self.degrees_of_freedom.min(of_parts).clamp(1.0, 1e6);
+        let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))
     }
 

@@ -63,13 +63,8 @@ pub(super) const CONFIRMED: usize = 2;
 /// misfit shows whether the minimum is the correct one.
 pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;
 
-/// Residual of an output, relative to the output, below which it is rounding; its parts are not
-/// compared.
-pub(super) const ROUNDING_RESIDUAL: f64 = 1e-10;
-
-/// Level of significance of the misfit of known noise, and of differences of the parts of the data,
-/// below which standard errors and intervals are scaled: a correct model has wider intervals than
-/// necessary in one of a thousand fits.
+/// Level of significance of the misfit of known noise below which standard errors and intervals are
+/// scaled by it: a correct model has wider intervals than necessary in one of a thousand fits.
 pub(super) const MISFIT_SIGNIFICANCE: f64 = 1e-3;
 
 /// Maximum share of a gradient outside the determined combinations for a determined quantity; this

@@ -12,7 +12,6 @@ mod fit;
 mod limits;
 pub mod machine;
 mod multi_start;
-mod parts;
 mod profile;
 mod residual;
 mod response_model;
@@ -27,6 +26,5 @@ pub use error::LikelihoodError;
 pub use estimate::{
     Combination, FoundMinimum, IntervalKind, LikelihoodEstimate, ParameterEstimate, PriorReport,
 };
-pub use parts::ComparedParts;
 pub use response_model::{Dimensions, LineResponse, ResponseModel};
 pub use settings::{NoiseSource, Settings};

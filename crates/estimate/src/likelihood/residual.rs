@@ -173,21 +173,6 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         jacobian.iter().all(|value| value.is_finite()).then_some(jacobian)
     }
 
-    /// Returns the residuals of each open record, and orthonormal columns that its transient explains
-    /// of them; `None` if the response does not exist.
-    pub(super) fn transient_bases(
-        &self,
-        parameters: &[f64],
-    ) -> Option<Vec<(Range<usize>, DMatrix<f64>)>> {
-        let of_line = 2 * self.outputs();
-        let open = self.data.records().iter().filter(|(_, kind)| *kind != Transient::None);
-        let basis = |(rows, kind): &(Range<usize>, Transient)| {
-            let eliminated = self.record(parameters, rows, *kind)?.eliminated?;
-            Some((of_line * rows.start..of_line * rows.end, eliminated.basis))
-        };
-        open.map(basis).collect()
-    }
-
     /// Rows of the priors.
     fn prior_rows(&self, parameters: &[f64]) -> Vec<f64> {
         let row = |prior: &PriorRow| (parameters[prior.parameter] - prior.mean) / prior.deviation;

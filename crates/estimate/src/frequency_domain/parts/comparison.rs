@@ -46,22 +46,22 @@ pub struct Difference {
 }
 
 /// Scores of the parts of a linearised fit, and their covariance in units of the noise.
-pub(crate) struct Scores<'a> {
+struct Scores<'a> {
     /// Orthonormal columns Q that the parameters explain.
-    pub(crate) basis: &'a DMatrix<f64>,
+    basis: &'a DMatrix<f64>,
     /// Change of every parameter by one of each column, parameters × columns.
-    pub(crate) root: &'a DMatrix<f64>,
+    root: &'a DMatrix<f64>,
     /// Values of the parameters, each in its unit.
-    pub(crate) values: &'a DVector<f64>,
+    values: &'a DVector<f64>,
     /// D_p Q of every part.
-    pub(crate) parts: Vec<DMatrix<f64>>,
+    parts: Vec<DMatrix<f64>>,
     /// Qᵀ D_p e, one below the other.
-    pub(crate) scores: DVector<f64>,
-    pub(crate) covariance: DMatrix<f64>,
+    scores: DVector<f64>,
+    covariance: DMatrix<f64>,
 }
 
 /// Variance of the residual in units of the noise.
-pub(crate) enum Level {
+enum Level {
     /// Variance of the stated noise, times a factor for weights that are sampled, with its degrees
     /// of freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
@@ -85,22 +85,22 @@ impl Level {
 }
 
 /// Result of [`Scores::compare`], with parts and parameters by their index.
-pub(crate) struct ScoreComparison {
-    pub(crate) ratio: f64,
-    pub(crate) degrees_of_freedom: usize,
-    pub(crate) p_value: f64,
-    pub(crate) error_scale: f64,
-    pub(crate) largest: Option<PartDifference>,
+struct ScoreComparison {
+    ratio: f64,
+    degrees_of_freedom: usize,
+    p_value: f64,
+    error_scale: f64,
+    largest: Option<PartDifference>,
 }
 
 /// Difference of one part from the others about one parameter, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PartDifference {
-    pub(crate) part: usize,
-    pub(crate) parameter: usize,
-    pub(crate) by_part: f64,
-    pub(crate) by_others: f64,
-    pub(crate) standard_error: f64,
+struct PartDifference {
+    part: usize,
+    parameter: usize,
+    by_part: f64,
+    by_others: f64,
+    standard_error: f64,
 }
 
 impl Scores<'_> {
@@ -117,7 +117,7 @@ impl Scores<'_> {
 
     /// Compares the scores with their covariance; `None` with too few residuals for an estimate of
     /// the noise.
-    pub(crate) fn compare(&self, level: &Level) -> Option<ScoreComparison> {
+    fn compare(&self, level: &Level) -> Option<ScoreComparison> {
         let (squares, rank) = whitened_square(&self.covariance, &self.scores)?;
         let degrees = rank as f64;
         let (level, of_level) = level.without(squares, rank)?;

@@ -21,7 +21,6 @@ use crate::{Estimate, Unknowns};
 use linearised::Linearised;
 
 pub use comparison::{Difference, PartsComparison};
-pub(crate) use comparison::{Level, PartDifference, ScoreComparison, Scores};
 pub use omitted::OmittedTerms;
 pub use split::{Part, Split};
 pub use terms::{OmittedTerm, Power, SampledRows};
