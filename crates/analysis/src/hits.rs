@@ -146,6 +146,8 @@ struct Struck {
 }
 
 impl Struck {
+    /// Detects the hits of a buffered record.
+    ///
     /// # Errors
     /// [`AnalysisError::Setting`] for an invalid rule, and if several forces act.
     fn from_block(held: &Block, rule: &HitRule) -> Result<Self, AnalysisError> {

@@ -45,7 +45,7 @@ pub struct Share {
 pub struct ValidationWindow {
     /// First sample, counted from 1; `None`: the first of the record.
     pub start: Option<usize>,
-    /// Number of samples; `None`: all after `start`.
+    /// Number of samples; `None`: all from `start` to the end.
     pub samples: Option<usize>,
 }
 

@@ -17,7 +17,7 @@ use crate::limits::{STRETCH_BYTES, WHOLE_BYTES};
 pub struct Window {
     /// First sample, counted from 1.
     pub start: usize,
-    /// Number of samples in one period; `None`: all samples after `start` are one window.
+    /// Number of samples in one period; `None`: all samples from `start` are one window.
     pub period: Option<usize>,
     /// Number of whole periods; `None`: as many as the record contains.
     pub periods: Option<usize>,

@@ -31,8 +31,8 @@ pub struct Request {
     pub periodic: bool,
     pub start: Start,
     pub rule: Rule,
-    /// Standard deviation of the noise on each measured channel, averaged over the periods, in its
-    /// SI unit; empty if unknown.
+    /// Standard deviation of the noise on each measured channel, after averaging over the periods,
+    /// in its SI unit; empty if unknown.
     pub noise: Vec<f64>,
     /// Number of averaged periods.
     pub averaged: usize,

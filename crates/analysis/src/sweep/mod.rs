@@ -56,11 +56,12 @@ pub struct Simulated {
 /// Callback that simulates an experiment; its error is a sentence.
 pub type Simulate<'a> = dyn Fn(&Experiment) -> Result<Simulated, String> + Sync + 'a;
 
-/// Identifies a described experiment at every setting; the machine described is the truth that
-/// errors are measured against.
+/// Identifies a described experiment at every setting; the errors are deviations from the described
+/// machine.
 ///
-/// The number of samples in a period stays; with NPI a period holds that many cycles of the natural
-/// frequency, so that the step is 2π NPI / (samples · ωn). `progress` is called after each setting.
+/// The number of samples in a period is constant. With NPI, a period contains NPI cycles of the
+/// natural frequency, so that the step is 2π NPI / (samples · ωn). `progress` is called after each
+/// setting.
 ///
 /// # Errors
 /// [`AnalysisError::NoSetting`], [`AnalysisError::EmptySweep`] if no setting gives an estimate, and
