@@ -216,16 +216,7 @@ impl SampleFit {
         let mut before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
-        // The identified modes are more specific than the warning about a force held between the
-        // samples.
-        for finding in &mut before_all {
-            if matches!(
-                finding,
-                Finding::HighestMode(HighestMode { limit: ModeLimit::BetweenSamples, .. })
-            ) {
-                *finding = fitted_step(&estimate, dt)?;
-            }
-        }
+        judge_step_by_modes(&mut before_all, &estimate, dt)?;
         let residual = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
             let extent = self.extent_of(&recorded.held);
             let [samples, fitted] =
@@ -299,6 +290,24 @@ impl SampleFit {
         }
         remarks
     }
+}
+
+/// Replaces the warning about a force held between the samples by a check of the identified modes,
+/// which are more specific.
+fn judge_step_by_modes(
+    findings: &mut [Finding],
+    estimate: &Estimate,
+    dt: f64,
+) -> Result<(), AnalysisError> {
+    for finding in findings {
+        if matches!(
+            finding,
+            Finding::HighestMode(HighestMode { limit: ModeLimit::BetweenSamples, .. })
+        ) {
+            *finding = fitted_step(estimate, dt)?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the displacements of the last two samples.

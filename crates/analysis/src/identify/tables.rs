@@ -84,13 +84,7 @@ pub fn identify_responses(
     let estimate = &of_machine;
     let system = estimate.system()?;
     let mut remarks = remarks(tables, &measured, added_decay, &fit, &of_machine, unscaled.as_ref());
-    if !checks.iter().any(|check| matches!(check.finding, Finding::Misfit(_))) {
-        remarks.extend(fit.misfit.map(|misfit| misfit.to_string()));
-    }
-    let is_left = |check: &CheckRow| check.is_conspicuous() && is_of_residual(&check.finding);
-    if checks.iter().any(is_left) && !checks.iter().any(CheckRow::is_bad) {
-        remarks.extend(resonances::surplus_of_tables(tables, how));
-    }
+    remarks.extend(fitted.residual_remarks(&checks, tables, how));
     let summary = ResponseSummary {
         files: tables.iter().map(|table| table.file.clone()).collect(),
         estimator: fit.name,
@@ -124,6 +118,25 @@ struct OfFit<'a> {
 }
 
 impl OfFit<'_> {
+    /// Returns the remarks on the residual that its `checks` do not already contain.
+    fn residual_remarks(
+        &self,
+        checks: &[CheckRow],
+        tables: &[FrequencyResponses],
+        how: &IdentifyResponses,
+    ) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if !checks.iter().any(|check| matches!(check.finding, Finding::Misfit(_))) {
+            remarks.extend(self.fit.misfit.map(|misfit| misfit.to_string()));
+        }
+        let is_residual =
+            |check: &CheckRow| check.is_conspicuous() && is_of_residual(&check.finding);
+        if checks.iter().any(is_residual) && !checks.iter().any(CheckRow::is_bad) {
+            remarks.extend(resonances::surplus_of_tables(tables, how));
+        }
+        remarks
+    }
+
     /// Returns the checks of the tables before and after the fit.
     fn checks(
         &self,
