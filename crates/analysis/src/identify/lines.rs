@@ -91,8 +91,8 @@ pub fn choose_lines(
     Ok(chosen)
 }
 
-/// Returns a warning if the forces do not drive all lines of the records, with advice; `None` if the
-/// lines were chosen, or if the forces drive all of them.
+/// Returns a warning if the forces do not drive all lines of the records, with advice; `None` if
+/// the lines were chosen, or if the forces drive all of them.
 pub(super) fn few(records: &[Windowed], choice: &LineChoice) -> Option<String> {
     if *choice != LineChoice::Driven {
         return None;

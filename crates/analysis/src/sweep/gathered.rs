@@ -16,8 +16,8 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Hold};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Steps from sample to sample by Euler's rule, as in the dissertation; the bias is proportional
-    /// to the step.
+    /// Steps from sample to sample by Euler's rule, as in the dissertation; the bias is
+    /// proportional to the step.
     Euler,
     /// Steps from sample to sample, the force held between them.
     Held,
