@@ -39,8 +39,8 @@ pub struct Reading {
     pub scales: BTreeMap<String, f64>,
     /// Factor on the memory limits for reading a file ([`mechid_io::Limits`]); `None`: 1.
     pub limits_factor: Option<usize>,
-    /// Maximum memory for the numbers of a file and their analysis, in GB; `None`: 0.27 GB and 512
-    /// bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
+    /// Maximum memory for the numbers of a file and their analysis, in units of GB; `None`: 0.27 GB
+    /// and 512 bytes for each byte of the file, 8.6 GB at most ([`crate::limits`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_gb: Option<f64>,
 }
