@@ -5,10 +5,10 @@ use nalgebra::Complex;
 
 use super::limits::{LINES_PER_CORRELATION, MAX_DISTANCES};
 
-/// Returns the correlation of a residual from line to line: real and imaginary part of Σ r̄(l) r(l
-/// + d), minus their expectation, at the distances d = `first`, `first` + 1 … in lines; `explained`
-/// are orthonormal columns that span the effect of the parameters. `None` if there are too few
-/// lines or the residual is zero.
+/// Returns the correlation of a residual from line to line: real and imaginary part of the sum of
+/// r̄(l) r(l+d), minus their expectation, at the distances d = `first`, `first` + 1 … in lines.
+/// `explained` are orthonormal columns that span the effect of the parameters. `None` if there are
+/// too few lines or the residual is zero.
 ///
 /// For given |r|, the phases of independent lines are random for any noise spectrum: this gives the
 /// variances of the products and the covariances of their squares.

@@ -5,23 +5,26 @@ use mechid_estimate::Estimate;
 use mechid_estimate::frequency_domain::{PartsOfFit, SampledRows, Split};
 use nalgebra::DMatrix;
 
-/// What a comparison of a fit with its parts and with larger models shows.
+/// Comparison of a fit with its parts and with larger models.
 #[derive(Default)]
 pub(super) struct Compared {
-    /// The findings.
+    /// Findings of both.
     pub(super) parts: Vec<Finding>,
     /// Mean square that a term left out adds to the covariance of the parameters.
     pub(super) omitted: Option<DMatrix<f64>>,
 }
 
 impl Compared {
+    /// Compares a fit with its parts and, if the samples of its rows are given (an empty list: none
+    /// are known), with larger models.
     pub(super) fn new(
         fit: &PartsOfFit<'_>,
         splits: &[(Split, RowParts)],
-        records: &[SampledRows],
+        records: Option<&[SampledRows]>,
         estimate: &Estimate,
     ) -> Self {
-        let (term, omitted) = omitted_term(fit, records, estimate).unzip();
+        let omitted = records.and_then(|records| omitted_term(fit, records, estimate));
+        let (term, omitted) = omitted.unzip();
         Self {
             parts: agreement_of_parts(fit, splits).into_iter().chain(term).collect(),
             omitted: omitted.map(|omitted| omitted.mean_square),

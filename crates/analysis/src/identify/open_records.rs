@@ -225,8 +225,9 @@ fn agreement(
             Some(SampledRows { rows, sampling: data.open_record(0)?.sampling })
         })
         .collect();
-    Ok(parts
-        .map_or_else(Compared::default, |of| Compared::new(&of, &splits, &sampled, &fit.estimate)))
+    Ok(parts.map_or_else(Compared::default, |of| {
+        Compared::new(&of, &splits, Some(&sampled), &fit.estimate)
+    }))
 }
 
 /// Rows of each record among those of all.

@@ -120,7 +120,8 @@ fn agreement(
         splits.push((Split::Rows(rows_of(&each)), RowParts::Records));
     }
     let parts = PartsOfFit::from_responses(data, &records, estimate);
-    Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, &[], estimate)))
+    Ok(parts
+        .map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, Some(&[]), estimate)))
 }
 
 /// Returns remarks on the averages of several records, and on their channels.

@@ -193,7 +193,10 @@ fn agreement(
         splits.push((Split::Rows(halves), RowParts::Halves));
     }
     let parts = PartsOfFit::new(&all, estimate, None, spectrum);
-    Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, &sampled, estimate)))
+    // Least squares of several periods ignores their noise: its residual is at no optimum of the
+    // likelihood that the score test assumes.
+    let sampled = (spectrum.is_some() || !is_stated).then_some(&sampled[..]);
+    Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, sampled, estimate)))
 }
 
 /// Returns the periods of each record, on the lines found in its force.

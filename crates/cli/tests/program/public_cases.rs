@@ -118,7 +118,8 @@ fn accelerance(response: usize, reference: usize, signs: [f64; 2]) -> Function<'
         let mass = Matrix2::from_diagonal(&M.into());
         let stiffness = (K - mass * omega.powi(2)).map(Complex::from);
         let dynamic = stiffness + C.map(|c| Complex::new(0.0, omega * c));
-        let h = -omega.powi(2) * dynamic.try_inverse().unwrap()[(response, reference)];
+        let receptance = dynamic.lu().solve(&Matrix2::identity()).unwrap();
+        let h = -omega.powi(2) * receptance[(response, reference)];
         let h = h * signs[response] * signs[reference];
         [h.re, h.im]
     });
@@ -140,8 +141,10 @@ fn a_row_is_a_column_by_reciprocity_and_a_direction_is_a_sign() {
     let home = tempfile::tempdir().unwrap();
     let home = home.path();
     let exact = |report: &Value| {
-        for (at, truth) in [(0, M[0]), (1, M[1])] {
-            let [value, _] = parameter(report, at);
+        for (name, truth) in [("m11", M[0]), ("m22", M[1])] {
+            let all = report["parameters"].as_array().unwrap();
+            let mass = all.iter().find(|one| one["name"] == name).unwrap();
+            let value = mass["value"].as_f64().unwrap();
             assert!((value / truth - 1.0).abs() < 1e-5, "{value} {truth}: {report}");
         }
     };
