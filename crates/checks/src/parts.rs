@@ -31,7 +31,8 @@ pub struct PartsAgreement {
     pub by_others: f64,
     /// Standard error of the difference by the noise alone (unit of the parameter).
     pub standard_error: f64,
-    /// Ratio of standard errors from the scatter of the parts to those from the noise (pure number).
+    /// Ratio of standard errors from the scatter of the parts to those from the noise (pure
+    /// number).
     pub scatter: f64,
     /// Number of independent differences of the parts behind that factor.
     pub degrees_of_freedom: usize,

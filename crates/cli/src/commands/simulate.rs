@@ -36,8 +36,9 @@ use crate::outcome::{Files, Outcome};
 ///                 impulse    momentum in N·s, at_s
 ///                 half-sine  peak in N, start_s, duration_s
 ///
-///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, generalised-alpha,
-///               hht-alpha, wbz-alpha, bathe, rho-infinity-bathe, matrix-exponential, runge-kutta-4)
+///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta,
+///               generalised-alpha, hht-alpha, wbz-alpha, bathe, rho-infinity-bathe,
+///               matrix-exponential, runge-kutta-4)
 ///               and its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
 ///               central-difference, {"given": {"at_dt": …, "at_2dt": …}} in m; theta, load:
 ///               projected, interpolated; rho_infinity, acceleration: equation-of-motion, carried;
@@ -48,16 +49,17 @@ use crate::outcome::{Files, Outcome};
 ///
 ///   periods     how many
 ///
-///   outputs     degrees of freedom whose response is recorded, counted from 1; without, all, and of
-///               more than 64 in sparse matrices those that a force acts on
+///   outputs     degrees of freedom whose response is recorded, counted from 1; without, all, and
+///               of more than 64 in sparse matrices those that a force acts on
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed
 ///
-/// The picture shows over time what the record holds, noise and all, of up to four degrees of freedom.
+/// The picture shows over time what the record holds, noise and all, of up to four degrees of
+/// freedom.
 ///
-/// Many runs, by --runs or --study, go into one Parquet file: its column run names the run of each row.
-/// mechid fleet identifies them all, and mechid trends shows the results.
+/// Many runs, by --runs or --study, go into one Parquet file: its column run names the run of each
+/// row. mechid fleet identifies them all, and mechid trends shows the results.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,

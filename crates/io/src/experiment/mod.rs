@@ -150,8 +150,8 @@ impl Experiment {
     }
 
     /// Returns the system in sparse matrices, if it has more than 64 degrees of freedom and Matrix
-    /// Market files or lists of entries describe it, or more than 300 and full matrices with at most
-    /// a tenth of their entries unequal to zero.
+    /// Market files or lists of entries describe it, or more than 300 and full matrices with at
+    /// most a tenth of their entries unequal to zero.
     pub fn sparse_system(&self) -> Option<&SparseSystem> {
         self.sparse.as_ref()
     }

@@ -16,8 +16,8 @@ use crate::limits::PART_INFORMS;
 pub struct PartsComparison {
     /// Number of parts.
     pub parts: usize,
-    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by noise
-    /// alone.
+    /// Mean square of the differences of the parts in units of their noise; 1 if they differ by
+    /// noise alone.
     pub ratio: f64,
     /// Number of independent differences.
     pub degrees_of_freedom: usize,
@@ -65,13 +65,14 @@ enum Level {
     /// Variance of the stated noise, times a factor for weights that are sampled, with its degrees
     /// of freedom.
     Known { inflation: f64, degrees_of_freedom: f64 },
-    /// Variance of a residual with a sum of squares and a number of free values, times such a factor.
+    /// Variance of a residual with a sum of squares and a number of free values, times such a
+    /// factor.
     Residual { inflation: f64, cost: f64, free: f64 },
 }
 
 impl Level {
-    /// Returns the variance and its degrees of freedom, after a statistic of this rank has explained
-    /// some `squares` of the residual; `None` if no residual remains.
+    /// Returns the variance and its degrees of freedom, after a statistic of this rank has
+    /// explained some `squares` of the residual; `None` if no residual remains.
     fn without(&self, squares: f64, rank: usize) -> Option<(f64, f64)> {
         let (level, of_level) = match *self {
             Self::Known { inflation, degrees_of_freedom } => (inflation, degrees_of_freedom),
@@ -133,8 +134,8 @@ impl Scores<'_> {
         })
     }
 
-    /// Returns the largest ratio of a standard error from the scatter of the scores to its value from
-    /// the noise.
+    /// Returns the largest ratio of a standard error from the scatter of the scores to its value
+    /// from the noise.
     fn largest_scatter(&self, level: f64) -> Option<f64> {
         let of_row = |row: usize| {
             let root = self.root.row(row).transpose();
@@ -186,8 +187,8 @@ impl PartDifference {
 }
 
 impl PartsOfFit<'_> {
-    /// Compares the parameters that the parts of a split determine; `None` with fewer than two parts
-    /// or too few residuals for an estimate of the noise.
+    /// Compares the parameters that the parts of a split determine; `None` with fewer than two
+    /// parts or too few residuals for an estimate of the noise.
     ///
     /// With scores s and their covariance V of rank d, sᵀV⁺s/d follows Fisher's distribution of d
     /// degrees of freedom and those of the level of the noise.

@@ -24,7 +24,7 @@ pub struct OmittedTerms {
     pub p_value: f64,
     /// Change of each parameter with that term, in the order and the unit of the parameters.
     pub changes: DVector<f64>,
-    /// Standard errors of these changes, in the order and the unit of the parameters.
+    /// Standard errors of these changes, one for each parameter, in its unit.
     pub errors: DVector<f64>,
     /// Mean square error that the terms add to the covariance of the parameters (parameters ×
     /// parameters), each weighted by its likelihood: the squares of the changes plus their
@@ -45,9 +45,9 @@ struct Explained {
 }
 
 impl PartsOfFit<'_> {
-    /// Tests terms that the model leaves out by their scores at the optimum, with the change of each
-    /// parameter to first order. `records` has the samples of the rows; without them nonlinear terms
-    /// are not tested. `None` if no term can be tested.
+    /// Tests terms that the model leaves out by their scores at the optimum, with the change of
+    /// each parameter to first order. `records` has the samples of the rows; without them
+    /// nonlinear terms are not tested. `None` if no term can be tested.
     ///
     /// C are the weighted changes of the response by a term, and Z what remains of them without the
     /// part that the parameters explain. The coefficient of the term is a = (ZᵀZ)⁻¹Zᵀe, and the
@@ -56,9 +56,9 @@ impl PartsOfFit<'_> {
     /// explain the same are weighted by their likelihoods, as in an average of models.
     ///
     /// # Source
-    /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for the
-    /// test; Buckland, Burnham & Augustin (1997), Biometrics 53, 603–618, for errors beyond one
-    /// model; Schwarz (1978), Annals of Statistics 6, 461–464, for the weights.
+    /// Rao (1948), Mathematical Proceedings of the Cambridge Philosophical Society 44, 50–57, for
+    /// the test; Buckland, Burnham & Augustin (1997), Biometrics 53, 603–618, for errors beyond
+    /// one model; Schwarz (1978), Annals of Statistics 6, 461–464, for the weights.
     pub fn omitted(&self, records: &[SampledRows]) -> Option<OmittedTerms> {
         let motion = LikelyMotion::new(self, records)?;
         let terms = motion.terms();

@@ -28,8 +28,8 @@ pub enum OmittedTerm {
     ResidualMass,
     /// Damping force in phase with the velocity that does not grow with the frequency.
     StructuralDamping,
-    /// Force that follows a power of a displacement or velocity, to the ground or between two degrees
-    /// of freedom.
+    /// Force that follows a power of a displacement or velocity, to the ground or between two
+    /// degrees of freedom.
     Nonlinear {
         /// Power of the motion.
         power: Power,
@@ -210,8 +210,8 @@ impl<'a> LikelyMotion<'a> {
         Change { force, displacement }
     }
 
-    /// Returns a power of the motion on every row, computed from sample to sample over whole records;
-    /// the effect of their ends is that of a transient.
+    /// Returns a power of the motion on every row, computed from sample to sample over whole
+    /// records; the effect of their ends is that of a transient.
     fn power_of(
         &self,
         power: Power,
