@@ -195,7 +195,8 @@ fn agreement(
     let parts = PartsOfFit::new(&all, estimate, None, spectrum);
     // Least squares of several periods ignores their noise: its residual is at no optimum of the
     // likelihood that the score test assumes.
-    let sampled = (spectrum.is_some() || !is_stated).then_some(&sampled[..]);
+    let is_one = spectra.iter().all(|(periods, _)| periods.count() == 1);
+    let sampled = (spectrum.is_some() || is_one).then_some(&sampled[..]);
     Ok(parts.map_or_else(Compared::default, |fit| Compared::new(&fit, &splits, sampled, estimate)))
 }
 
