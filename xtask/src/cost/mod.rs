@@ -57,7 +57,7 @@ pub fn write(root: &Path, seconds: f64) -> Result<(), String> {
 /// Measures the tests of a laboratory alone, and writes their table into the page of the book.
 ///
 /// # Errors
-/// As [`write`], and a page without such a table.
+/// As [`write()`], and a page without such a table.
 pub fn write_lab(root: &Path) -> Result<(), String> {
     let path = root.join("docs/book/src/choose/cost.md");
     let failed = |e: std::io::Error| format!("{}: {e}", path.display());
