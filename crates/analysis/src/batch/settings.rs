@@ -25,7 +25,7 @@ use crate::{AnalysisError, Identify, IdentifyElements, ModesSettings};
 /// let row = analysis.row("rig", || analysis.open(rig));
 /// assert_eq!(row.error, None);
 /// assert_eq!(row.parameters[0].name, "m");
-/// A record that cannot be identified gives a row, too.
+/// // A record that cannot be identified gives a row, too.
 /// let row = analysis.row("lost", || analysis.open("lost.csv"));
 /// assert_eq!(row.error.unwrap().code, "io.read");
 /// # Ok::<(), mechid_analysis::AnalysisError>(())
