@@ -289,4 +289,4 @@ pub(crate) const ACQUISITION_ROUNDS: usize = 4;
 pub(crate) const HIGH_PASS_STEP: f64 = 1e-3;
 
 /// Maximum number of changes in the sentence about an omitted term; the result has all of them.
-pub(crate) const CHANGES_TOLD: usize = 3;
+pub(crate) const LISTED_CHANGES: usize = 3;

@@ -8,7 +8,7 @@ use mechid_model::{Parameter, ResponseQuantity};
 
 use super::digits::three_digits;
 use super::finding::{Check, Finding, Names};
-use super::limits::CHANGES_TOLD;
+use super::limits::LISTED_CHANGES;
 use super::p_value::PValue;
 use super::{Subject, Verdict};
 
@@ -122,7 +122,7 @@ impl Check for TermLeftOut {
         )?;
         let mut largest: Vec<&ChangeByTerm> = self.changes.iter().collect();
         largest.sort_by(|a, b| b.in_errors.abs().total_cmp(&a.in_errors.abs()));
-        for (at, change) in largest.iter().take(CHANGES_TOLD).enumerate() {
+        for (at, change) in largest.iter().take(LISTED_CHANGES).enumerate() {
             let ChangeByTerm { parameter, by, in_errors, .. } = change;
             let unit = parameter.matrix().unit();
             let sign = if *by < 0.0 { '−' } else { '+' };

@@ -10,18 +10,6 @@ pub(crate) const DELAY_STEPS: usize = 30;
 /// Maximum number of Gauss–Newton steps of the first search.
 pub(crate) const SEARCH_STEPS: usize = 200;
 
-/// Length of the blocks of lines with one line each in the first search if the noise is unknown;
-/// the minimum is then followed in all lines. A larger block would leave narrow resonances with too
-/// few lines.
-pub(crate) const LINES_PER_SEARCHED: usize = 10;
-
-/// Minimum number of lines that are searched in: fewer cost little anyway.
-pub(crate) const SEARCHED_LINES: usize = 1024;
-
-/// Minimum number of real residuals per parameter in such a search; with fewer, minima by chance
-/// appear.
-pub(crate) const SEARCHED_PER_PARAMETER: usize = 20;
-
 /// Maximum number of Gauss–Newton steps of the searches that confirm the first one.
 pub(crate) const STEPS_MORE: usize = 60;
 

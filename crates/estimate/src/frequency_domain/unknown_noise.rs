@@ -9,23 +9,21 @@ use mechid_spectra::SpectraError;
 use mechid_spectra::noise::level::motion_level;
 use mechid_spectra::sinusoids;
 use mechid_spectra::sinusoids::Sinusoid;
-use mechid_spectra::transient;
 use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Whitened;
 use super::initial_estimates::InitialEstimates;
 use super::misfit::Misfit;
-use super::multi_start::{GlobalMinimum, Plausible, search};
+use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
 };
 use super::pulse_covariance;
 use crate::limits::{
-    COLOURED_ROUNDS, LINES_PER_SEARCHED, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST,
-    RESIDUAL_ROUNDING, SEARCHED_LINES, SEARCHED_PER_PARAMETER, SINUSOID_ROUNDS, SINUSOID_TOLERANCE,
-    WEIGHT_TOLERANCE,
+    COLOURED_ROUNDS, MAX_LEVERAGES, MAX_ROUNDS, NOISE_KEPT, NOISE_LEAST, RESIDUAL_ROUNDING,
+    SINUSOID_ROUNDS, SINUSOID_TOLERANCE, WEIGHT_TOLERANCE,
 };
 use crate::{EstimateError, Unknowns};
 
@@ -150,12 +148,8 @@ fn with_white_noise(
         let fit = match last {
             None => {
                 let starts = InitialEstimates::new(data, unknowns, &noise).with_nominal(nominal);
-                match searched_in_few_lines(data, unknowns, &levels, &starts) {
-                    Some(near) => near.followed(&mut misfit).or_else(|_| {
-                        search(&mut misfit, &starts, plausible_at_any_level(data, unknowns))
-                    })?,
-                    None => search(&mut misfit, &starts, plausible_at_any_level(data, unknowns))?,
-                }
+                let spare = spare(data, unknowns) as f64;
+                search(&mut misfit, &starts, plausible(None, spare, spare))?
             }
             Some(before) => before.followed(&mut misfit)?,
         };
@@ -178,32 +172,6 @@ fn with_white_noise(
     }
     let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
     Err(EstimateError::NotConverged { searches, steps })
-}
-
-/// Returns the sums of squares that noise of an unknown level explains.
-fn plausible_at_any_level(data: &FrequencyData, unknowns: &Unknowns) -> Plausible {
-    let spare = spare(data, unknowns) as f64;
-    plausible(None, spare, spare)
-}
-
-/// Searches from all initial estimates in the line with the strongest response of each block of
-/// lines; `None` if there are too few lines to leave some out, or no minimum.
-fn searched_in_few_lines(
-    data: &FrequencyData,
-    unknowns: &Unknowns,
-    levels: &[f64],
-    starts: &InitialEstimates<'_>,
-) -> Option<GlobalMinimum> {
-    let parameters = unknowns.independent() + transient::len(data);
-    let needed = SEARCHED_LINES.max(SEARCHED_PER_PARAMETER * parameters / (2 * data.dof()));
-    let block = (data.len() / needed).min(LINES_PER_SEARCHED);
-    if block < 2 {
-        return None;
-    }
-    let few = data.rows(&data.strongest_rows(block));
-    let noise = white_noise(&few, levels).ok()?;
-    let mut misfit = Misfit::new(&few, unknowns, &noise).ok()?;
-    search(&mut misfit, starts, plausible_at_any_level(&few, unknowns)).ok()
 }
 
 /// Fits with the spectrum of the residual of the fit before as noise; `None` if the residual is

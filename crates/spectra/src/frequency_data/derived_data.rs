@@ -1,5 +1,5 @@
 //! Data derived from other data: without the transients of open records, under a window, with a
-//! delay, of one load alone, or some of the rows.
+//! delay, or of one load alone.
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
@@ -46,44 +46,6 @@ impl FrequencyData {
             }
         }
         data
-    }
-
-    /// Returns some rows, by their indices in rising order, without the noise that was stated for
-    /// all of them: the initial estimates of a search need none.
-    #[must_use]
-    pub fn rows(&self, rows: &[usize]) -> Self {
-        Self {
-            omega: rows.iter().map(|row| self.omega[*row]).collect(),
-            force: self.force.select_rows(rows),
-            displacement: self.displacement.select_rows(rows),
-            measured: self.measured,
-            noise: None,
-            force_variance: self.force_variance.select_rows(rows),
-            transient: self.transient.select_rows(rows),
-            open: self.open.clone(),
-            pulses: Vec::new(),
-        }
-    }
-
-    /// Returns the index of the row of the strongest response among each `block` neighbouring rows,
-    /// the mean power of every channel being 1: narrow resonances are kept.
-    pub fn strongest_rows(&self, block: usize) -> Vec<usize> {
-        let scale = |row: usize| self.measured.per_displacement(self.omega[row]).norm_sqr();
-        let power =
-            |row: usize, channel: usize| scale(row) * self.displacement[(row, channel)].norm_sqr();
-        let mean = |channel: usize| {
-            let sum: f64 = (0..self.len()).map(|row| power(row, channel)).sum();
-            (sum / self.len() as f64).max(f64::MIN_POSITIVE)
-        };
-        let means: Vec<f64> = (0..self.dof()).map(mean).collect();
-        let strength = |row: usize| -> f64 {
-            means.iter().enumerate().map(|(channel, mean)| power(row, channel) / mean).sum()
-        };
-        let strongest = |first: usize| {
-            let rows = first..(first + block).min(self.len());
-            rows.map(|row| (strength(row), row)).max_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        (0..self.len()).step_by(block.max(1)).filter_map(strongest).map(|(_, row)| row).collect()
     }
 
     /// Returns the same data with other displacements (m), rows × n.
