@@ -57,8 +57,12 @@ pub(crate) const GRAM_DEPENDENT: f64 = 1e-14;
 /// regressors still have a triangular factor.
 pub(crate) const GRAM_RIDGE: f64 = 1e-7;
 
-/// Number of lines whose products are in memory at a time.
+/// Number of lines whose products are in memory at a time, on each thread.
 pub(crate) const GRAM_LINES: usize = 256;
+
+/// Minimum number of lines that one thread computes at a time: with fewer, sharing them costs more
+/// than it saves.
+pub(crate) const LINES_AT_ONCE: usize = 64;
 
 /// Maximum number of Lanczos steps; after as many, an extreme eigenvalue is accurate to many
 /// digits.

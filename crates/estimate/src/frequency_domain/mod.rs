@@ -50,6 +50,7 @@ mod equation_error;
 mod initial_estimates;
 mod instrumental;
 mod likelihood_ratio;
+mod line;
 mod misfit;
 mod multi_start;
 mod normal_equations;

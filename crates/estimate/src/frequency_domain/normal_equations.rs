@@ -1,6 +1,7 @@
 //! Normal equations of a Jacobian with Kronecker products as rows, in coordinates with a small
 //! condition number.
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use mechid_model::Matrix;
@@ -9,6 +10,7 @@ use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_spectra::transient;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::Unknowns;
 use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_LINES, GRAM_RIDGE};
@@ -206,29 +208,37 @@ impl Layout {
 
     /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
     fn products(&self, factors: &Factors) -> DMatrix<f64> {
+        let lines = factors.weights.nrows() / 2;
+        let starts: Vec<usize> = (0..lines).step_by(GRAM_LINES).collect();
+        let parts = starts
+            .into_par_iter()
+            .map(|start| self.products_of_lines(factors, start..lines.min(start + GRAM_LINES)));
+        // The sum has one order, whatever the number of threads.
+        let parts: Vec<DMatrix<f64>> = parts.collect();
+        let pairs = self.columns.len() * (self.columns.len() + 1) / 2;
+        parts.into_iter().fold(DMatrix::zeros(pairs, self.dof * self.dof), |sum, part| sum + part)
+    }
+
+    fn products_of_lines(&self, factors: &Factors, range: Range<usize>) -> DMatrix<f64> {
         let (q, lines) = (self.columns.len(), factors.weights.nrows() / 2);
         let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
-        let mut pairs = DMatrix::zeros(sums.nrows(), GRAM_LINES.min(lines));
-        for start in (0..lines).step_by(GRAM_LINES) {
-            let len = GRAM_LINES.min(lines - start);
-            for imaginary in [false, true] {
-                for (at, mut column) in pairs.columns_mut(0, len).column_iter_mut().enumerate() {
-                    let re = factors.regressors.column(start + at);
-                    let im = factors.regressors.column(lines + start + at);
-                    let mut next = column.iter_mut();
-                    for b in 0..q {
-                        for (a, to) in (0..=b).zip(&mut next) {
-                            *to = if imaginary {
-                                2.0 * (im[a] * re[b] - re[a] * im[b])
-                            } else {
-                                2.0 * (re[a] * re[b] + im[a] * im[b])
-                            };
-                        }
+        let mut pairs = DMatrix::zeros(sums.nrows(), range.len());
+        for imaginary in [false, true] {
+            for (line, mut column) in range.clone().zip(pairs.column_iter_mut()) {
+                let re = &factors.regressors.as_slice()[q * line..q * (line + 1)];
+                let im = &factors.regressors.as_slice()[q * (lines + line)..][..q];
+                let mut rest = column.as_mut_slice();
+                for b in 0..q {
+                    let (pairs_of_b, next) = rest.split_at_mut(b + 1);
+                    let (re_b, im_b) = (2.0 * re[b], 2.0 * im[b]);
+                    for ((to, re), im) in pairs_of_b.iter_mut().zip(re).zip(im) {
+                        *to = if imaginary { im * re_b - re * im_b } else { re * re_b + im * im_b };
                     }
+                    rest = next;
                 }
-                let first = if imaginary { lines + start } else { start };
-                sums.gemm(1.0, &pairs.columns(0, len), &factors.weights.rows(first, len), 1.0);
             }
+            let first = if imaginary { lines + range.start } else { range.start };
+            sums.gemm(1.0, &pairs, &factors.weights.rows(first, range.len()), 1.0);
         }
         sums
     }

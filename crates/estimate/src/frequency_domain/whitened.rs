@@ -4,6 +4,7 @@ use mechid_model::{Parameter, SecondOrderSystem};
 use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::line::{Line, noisy_forces};
 use crate::Unknowns;
 use crate::relations::Relations;
 
@@ -65,9 +66,11 @@ impl Whitened {
         covariance: impl Fn(usize) -> &'a ComplexMatrix,
     ) -> Option<ComplexMatrix> {
         let mut likely = ComplexMatrix::zeros(data.len(), data.dof());
+        let matrices = [system.mass(), system.damping(), system.stiffness()].map(Clone::clone);
+        let mut line = Line::new(data.dof());
         for row in 0..data.len() {
-            let line = Line::new(system, data, row, covariance(row))?;
-            likely.row_mut(row).copy_from(&line.likely_displacement.transpose());
+            whiten(&mut line, &matrices, data, row, covariance(row))?;
+            likely.row_mut(row).tr_copy_from(line.likely_displacement());
         }
         Some(likely)
     }
@@ -80,21 +83,17 @@ impl Whitened {
         covariance: impl Fn(usize) -> ComplexMatrix,
     ) -> Option<Self> {
         let n = data.dof();
-        let [mass, damping, stiffness] = unknowns.assemble(values.as_slice());
-        let system = SecondOrderSystem::new(mass, damping, stiffness).ok()?;
+        let matrices = unknowns.assemble(values.as_slice());
         let mut residual = DVector::zeros(2 * n * data.len());
         let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());
+        let mut line = Line::new(n);
         for (row, &omega) in data.omega().iter().enumerate() {
-            let mut line = Line::new(&system, data, row, &covariance(row))?;
+            whiten(&mut line, &matrices, data, row, &covariance(row))?;
             let at = 2 * n * row..2 * n * (row + 1);
-            write_real(&line.residual, &mut residual.as_mut_slice()[at.clone()]);
-            if parameters.is_empty() {
-                continue;
-            }
-            line.whiten_receptance()?;
+            write_real(line.white().iter().copied(), &mut residual.as_mut_slice()[at.clone()]);
             for (parameter, mut column) in parameters.iter().zip(sensitivity.column_iter_mut()) {
-                let derivative = line.derivative(parameter, omega);
-                write_real(&derivative, &mut column.as_mut_slice()[at.clone()]);
+                let derivative = derivative(&line, parameter, omega);
+                write_real(derivative, &mut column.as_mut_slice()[at.clone()]);
             }
         }
         let finite = residual.iter().chain(sensitivity.iter()).all(|value| value.is_finite());
@@ -102,73 +101,34 @@ impl Whitened {
     }
 }
 
-/// Weighted residual and receptance of one line.
-struct Line {
-    /// Lower triangular factor L of the covariance.
-    lower: ComplexMatrix,
-    /// Weighted residual L⁻¹(X − G F).
-    residual: DVector<Complex<f64>>,
-    /// Receptance G or, after whitening, L⁻¹G.
-    receptance: ComplexMatrix,
-    /// Displacement G F̂ under the most likely force F̂, given its noise and the displacement.
-    likely_displacement: DVector<Complex<f64>>,
+/// Computes the weighted residual and receptance of one line; `None` if they do not exist.
+fn whiten(
+    line: &mut Line,
+    matrices: &[DMatrix<f64>; 3],
+    data: &FrequencyData,
+    row: usize,
+    covariance: &ComplexMatrix,
+) -> Option<()> {
+    let noisy: Vec<usize> = noisy_forces(covariance).collect();
+    let (force, displacement) = (data.force().row(row), data.displacement().row(row));
+    let exists = line.model(matrices, data.omega()[row], force.iter())
+        && line.whiten_both(displacement.iter(), covariance, &noisy);
+    exists.then_some(())
 }
 
-impl Line {
-    fn new(
-        system: &SecondOrderSystem,
-        data: &FrequencyData,
-        row: usize,
-        covariance: &ComplexMatrix,
-    ) -> Option<Self> {
-        let n = data.dof();
-        let receptance = system.receptance(data.omega()[row]).ok()?;
-        let block = |i: usize, j: usize| covariance.view((i * n, j * n), (n, n));
-        let force = data.force().row(row).transpose();
-        let modelled = &receptance * &force;
-        let mut residual = data.displacement().row(row).transpose() - &modelled;
-        // An exact force is the most likely one.
-        let is_exact = covariance.columns(n, n).iter().all(|entry| *entry == Complex::ZERO);
-        if is_exact {
-            let lower = cholesky(block(0, 0).into_owned())?;
-            lower.solve_lower_triangular_mut(&mut residual).then_some(())?;
-            return Some(Self { lower, residual, receptance, likely_displacement: modelled });
-        }
-        let adjoint = receptance.adjoint();
-        let cross = block(1, 0) - block(1, 1) * &adjoint;
-        let total = block(0, 0) - block(0, 1) * &adjoint - &receptance * &cross;
-        let lower = cholesky(total)?;
-        lower.solve_lower_triangular_mut(&mut residual).then_some(())?;
-        let mut twice = residual.clone();
-        lower.ad_solve_lower_triangular_mut(&mut twice).then_some(())?;
-        let likely_displacement = &receptance * (force - cross * twice);
-        Some(Self { lower, residual, receptance, likely_displacement })
-    }
-
-    /// Replaces G by L⁻¹G.
-    fn whiten_receptance(&mut self) -> Option<()> {
-        self.lower.solve_lower_triangular_mut(&mut self.receptance).then_some(())
-    }
-
-    /// Returns the derivative −L⁻¹G E_ij X̂ (iω)^p of −L⁻¹(X − G F̂) with respect to an entry (i,
-    /// j).
-    fn derivative(&self, parameter: &Parameter, omega: f64) -> DVector<Complex<f64>> {
-        let power = -Complex::new(0.0, omega).powu(2 - parameter.matrix() as u32);
-        let factor = power * self.likely_displacement[parameter.column()];
-        self.receptance.column(parameter.row()) * factor
-    }
+/// Returns the derivative −L⁻¹G E_ij X̂ (iω)^p of −L⁻¹(X − G F̂) with respect to an entry (i, j).
+fn derivative(
+    line: &Line,
+    parameter: &Parameter,
+    omega: f64,
+) -> impl Iterator<Item = Complex<f64>> {
+    let power = -Complex::new(0.0, omega).powu(2 - parameter.matrix() as u32);
+    let factor = power * line.likely_displacement()[parameter.column()];
+    line.white_receptance().column(parameter.row()).into_iter().map(move |g| g * factor)
 }
 
-/// Returns L of a Hermitian positive definite matrix L Lᴴ, `None` for any other matrix.
-fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
-    // nalgebra does not reject negative pivots but computes their complex roots.
-    let lower = matrix.cholesky()?.unpack();
-    let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
-    lower.diagonal().iter().all(positive).then_some(lower)
-}
-
-fn write_real(white: &DVector<Complex<f64>>, part: &mut [f64]) {
-    for (z, pair) in white.iter().zip(part.chunks_exact_mut(2)) {
+fn write_real(white: impl Iterator<Item = Complex<f64>>, part: &mut [f64]) {
+    for (z, pair) in white.zip(part.chunks_exact_mut(2)) {
         pair[0] = std::f64::consts::SQRT_2 * z.re;
         pair[1] = std::f64::consts::SQRT_2 * z.im;
     }

@@ -1,8 +1,9 @@
 //! Difference of measured and modelled displacement, in units of the noise.
 
-mod row;
 #[cfg(test)]
 mod tests;
+
+use std::collections::BTreeSet;
 
 use mechid_numerics::cholesky::Cholesky;
 use mechid_numerics::gauss_newton::SumOfSquares;
@@ -10,12 +11,14 @@ use mechid_signal::{Sampling, noise};
 use mechid_spectra::transient::{self, TransientLoad, powers};
 use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 
+use super::line::{Line, lower_factor, noisy_forces};
 use super::normal_equations::{Factors, Layout, NormalEquations};
 use super::search::Restartable;
+use crate::limits::LINES_AT_ONCE;
 use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
-use row::Row;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 type ComplexVector = DVector<Complex<f64>>;
@@ -24,8 +27,8 @@ type ComplexVector = DVector<Complex<f64>>;
 enum Noise<'a> {
     /// Exact force; the factor L of the covariance L Lᴴ of the displacement.
     Output(Vec<ComplexMatrix>),
-    /// Noisy force and displacement.
-    Both(&'a NoiseSpectrum),
+    /// Noisy force and displacement, and the forces that have noise at any line.
+    Both(&'a NoiseSpectrum, Vec<usize>),
 }
 
 /// Sum of squares of the weighted errors e = X − G(ω) F of every row, with G = (K + iωC − ω²M)⁻¹:
@@ -58,9 +61,9 @@ pub(super) struct Misfit<'a> {
     /// Independent unknowns of the last trial.
     tried_at: DVector<f64>,
     /// All rows at the parameters last accepted.
-    rows: Vec<Row>,
+    rows: Vec<Line>,
     /// All rows at the parameters of the last trial.
-    tried: Vec<Row>,
+    tried: Vec<Line>,
     /// Orthonormal regressors X̂ s^p at the parameters last accepted.
     regressors: DMatrix<f64>,
     /// Weight of each row; 1 except in the restarts of a search.
@@ -77,11 +80,12 @@ impl<'a> Misfit<'a> {
         noise: &'a NoiseSpectrum,
     ) -> Result<Self, EstimateError> {
         let noise = if noise.has_force() {
-            Noise::Both(noise)
+            let forces = (0..data.len()).flat_map(|row| noisy_forces(noise.covariance(row)));
+            Noise::Both(noise, BTreeSet::from_iter(forces).into_iter().collect())
         } else {
             Noise::Output(output_weights(noise)?)
         };
-        let rows = vec![Row::new(data.dof()); data.len()];
+        let rows = vec![Line::new(data.dof()); data.len()];
         Ok(Self {
             data,
             unknowns,
@@ -157,22 +161,23 @@ impl<'a> Misfit<'a> {
                 ends.subtract(at, force.as_mut_slice());
             }
         }
-        let mut cost = 0.0;
-        for (at, row) in self.tried.iter_mut().enumerate() {
-            let (force, displacement) = (self.force.column(at), self.displacement.column(at));
-            let exists = row.model(&matrices, self.data.omega()[at], force)
-                && match &self.noise {
-                    Noise::Output(lower) => row.whiten(displacement, &lower[at]),
-                    Noise::Both(noise) => {
-                        row.whiten_both(displacement, force, noise.covariance(at))
-                    }
-                };
-            if !exists {
-                return None;
-            }
-            row.scale(self.shares[at].sqrt());
-            cost += 2.0 * row.white().norm_squared();
-        }
+        let Self { data, noise, force, displacement, shares, tried, .. } = self;
+        let costs =
+            tried.par_iter_mut().with_min_len(LINES_AT_ONCE).enumerate().map(|(at, row)| {
+                let (force, displacement) = (force.column(at), displacement.column(at));
+                let exists = row.model(&matrices, data.omega()[at], force.iter())
+                    && match &*noise {
+                        Noise::Output(lower) => row.whiten(displacement.iter(), &lower[at]),
+                        Noise::Both(noise, noisy) => {
+                            row.whiten_both(displacement.iter(), noise.covariance(at), noisy)
+                        }
+                    };
+                row.scale(shares[at].sqrt());
+                exists.then(|| 2.0 * row.white().norm_squared())
+            });
+        // The sum has one order, whatever the number of threads.
+        let costs: Vec<Option<f64>> = costs.collect();
+        let cost: f64 = costs.into_iter().sum::<Option<f64>>()?;
         cost.is_finite().then_some(cost)
     }
 
@@ -294,14 +299,6 @@ impl Restartable for Misfit<'_> {
     }
 }
 
-/// Returns L of a Hermitian positive definite matrix L Lᴴ, `None` for any other matrix.
-fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
-    // nalgebra does not reject negative pivots but computes their complex roots.
-    let lower = matrix.cholesky()?.unpack();
-    let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
-    lower.diagonal().iter().all(positive).then_some(lower)
-}
-
 /// Returns the factor L of the displacement part of every covariance.
 fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateError> {
     let n = noise.dof();
@@ -311,7 +308,7 @@ fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateE
         .enumerate()
         .map(|(row, &omega)| {
             let covariance = noise.covariance(row).view((0, 0), (n, n)).into_owned();
-            cholesky(covariance)
+            lower_factor(covariance)
                 .ok_or(EstimateError::SingularNoise { frequency_hz: omega / std::f64::consts::TAU })
         })
         .collect()

@@ -1,12 +1,17 @@
 //! One spectral line at one set of parameters, in reusable buffers.
 
-use nalgebra::{Complex, DMatrix, DVector, DVectorView};
+use nalgebra::{Complex, DMatrix, DVector};
 
-use super::{ComplexMatrix, ComplexVector, cholesky};
+type ComplexMatrix = DMatrix<Complex<f64>>;
+type ComplexVector = DVector<Complex<f64>>;
 
-/// One row of the data at one set of parameters.
+/// Residual e = X − G(ω) F of one line at one set of parameters, in units of its noise.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on
+/// maximum likelihood in errors-in-variables.
 #[derive(Clone)]
-pub(super) struct Row {
+pub(super) struct Line {
     /// Dynamic stiffness K + iωC − ω²M, overwritten by its elimination.
     dynamic: ComplexMatrix,
     /// Receptance G = (K + iωC − ω²M)⁻¹.
@@ -19,9 +24,15 @@ pub(super) struct Row {
     white_receptance: ComplexMatrix,
     /// Weighted error L⁻¹ e.
     white: ComplexVector,
+    /// Covariance L Lᴴ of e, and its factor L in the lower triangle.
+    lower: ComplexMatrix,
+    /// E[ΔF eᴴ] of the forces with noise, in its first rows.
+    cross: ComplexMatrix,
+    /// (L Lᴴ)⁻¹e.
+    twice: ComplexVector,
 }
 
-impl Row {
+impl Line {
     pub(super) fn new(n: usize) -> Self {
         let (square, vector) = (DMatrix::zeros(n, n), DVector::zeros(n));
         Self {
@@ -29,8 +40,11 @@ impl Row {
             receptance: square.clone(),
             displacement: vector.clone(),
             likely: vector.clone(),
-            white_receptance: square,
-            white: vector,
+            white_receptance: square.clone(),
+            white: vector.clone(),
+            lower: square.clone(),
+            cross: square,
+            twice: vector,
         }
     }
 
@@ -51,7 +65,7 @@ impl Row {
         &self.white_receptance
     }
 
-    /// Scales L⁻¹, which gives the row another weight.
+    /// Scales L⁻¹, which gives the line another weight.
     pub(super) fn scale(&mut self, by: f64) {
         self.white.scale_mut(by);
         self.white_receptance.scale_mut(by);
@@ -62,11 +76,11 @@ impl Row {
     }
 
     /// Computes G and G F; returns `false` if G does not exist.
-    pub(super) fn model(
+    pub(super) fn model<'f>(
         &mut self,
         [m, c, k]: &[DMatrix<f64>; 3],
         omega: f64,
-        force: DVectorView<'_, Complex<f64>>,
+        force: impl Iterator<Item = &'f Complex<f64>>,
     ) -> bool {
         for ((to, m), (c, k)) in self.dynamic.iter_mut().zip(m).zip(c.iter().zip(k)) {
             *to = Complex::new(k - omega * omega * m, omega * c);
@@ -75,47 +89,99 @@ impl Row {
         if !solve_in_place(&mut self.dynamic, &mut self.receptance) {
             return false;
         }
-        let (one, zero) = (Complex::from(1.0), Complex::from(0.0));
-        self.displacement.gemv(one, &self.receptance, &force, zero);
+        self.displacement.fill(Complex::ZERO);
+        for (column, force) in self.receptance.column_iter().zip(force) {
+            self.displacement.axpy(*force, &column, Complex::from(1.0));
+        }
         self.likely.copy_from(&self.displacement);
         self.displacement.iter().all(|z| z.is_finite())
     }
 
     /// Computes L⁻¹e and L⁻¹G for a given L; returns `false` if L is singular.
-    pub(super) fn whiten(
+    pub(super) fn whiten<'x>(
         &mut self,
-        measured: DVectorView<'_, Complex<f64>>,
+        measured: impl Iterator<Item = &'x Complex<f64>>,
         lower: &ComplexMatrix,
     ) -> bool {
-        self.white.copy_from(&measured);
-        self.white -= &self.displacement;
+        for ((to, x), modelled) in self.white.iter_mut().zip(measured).zip(&self.displacement) {
+            *to = x - modelled;
+        }
         self.white_receptance.copy_from(&self.receptance);
         lower.solve_lower_triangular_mut(&mut self.white)
             && lower.solve_lower_triangular_mut(&mut self.white_receptance)
     }
 
-    /// Whitens like [`Row::whiten`], with L from the covariance of displacements and forces, and
+    /// Whitens like [`Line::whiten`], with L from the covariance of displacements and forces, and
     /// computes the most likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
-    pub(super) fn whiten_both(
+    /// Forces that are not `noisy` have no covariance with anything.
+    pub(super) fn whiten_both<'x>(
         &mut self,
-        measured: DVectorView<'_, Complex<f64>>,
-        force: DVectorView<'_, Complex<f64>>,
+        measured: impl Iterator<Item = &'x Complex<f64>>,
         covariance: &ComplexMatrix,
+        noisy: &[usize],
     ) -> bool {
         let n = self.receptance.nrows();
-        let block = |i: usize, j: usize| covariance.view((i * n, j * n), (n, n));
-        let adjoint = self.receptance.adjoint();
-        let cross = block(1, 0) - block(1, 1) * &adjoint;
-        let total = block(0, 0) - block(0, 1) * &adjoint - &self.receptance * &cross;
-        let Some(lower) = cholesky(total) else { return false };
-        if !self.whiten(measured, &lower) {
+        let mut total = std::mem::replace(&mut self.lower, ComplexMatrix::zeros(0, 0));
+        self.write_covariance(covariance, noisy, &mut total);
+        let Some(lower) = lower_factor(total) else {
+            self.lower = ComplexMatrix::zeros(n, n);
             return false;
+        };
+        let exists = self.whiten(measured, &lower);
+        self.twice.copy_from(&self.white);
+        lower.ad_solve_lower_triangular_mut(&mut self.twice);
+        self.lower = lower;
+        for (at, &force) in noisy.iter().enumerate() {
+            let change: Complex<f64> =
+                self.cross.row(at).iter().zip(&self.twice).map(|(q, w)| q * w).sum();
+            self.likely.axpy(-change, &self.receptance.column(force), Complex::from(1.0));
         }
-        let mut whitened_twice = self.white.clone();
-        lower.ad_solve_lower_triangular_mut(&mut whitened_twice);
-        self.likely = &self.receptance * (force - cross * whitened_twice);
-        true
+        exists
     }
+
+    /// Writes Q and the lower triangle of L Lᴴ = [I −G] E[z zᴴ] [I −G]ᴴ, z = (ΔX, ΔF).
+    fn write_covariance(
+        &mut self,
+        covariance: &ComplexMatrix,
+        noisy: &[usize],
+        total: &mut ComplexMatrix,
+    ) {
+        let n = self.receptance.nrows();
+        for column in 0..n {
+            for (at, &force) in noisy.iter().enumerate() {
+                let mut cross = covariance[(n + force, column)];
+                for &other in noisy {
+                    let gain = self.receptance[(column, other)].conj();
+                    cross -= covariance[(n + force, n + other)] * gain;
+                }
+                self.cross[(at, column)] = cross;
+            }
+            for row in column..n {
+                let mut sum = covariance[(row, column)];
+                for (at, &force) in noisy.iter().enumerate() {
+                    sum -= covariance[(row, n + force)] * self.receptance[(column, force)].conj();
+                    sum -= self.receptance[(row, force)] * self.cross[(at, column)];
+                }
+                total[(row, column)] = sum;
+            }
+        }
+    }
+}
+
+/// Returns the forces that have noise in a covariance of n displacements and n forces.
+pub(super) fn noisy_forces(covariance: &ComplexMatrix) -> impl Iterator<Item = usize> {
+    let n = covariance.ncols() / 2;
+    (0..n).filter(move |force| covariance.column(n + force).iter().any(|z| *z != Complex::ZERO))
+}
+
+/// Returns L of a Hermitian positive definite matrix L Lᴴ, of which the lower triangle is given, in
+/// the lower triangle; `None` for any other matrix.
+pub(super) fn lower_factor(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
+    // nalgebra does not reject negative pivots but computes their complex roots.
+    let lower = matrix.cholesky()?.unpack_dirty();
+    let n = lower.nrows();
+    let positive = |z: Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
+    (0..n).all(|at| positive(lower[(at, at)])).then_some(lower)
 }
 
 /// Replaces B by A⁻¹B by elimination with row exchanges and overwrites A; returns `false` for a
