@@ -5,6 +5,7 @@ mod bump;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 pub(crate) use self::bump::Bump;
 use self::bump::{most_conspicuous, widths};
@@ -54,16 +55,19 @@ impl Form {
         let ends = (omega.first().copied(), omega.last().copied());
         let (least, most) = (ends.0.unwrap_or(1.0), ends.1.unwrap_or(1.0));
         let span = f64::max((most / least).ln(), f64::MIN_POSITIVE);
-        let columns = DMatrix::from_fn(omega.len(), self.terms(), |line, column| {
-            match column.checked_sub(self.order + 1) {
-                None => {
-                    // The columns of the polynomial are Chebyshev polynomials.
-                    let t = 2.0 * (omega[line] / least).ln() / span - 1.0;
-                    (column as f64 * t.clamp(-1.0, 1.0).acos()).cos()
-                }
-                Some(bump) => self.bumps[bump].at(line),
+        let mut columns = DMatrix::from_element(omega.len(), self.terms(), 1.0);
+        for (line, omega) in omega.iter().enumerate() {
+            let t = (2.0 * (omega / least).ln() / span - 1.0).clamp(-1.0, 1.0);
+            // The columns of the polynomial are Chebyshev polynomials.
+            let (mut before, mut polynomial) = (t, 1.0);
+            for column in 0..=self.order {
+                columns[(line, column)] = polynomial;
+                (before, polynomial) = (polynomial, 2.0 * t * polynomial - before);
             }
-        });
+            for (at, bump) in self.bumps.iter().enumerate() {
+                columns[(line, self.order + 1 + at)] = bump.at(line);
+            }
+        }
         columns.qr().q()
     }
 }
@@ -136,16 +140,16 @@ pub(crate) fn choose_beside(
     nu: f64,
     relative: &DMatrix<f64>,
 ) -> (Smooth, bool) {
-    let smooth = choose(omega, variances, nu);
     let log = relative.map(f64::ln);
     if !log.iter().all(|log| log.is_finite()) {
-        return (smooth, false);
+        return (choose(omega, variances, nu), false);
     }
     // A common factor has no effect; without it the numbers have the size of the variances.
     let mean = log.row_mean();
     let log = DMatrix::from_fn(log.nrows(), log.ncols(), |line, at| log[(line, at)] - mean[at]);
-    let mut relative_smooth =
-        choose(omega, &variances.zip_map(&log, |v, log| v * (-log).exp()), nu);
+    let ratios = variances.zip_map(&log, |v, log| v * (-log).exp());
+    let (smooth, mut relative_smooth) =
+        rayon::join(|| choose(omega, variances, nu), || choose(omega, &ratios, nu));
     // The logarithms of the factors have the sum zero, so that the likelihoods can be compared.
     if relative_smooth.cost >= smooth.cost {
         return (smooth, false);
@@ -166,8 +170,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
             + 2.0 * smooth.form.bumps.len() as f64 * per_place
     };
     let compared = |form: Form| fit_within(SMOOTH_COMPARED, form, omega, variances, nu);
-    let mut best: Option<(f64, Smooth)> = None;
-    for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
+    let of_order = |order: usize| {
         let mut smooth = compared(Form { order, bumps: Vec::new() });
         let mut least = cost(&smooth);
         while smooth.form.bumps.len() < MAX_BUMPS && 4 * (smooth.form.terms() + 1) <= lines {
@@ -181,10 +184,12 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
             }
             (smooth, least) = (more, now);
         }
-        if best.as_ref().is_none_or(|(before, _)| least < *before) {
-            best = Some((least, smooth));
-        }
-    }
+        (least, smooth)
+    };
+    let orders = (0..=MAX_ORDER.min(lines / LINES_PER_ORDER)).into_par_iter();
+    let of_orders: Vec<(f64, Smooth)> = orders.map(of_order).collect();
+    // Of equal costs the lower order is chosen.
+    let best = of_orders.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let white = || (f64::INFINITY, Form { order: 0, bumps: Vec::new() });
     let (cost, form) = best.map_or_else(white, |(cost, smooth)| (cost, smooth.form));
     Smooth { cost, ..fit(form, omega, variances, nu) }
@@ -250,17 +255,15 @@ fn most_likely(
     let mut ratio = DVector::zeros(variances.len());
     let mut misfit = deviance(&log_power, variances, &mut ratio);
     let tolerance = tolerance * (variances.len() as f64).sqrt();
-    let (mut next_ratio, mut weighted) = (ratio.clone(), ratio.clone());
+    let mut next_ratio = ratio.clone();
+    let (transposed, mut weighted) = (basis.transpose(), basis.clone());
     let mut information = DMatrix::zeros(basis.ncols(), basis.ncols());
     for _ in 0..SMOOTH_STEPS {
         let slope = basis.tr_mul(&ratio.add_scalar(-1.0));
-        for j in 0..basis.ncols() {
-            weighted.zip_zip_apply(&basis.column(j), &ratio, |w, own, ratio| *w = own * ratio);
-            for i in 0..=j {
-                let information_of = basis.column(i).dot(&weighted);
-                (information[(i, j)], information[(j, i)]) = (information_of, information_of);
-            }
+        for (mut column, own) in weighted.column_iter_mut().zip(basis.column_iter()) {
+            column.zip_zip_apply(&own, &ratio, |w, own, ratio| *w = own * ratio);
         }
+        information.gemm(1.0, &transposed, &weighted, 0.0);
         // The expected information, which is the identity, replaces a Hessian that is not positive
         // definite in Newton's step.
         let mut step = match information.clone().cholesky() {

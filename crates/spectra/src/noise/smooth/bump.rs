@@ -150,26 +150,34 @@ pub(super) fn most_conspicuous(
             below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
         }
     }
-    let gain_of_flat = |start: usize, width: usize| {
+    // Returns the gain of a flat bump, or `None` if it is less than `least`.
+    let gain_of_flat = |start: usize, width: usize, least: f64| {
         let (count, others) = (width as f64, (lines - width) as f64);
-        let of_channel = |channel: usize| {
+        let ratios = (0..channels).map(|channel| {
             let inside = below[(start + width, channel)] - below[(start, channel)];
             let total = below[(lines, channel)];
             let [mean, inside, other] =
                 [total / (count + others), inside / count, (total - inside) / others]
                     .map(|level: f64| level.max(SMOOTH_FLOOR));
-            if inside > other || count * nu >= QUIET_DEVIATIONS {
-                count * (mean / inside).ln() + others * (mean / other).ln()
-            } else {
-                0.0
-            }
-        };
-        (0..channels).map(of_channel).sum::<f64>()
+            let counts = inside > other || count * nu >= QUIET_DEVIATIONS;
+            if counts { [mean / inside, mean / other] } else { [1.0, 1.0] }
+        });
+        // As ln x ≤ x − 1, most bands are excluded without a logarithm.
+        let bound = |[inside, other]: [f64; 2]| count * (inside - 1.0) + others * (other - 1.0);
+        let gain = |[inside, other]: [f64; 2]| count * inside.ln() + others * other.ln();
+        let possible = ratios.clone().map(bound).sum::<f64>() >= least;
+        possible.then(|| ratios.map(gain).sum::<f64>())
     };
     let of_width = |width: usize| {
-        let starts = 0..=lines - width;
-        let best = starts.map(|start| (gain_of_flat(start, width), start));
-        best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(gain, at)| (gain, at..at + width))
+        let mut best: Option<(f64, usize)> = None;
+        for start in 0..=lines - width {
+            let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
+            best = gain_of_flat(start, width, least)
+                .filter(|gain| *gain >= least)
+                .map(|gain| (gain, start))
+                .or(best);
+        }
+        best.map(|(gain, at)| (gain, at..at + width))
     };
     let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
     flat.sort_by(|a, b| b.0.total_cmp(&a.0));
