@@ -84,6 +84,9 @@ impl TermLeftOut {
             OmittedTerm::StructuralDamping => {
                 "structural damping, a force that does not grow with the frequency,"
             }
+            OmittedTerm::KnownEntry { entry } => {
+                return write!(f, "another value of the known {entry}");
+            }
             OmittedTerm::Nonlinear { power, dof, other: None } => {
                 return write!(f, "a force with the {power} {}", name(dof));
             }
@@ -139,6 +142,9 @@ impl Check for TermLeftOut {
             }
             OmittedTerm::StructuralDamping => {
                 ": choose a narrow band (`band_hz`), in which viscous damping has the same effect"
+            }
+            OmittedTerm::KnownEntry { .. } => {
+                ": leave it free (`mass`, `structure`), or measure more degrees of freedom"
             }
             _ => ": choose a narrower band (`band_hz`), or measure more degrees of freedom",
         })

@@ -5,9 +5,11 @@ use mechid_analysis::{
     AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
 use mechid_checks::{DataPart, Finding, OmittedTerm, PartsAgreement, Power, Subject};
-use mechid_model::Matrix;
-use mechid_problems::FaultyOscillator;
+use mechid_model::{Matrix, Parameter, SecondOrderSystem};
+use mechid_problems::machines::{Support, chain};
+use mechid_problems::{FaultyOscillator, exact_harmonic_periodic};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use nalgebra::DMatrix;
 
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 const SAMPLES: usize = 2048;
@@ -160,5 +162,53 @@ fn a_term_that_the_model_leaves_out_is_named_and_counted() {
             assert!(estimated.standard_error > 0.9 * shift.by.abs(), "{found}");
             assert!(holds(&found, name, value), "{found}");
         }
+    }
+}
+
+/// Chain of three masses under a force at the first, with another damper from the first mass to the third.
+fn bridged_chain(damper: f64, seed: u64) -> (SecondOrderSystem, Measurement) {
+    let held = chain(3, Support::Held, 0.02, 1);
+    let mut damping = held.damping().clone();
+    for (row, column) in [(0, 2), (2, 0)] {
+        damping[(row, row)] += damper;
+        damping[(row, column)] -= damper;
+    }
+    let system =
+        SecondOrderSystem::new(held.mass().clone(), damping, held.stiffness().clone()).unwrap();
+    let period = Sampling::from_rate_hz(128.0, 1024).unwrap();
+    let force = noise::white(period, 1, 50.0, seed).unwrap();
+    let mut data = DMatrix::zeros(period.len(), 3);
+    data.column_mut(0).copy_from_slice(force.channel(0));
+    let force = Record::new(period, data).unwrap();
+    let response = exact_harmonic_periodic(&system, &force).unwrap();
+    let repeated = |record: &Record| record.repeated(8).unwrap();
+    let noisy = noise::add_white(
+        &repeated(response.displacement()),
+        NoiseLevel::FractionOfRms(0.01),
+        seed + 1,
+    );
+    let record = Measurement::from_records(&repeated(&force), &[(KIND, &noisy.unwrap())]).unwrap();
+    (system, record.period(1024).unwrap())
+}
+
+/// An entry that the structure holds at zero is tested as other terms are.
+#[test]
+fn an_entry_that_the_structure_leaves_out_is_named_and_counted() {
+    let how = Identify { structure: "chain".parse().unwrap(), ..Identify::default() };
+    let left_out = |found: &Identified| {
+        found.checks().iter().find_map(|check| match &check.finding {
+            Finding::TermLeftOut(term) => Some(term.term),
+            _ => None,
+        })
+    };
+    let (_, right) = bridged_chain(0.0, 20);
+    let found = identify(&[right], &how).unwrap();
+    assert!(left_out(&found).is_none(), "{found}");
+    let (system, wrong) = bridged_chain(2.0, 21);
+    let found = identify(&[wrong], &how).unwrap();
+    let expected = Parameter::new(Matrix::Damping, 0, 2, 3).unwrap();
+    assert_eq!(left_out(&found), Some(OmittedTerm::KnownEntry { entry: expected }), "{found}");
+    for (name, value) in [("c11", system.damping()[(0, 0)]), ("c33", system.damping()[(2, 2)])] {
+        assert!(holds(&found, name, value), "{found}");
     }
 }

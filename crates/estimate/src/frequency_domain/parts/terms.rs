@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{Parameter, SecondOrderSystem};
 use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -28,6 +28,12 @@ pub enum OmittedTerm {
     ResidualMass,
     /// Damping force in phase with the velocity that does not grow with the frequency.
     StructuralDamping,
+    /// Another value of an entry of M, C or K that is known, such as a zero of the structure.
+    KnownEntry {
+        /// The entry.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
+        entry: Parameter,
+    },
     /// Force that follows a power of a displacement or velocity, to the ground or between two
     /// degrees of freedom.
     Nonlinear {
@@ -125,6 +131,8 @@ impl<'a> LikelyMotion<'a> {
         let (n, rows) = (self.fit.data.dof(), self.fit.data.len());
         let mut all = vec![OmittedTerm::ResidualFlexibility, OmittedTerm::ResidualMass];
         all.extend([OmittedTerm::HiddenMass, OmittedTerm::StructuralDamping]);
+        let most = MAX_SENSITIVITIES / (2 * n * rows).max(1);
+        all.extend(self.known_entries().take(most));
         if self.records.is_empty() {
             return all;
         }
@@ -132,9 +140,19 @@ impl<'a> LikelyMotion<'a> {
             |dof, other| Power::ALL.map(|power| OmittedTerm::Nonlinear { power, dof, other });
         let to_ground = (0..n).flat_map(|dof| of_each(dof, None));
         let between = (0..n).flat_map(|dof| (dof + 1..n).flat_map(move |b| of_each(dof, Some(b))));
-        let most = MAX_SENSITIVITIES / (2 * n * rows).max(1);
         all.extend(to_ground.chain(between).take(most));
         all
+    }
+
+    /// Returns the known entries, of each symmetric pair one.
+    fn known_entries(&self) -> impl Iterator<Item = OmittedTerm> {
+        let unknowns = &self.fit.unknowns;
+        let known = Parameter::all(unknowns.dof()).filter(move |entry| {
+            let (matrix, row, column) = (entry.matrix(), entry.row(), entry.column());
+            let is_second = row > column && unknowns.is_symmetric(matrix);
+            !is_second && unknowns.fixed(matrix, row, column).is_some()
+        });
+        known.map(|entry| OmittedTerm::KnownEntry { entry })
     }
 
     /// Returns the weighted changes of the response by a term, each of unit length, one below the
@@ -180,6 +198,7 @@ impl<'a> LikelyMotion<'a> {
                 let force = &self.displacement * stiffness.transpose();
                 vec![Change { displacement: DMatrix::zeros(omega.len(), n), force }]
             }
+            OmittedTerm::KnownEntry { entry } => vec![self.by_entry(entry)],
             OmittedTerm::Nonlinear { power, dof, other } => {
                 let values = self.power_of(power, dof, other)?;
                 let ends: Vec<(usize, f64)> =
@@ -187,6 +206,22 @@ impl<'a> LikelyMotion<'a> {
                 vec![self.forced(&ends, |row| values[row])]
             }
         })
+    }
+
+    /// Returns the force of a unit of an entry, and of its equal in a symmetric matrix.
+    fn by_entry(&self, entry: Parameter) -> Change {
+        let (n, omega) = (self.fit.data.dof(), self.fit.data.omega());
+        let (row, column) = (entry.row(), entry.column());
+        let order = 2 - entry.matrix() as u32;
+        let mut force = DMatrix::zeros(omega.len(), n);
+        for (line, omega) in omega.iter().enumerate() {
+            let factor = -Complex::new(0.0, *omega).powu(order);
+            force[(line, row)] += factor * self.displacement[(line, column)];
+            if row != column && self.fit.unknowns.is_symmetric(entry.matrix()) {
+                force[(line, column)] += factor * self.displacement[(line, row)];
+            }
+        }
+        Change { displacement: DMatrix::zeros(omega.len(), n), force }
     }
 
     fn displaced(&self, response: usize, of: impl Fn(usize) -> Complex<f64>) -> Change {
@@ -241,6 +276,12 @@ impl<'a> LikelyMotion<'a> {
         }
         Some(values)
     }
+}
+
+/// Serialises an entry by its name.
+#[cfg(feature = "serde")]
+fn as_text<S: serde::Serializer>(entry: &Parameter, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(entry)
 }
 
 /// Serialises an index counted from 1.
