@@ -5,11 +5,13 @@ use std::ops::Range;
 
 use mechid_spectra::{LineData, Transient};
 use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::response_model::{LineResponse, ResponseModel};
 use super::search::LeastSquaresProblem;
 use super::transient::{self, Eliminated};
 use super::weights::{WeightedLine, Weights};
+use crate::limits::LINES_AT_ONCE;
 
 /// Normal prior of a parameter, as one row of the residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,22 +97,14 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         let reference = transient::reference(self.data, rows.clone());
         let mut residual = DVector::zeros(2 * p * rows.len());
         let mut columns = DMatrix::zeros(if unknowns > 0 { residual.len() } else { 0 }, unknowns);
+        let of_rows = rows.clone().into_par_iter().with_min_len(LINES_AT_ONCE);
+        let whitened: Option<Vec<_>> = of_rows.map(|row| self.whitened(parameters, row)).collect();
         let mut lines = Vec::with_capacity(rows.len());
-        for (at, row) in rows.clone().enumerate() {
-            let line = self.model.at(parameters, row)?;
-            let input = self.data.inputs().row(row).transpose();
-            let mut white = self.data.outputs().row(row).transpose() - line.receptance() * &input;
-            if let Some(own) = line.own_response() {
-                white -= own;
-            }
-            let weighted = self.weights.line(row, line.receptance(), |covariance| {
-                self.model.add_covariance(row, &line, &input, covariance);
-            })?;
-            weighted.lower.solve_lower_triangular_mut(&mut white).then_some(())?;
+        for (at, (line, weighted, white)) in whitened?.into_iter().enumerate() {
             let part = 2 * p * at..2 * p * (at + 1);
             write_real(white.iter(), &mut residual.as_mut_slice()[part.clone()]);
             if unknowns > 0 {
-                let omega = self.data.omega()[row];
+                let omega = self.data.omega()[rows.start + at];
                 let mut of_line = transient::columns(omega, reference, p, line.state_response());
                 weighted.lower.solve_lower_triangular_mut(&mut of_line).then_some(())?;
                 for (column, mut to) in of_line.column_iter().zip(columns.column_iter_mut()) {
@@ -131,6 +125,25 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
             eliminated,
             reference,
         })
+    }
+
+    /// Returns the response at a line, its weights, and L⁻¹e without a transient.
+    fn whitened(
+        &self,
+        parameters: &[f64],
+        row: usize,
+    ) -> Option<(M::Line<'a>, WeightedLine, DVector<Complex<f64>>)> {
+        let line = self.model.at(parameters, row)?;
+        let input = self.data.inputs().row(row).transpose();
+        let mut white = self.data.outputs().row(row).transpose() - line.receptance() * &input;
+        if let Some(own) = line.own_response() {
+            white -= own;
+        }
+        let weighted = self.weights.line(row, line.receptance(), |covariance| {
+            self.model.add_covariance(row, &line, &input, covariance);
+        })?;
+        let exists = weighted.lower.solve_lower_triangular_mut(&mut white);
+        exists.then_some((line, weighted, white))
     }
 
     /// Returns the Jacobian of the residual of one record.

@@ -22,7 +22,7 @@ pub struct Dimensions {
 /// only the responses of the model.
 pub trait ResponseModel: Sync {
     /// Response at one line and one set of parameters.
-    type Line<'a>: LineResponse
+    type Line<'a>: LineResponse + Send
     where
         Self: 'a;
 
