@@ -15,7 +15,7 @@ use nalgebra::DVector;
 
 use super::output_error_fit::{EndLoads, sampled_weight_inflation};
 use super::unknown_noise::white_noise_at;
-use crate::limits::{MAX_SENSITIVITIES, PARTS, SHARPENING_ROUNDS, SHARPENING_SETTLED};
+use crate::limits::{MAX_PARTS, PARTS, SHARPENING_ROUNDS, SHARPENING_SETTLED};
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
 use linearised::Linearised;
@@ -63,7 +63,7 @@ impl<'a> PartsOfFit<'a> {
         spectrum: Option<&'a NoiseSpectrum>,
     ) -> Option<Self> {
         let unknowns = estimate.unknowns();
-        if 2 * data.dof() * data.len() * unknowns.independent() * PARTS > MAX_SENSITIVITIES {
+        if 2 * data.dof() * data.len() * unknowns.independent() * PARTS > MAX_PARTS {
             return None;
         }
         let relations = Relations::from_unknowns(unknowns);

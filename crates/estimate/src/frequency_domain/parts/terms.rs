@@ -9,7 +9,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::PartsOfFit;
 use crate::frequency_domain::Whitened;
-use crate::limits::MAX_SENSITIVITIES;
+use crate::limits::MAX_PARTS;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
@@ -131,7 +131,7 @@ impl<'a> LikelyMotion<'a> {
         let (n, rows) = (self.fit.data.dof(), self.fit.data.len());
         let mut all = vec![OmittedTerm::ResidualFlexibility, OmittedTerm::ResidualMass];
         all.extend([OmittedTerm::HiddenMass, OmittedTerm::StructuralDamping]);
-        let most = MAX_SENSITIVITIES / (2 * n * rows).max(1);
+        let most = MAX_PARTS / (2 * n * rows).max(1);
         all.extend(self.known_entries().take(most));
         if self.records.is_empty() {
             return all;
