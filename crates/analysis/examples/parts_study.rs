@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use mechid_analysis::identify::{HitFit, OpenFit, SegmentFit, Source};
+use mechid_analysis::identify::{HitFit, KnownMass, OpenFit, SegmentFit, Source};
 use mechid_analysis::{
     AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
@@ -42,6 +42,8 @@ enum Test {
     Sweep,
     /// Eight periods of a machine whose damping is structural.
     Structural,
+    /// Eight periods of a machine whose mass is said to be known, times this factor.
+    KnownMass(f64),
 }
 
 /// Loss factor in place of viscous damping.
@@ -109,6 +111,12 @@ fn run(
             let record = measured(both.expect("a record"), seed + 50_000)?.period(PERIOD)?;
             (vec![record], Source::default())
         }
+        Test::KnownMass(factor) => {
+            let both = machine.measure(sampling(8 * PERIOD), PERIOD, 4 * PERIOD, band, seed);
+            let record = measured(both.expect("a record"), seed + 50_000)?.period(PERIOD)?;
+            let mass = KnownMass { values: vec![Some(factor * machine.mass)] };
+            return identify(&[record], &Identify { mass, ..Identify::default() });
+        }
         Test::Segments => {
             let both = machine.measure(sampling(4 * SAMPLES), 16 * SAMPLES, SAMPLES, band, seed);
             let record = measured(both.expect("a record"), seed + 50_000)?;
@@ -168,7 +176,9 @@ fn row(name: &str, test: Test, machine: &FaultyOscillator, band: f64, runs: u64)
     // Far below its frequency on its spring the hidden mass moves along.
     let mass = machine.mass + machine.hidden_mass;
     let truth = [("m", mass), ("c", machine.damping), ("k", machine.stiffness)];
-    let cells = truth.map(|(name, value)| {
+    let is_estimated =
+        |name: &str| all.first().is_some_and(|f| f.estimate().parameter(name).is_ok());
+    let cells = truth.into_iter().filter(|(name, _)| is_estimated(name)).map(|(name, value)| {
         let of = |found: &Identified| found.estimate().parameter(name).expect("a parameter");
         let share = percent(&|found| {
             let [low, high] = of(found).interval(0.95).expect("a level");
@@ -182,7 +192,7 @@ fn row(name: &str, test: Test, machine: &FaultyOscillator, band: f64, runs: u64)
         percent(&|found| scale(found) == 1.0),
         percent(&|found| found.checks().iter().any(|check| check.is_conspicuous())),
         factors.get(all.len() / 2).copied().unwrap_or(f64::NAN),
-        cells.join(" | ")
+        cells.collect::<Vec<_>>().join(" | ")
     );
     let mut terms: BTreeMap<String, usize> = BTreeMap::new();
     let named = all.iter().flat_map(|found| found.checks()).filter(|check| check.is_conspicuous());
@@ -229,6 +239,8 @@ fn main() {
         ("right: sweep", Test::Sweep, right, BAND),
         ("right: segments", Test::Segments, right, BAND),
         ("structural damping, periods", Test::Structural, right, BAND),
+        ("right: known mass, periods", Test::KnownMass(1.0), right, BAND),
+        ("known mass 2 % too large, periods", Test::KnownMass(1.02), right, BAND),
         ("stiffness drifts by 1 %, segments", Test::Segments, drifts, BAND),
         ("hardening, segments", Test::Segments, hardens, BAND),
         ("mode above the band, segments", Test::Segments, hides, 0.09),
