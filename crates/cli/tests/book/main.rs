@@ -3,9 +3,10 @@
 //!
 //! A page's `console` blocks are followed in order; a chapter and the pages nested below it in the
 //! book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book` writes
-//! the answers and pictures anew.
+//! the answers and pictures anew. Pages of the gallery are followed where their records are.
 
 mod commands;
+mod gallery;
 mod markdown;
 mod numbers;
 mod pictures;
@@ -141,6 +142,9 @@ fn commands_print_and_draw_what_the_pages_show() {
     let mut findings = Findings::default();
     for chapter in [vec![vec![root().join("README.md")]], chapters()].concat() {
         let mut session = Session::new(&root());
+        if !chapter.iter().all(|page| gallery::has_its_record(page, &session)) {
+            continue;
+        }
         for page in &chapter {
             let today = follow(page, &mut session, &mut findings);
             if bless() && today != read(page) {

@@ -9,6 +9,9 @@ use tempfile::TempDir;
 /// How the program is started where it is installed, and from a fresh clone.
 const PROGRAM: [&str; 2] = ["mechid", "cargo run --package mechid-cli --"];
 
+/// Tools of every shell that cut columns out of a text.
+const TEXT_TOOLS: [&str; 2] = ["tail ", "paste "];
+
 /// A folder with the repository's examples, and what the commands so far have left there.
 pub struct Session {
     /// Removed with the session.
@@ -50,6 +53,11 @@ impl Session {
     /// Writes a file that a page shows.
     pub fn write(&self, name: &str, text: &str) {
         fs::write(self.folder.join(name), text).unwrap();
+    }
+
+    /// Copies a file that the reader has fetched.
+    pub fn copy(&self, file: &Path) {
+        fs::copy(file, self.folder.join(file.file_name().unwrap())).unwrap();
     }
 
     /// A file that the reader would find, if it is there.
@@ -105,6 +113,12 @@ impl Session {
     }
 
     fn start(&mut self, command: &str) -> Result<String, String> {
+        if TEXT_TOOLS.iter().any(|tool| command.starts_with(tool)) {
+            let mut shell = Command::new("sh");
+            let output = shell.current_dir(&self.folder).args(["-c", command]).output().unwrap();
+            self.code = output.status.code().ok_or("killed by a signal")?;
+            return String::from_utf8(output.stdout).map_err(|error| error.to_string());
+        }
         let arguments = PROGRAM
             .iter()
             .find_map(|program| command.strip_prefix(program)?.strip_prefix(' '))
@@ -114,7 +128,7 @@ impl Session {
             .current_dir(&self.folder)
             // The width of the developer's terminal is not the reader's.
             .env_remove("COLUMNS")
-            .args(arguments.split(' '))
+            .args(shlex::split(arguments).ok_or_else(|| format!("no shell reads `{command}`"))?)
             .output()
             .unwrap();
         self.code = output.status.code().ok_or("killed by a signal")?;
