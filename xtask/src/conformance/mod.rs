@@ -5,7 +5,9 @@
 mod closed_forms;
 mod dissertation;
 mod journal_bearings;
+mod measured;
 mod page;
+mod programs;
 
 use std::path::Path;
 
@@ -91,7 +93,7 @@ impl Judge {
 pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
     let published = Published::read(root)?;
     let results = Results::compute(&published, || ())?;
-    Ok(vec![
+    let mut judges = vec![
         dissertation::estimates(&published, &results)?,
         dissertation::means(&published, &results),
         dissertation::modes(&published)?,
@@ -99,7 +101,11 @@ pub fn judges(root: &Path) -> Result<Vec<Judge>, String> {
         journal_bearings::short_bearing()?,
         closed_forms::chain()?,
         closed_forms::transient()?,
-    ])
+        programs::opensees(root)?,
+        programs::scipy(root)?,
+    ];
+    judges.extend(measured::records(root)?);
+    Ok(judges)
 }
 
 /// Writes the page into the book; where a folder is named, the page and the rows as JSON there

@@ -42,9 +42,10 @@ pub(super) fn markdown(judges: &[Judge]) -> String {
     let _ =
         writeln!(text, "| **all** | {} | {met} | {misprints} | {open} |", met + misprints + open);
     text.push_str(
-        "\nJudged elsewhere, for they need files that are not part of this repository, or thousands of seeded experiments: \
-         the [Silverbox](nonlinear.md), a measured circuit, and the coverage of all intervals ([estimators](estimators.md), \
-         [checks](checks.md), [modes](modes.md), [forces](force.md)).\n",
+        "\nMeasured records are not part of this repository. Ours about them are the numbers that the [gallery](../gallery/index.md) \
+         shows; its test compares them with the program wherever the records are, and this page is the same with and without them.\n\n\
+         Judged elsewhere, for it needs thousands of seeded experiments: the coverage of all intervals \
+         ([estimators](estimators.md), [checks](checks.md), [modes](modes.md), [forces](force.md)).\n",
     );
     for judge in judges {
         section(&mut text, judge);
