@@ -4,4 +4,5 @@ pub mod conformance;
 pub mod cost;
 pub mod drawing;
 pub mod figures;
+pub mod studies;
 pub mod thesis;

@@ -3,10 +3,11 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::{Parser, Subcommand};
 use indicatif::ProgressBar;
+use xtask::studies::{self, Plan};
 use xtask::thesis::reproduce::{self, Reproduction};
 use xtask::{conformance, cost};
 
@@ -46,6 +47,28 @@ enum Task {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
+    /// Run the studies of many seeded experiments; write their results as Parquet and the tables of
+    /// the book (short form), or all studies for a given time (long form).
+    Studies {
+        /// Compare the short form with the page of the book, without writing it.
+        #[arg(long, conflicts_with_all = ["seconds", "out"])]
+        check: bool,
+        /// Time budget of the long form, in s [default: the short form].
+        #[arg(long)]
+        seconds: Option<f64>,
+        /// First seed.
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+        /// Part of the names of the long studies to run [default: all].
+        #[arg(long, default_value = "", hide_default_value = true)]
+        only: String,
+        /// Cargo's profile for the long studies.
+        #[arg(long, default_value = "release")]
+        profile: String,
+        /// Folder of the results; the book is not written then [default: target/studies].
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
+    },
     /// Measure how time grows with degrees of freedom and samples, and write the page of the book
     /// about it (with --release, on an idle machine).
     MeasureCost {
@@ -64,6 +87,10 @@ fn main() -> ExitCode {
         Task::Conformance { check: true, .. } => conformance_compared(root),
         Task::Conformance { out, .. } => {
             conformance::write(root, out.as_deref()).map(|rows| println!("{rows} rows written"))
+        }
+        Task::Studies { check: true, seed, .. } => studies_compared(root, seed),
+        Task::Studies { seconds, seed, only, profile, out, .. } => {
+            run_studies(root, seconds, Plan { seed, budget: None, only, profile, out })
         }
         Task::MeasureCost { lab: true, .. } => cost::write_lab(root),
         Task::MeasureCost { seconds, .. } => cost::write(root, seconds),
@@ -112,6 +139,28 @@ fn conformance_compared(root: &Path) -> Result<(), String> {
             Err(format!("{} differences from the page", differences.len()))
         }
     }
+}
+
+fn run_studies(root: &Path, seconds: Option<f64>, plan: Plan) -> Result<(), String> {
+    let budget = seconds.map(Duration::try_from_secs_f64).transpose();
+    let budget = budget.map_err(|e| format!("--seconds: {e}"))?;
+    let (told, alarms) = studies::run(root, &Plan { budget, ..plan })?;
+    print!("{told}");
+    if alarms.is_empty() { Ok(()) } else { Err(alarms.join("\n")) }
+}
+
+fn studies_compared(root: &Path, seed: u64) -> Result<(), String> {
+    let all = studies::short(seed)?;
+    let coverages: Vec<_> = all.into_iter().map(|(coverage, _)| coverage).collect();
+    let mut wrong = studies::alarms(&coverages)?;
+    if seed == 0 {
+        wrong.extend(studies::differences(root, &coverages)?);
+    }
+    if wrong.is_empty() {
+        println!("{} intervals agree with the page", coverages.len() as u64 * studies::SHORT);
+        return Ok(());
+    }
+    Err(wrong.join("\n"))
 }
 
 fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {

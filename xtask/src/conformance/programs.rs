@@ -8,7 +8,8 @@ use mechid::integrate::{
     Bathe, CentralDifference, CentralDifferenceStart, GeneralisedAlpha, Houbolt, HouboltStart,
     MatrixExponential, Newmark, Scheme, WilsonLoad, WilsonTheta, integrate,
 };
-use mechid::model::{InitialState, Response, SecondOrderSystem};
+use mechid::model::linear_algebra::exponential;
+use mechid::model::{InitialState, Mode, Response, SecondOrderSystem};
 use mechid::numerics::student_interval;
 use mechid::signal::{Record, Sampling, Window};
 use mechid::spectra::frf::{Frf, FrfEstimator, Segments};
@@ -49,7 +50,7 @@ fn parsed<T: std::str::FromStr>(word: &str) -> Result<T, String> {
     word.parse().map_err(|_| format!("{word} in the values of another program"))
 }
 
-/// Forces on three masses: two sinusoids on the second, nothing at first.
+/// Forces on three masses: two sinusoids on the second, from zero on.
 fn force(sampling: Sampling) -> Result<Record, String> {
     let forces: Vec<f64> =
         sampling.times().map(|t| 30.0 * (18.0 * t).sin() + 12.0 * (47.0 * t).sin()).collect();
@@ -176,52 +177,81 @@ fn averaged() -> Result<Frf, String> {
     .map_err(words)
 }
 
-/// Eigenvalues, receptances, exact steps, quantiles, a logarithm and averaged spectra of SciPy.
-pub(super) fn scipy(root: &Path) -> Result<Judge, String> {
-    let system = machine()?;
-    let exact = response(&MatrixExponential::LINEAR, &system)?;
-    let mut modes = system.modes().map_err(words)?;
-    modes.sort_by(|a, b| a.natural_frequency().total_cmp(&b.natural_frequency()));
-    let step = (system.state_matrix() * DT).exp();
-    let generator = logarithm(&step).map_err(words)?;
-    let frf = averaged()?;
-    let part = |value: Complex<f64>, part: &str| {
-        if part.ends_with("real") { value.re } else { value.im }
-    };
-    let mut rows = Vec::new();
-    for Value { words: [what, index, of], value } in values(root, "scipy.csv")? {
-        let (ours, scale, unit) = match what.as_str() {
+/// Part of a complex number by the last word of its name.
+fn part(value: Complex<f64>, name: &str) -> f64 {
+    if name.ends_with("real") { value.re } else { value.im }
+}
+
+/// Index of a number that counts from 1.
+fn index(word: &str) -> Result<usize, String> {
+    parsed::<usize>(word)?.checked_sub(1).ok_or_else(|| format!("{word} counts from 1"))
+}
+
+/// Results of this workspace that SciPy has, too.
+struct Ours {
+    system: SecondOrderSystem,
+    modes: Vec<Mode>,
+    exact: Response,
+    generator: DMatrix<f64>,
+    frf: Frf,
+}
+
+impl Ours {
+    fn compute() -> Result<Self, String> {
+        let system = machine()?;
+        let mut modes = system.modes().map_err(words)?;
+        modes.sort_by(|a, b| a.natural_frequency().total_cmp(&b.natural_frequency()));
+        let step = exponential(&(system.state_matrix() * DT)).map_err(words)?;
+        Ok(Self {
+            modes,
+            exact: response(&MatrixExponential::LINEAR, &system)?,
+            generator: logarithm(&step).map_err(words)?,
+            frf: averaged()?,
+            system,
+        })
+    }
+
+    /// Returns a value, the size that its rounding is judged by, and its unit.
+    fn value(&self, [what, at, of]: &[String; 3]) -> Result<(f64, f64, &'static str), String> {
+        Ok(match what.as_str() {
             "eigenvalue" => {
-                let mode = modes[parsed::<usize>(&index)? - 1].eigenvalue();
-                (part(mode, &of), mode.norm(), "1/s")
+                let eigenvalue = self.modes[index(at)?].eigenvalue();
+                (part(eigenvalue, of), eigenvalue.norm(), "1/s")
             }
             "receptance" => {
-                let h = system.receptance(TAU * parsed::<f64>(&index)?).map_err(words)?;
-                let entry = h[(parsed::<usize>(&of[..1])? - 1, 0)];
-                (part(entry, &of), entry.norm(), "m/N")
+                let h = self.system.receptance(TAU * parsed::<f64>(at)?).map_err(words)?;
+                let entry = h[(index(&of[..1])?, 0)];
+                (part(entry, of), entry.norm(), "m/N")
             }
             "response" => {
-                let channel = exact.displacement().channel(parsed::<usize>(&of)? - 1);
+                let channel = self.exact.displacement().channel(index(of)?);
                 let largest = channel.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
-                (channel[parsed::<usize>(&index)?], largest, "m")
+                (channel[parsed::<usize>(at)?], largest, "m")
             }
             "student" => {
-                let interval = student_interval(0.0, 1.0, parsed(&index)?, parsed(&of)?);
-                (interval.map_err(words)?[1], value, "–")
+                let interval = student_interval(0.0, 1.0, parsed(at)?, parsed(of)?);
+                let [_, high] = interval.map_err(words)?;
+                (high, high, "–")
             }
-            "logarithm" => {
-                let at = (parsed::<usize>(&index)? - 1, parsed::<usize>(&of)? - 1);
-                (generator[at], generator.amax(), "–")
-            }
+            "logarithm" => (self.generator[(index(at)?, index(of)?)], self.generator.amax(), "–"),
             "h1" => {
-                let h = frf.response(parsed::<usize>(&index)? - 1)[(0, 0)];
-                (part(h, &of), h.norm(), "–")
+                let h = self.frf.response(index(at)?)[(0, 0)];
+                (part(h, of), h.norm(), "–")
             }
-            "coherence" => (frf.coherence()[(parsed::<usize>(&index)? - 1, 0)], 1.0, "–"),
+            "coherence" => (self.frf.coherence()[(index(at)?, 0)], 1.0, "–"),
             _ => return Err(format!("no quantity {what}")),
-        };
-        let quantity = format!("{what} {index} {of}, {unit}").replace(" , ", ", ");
-        rows.push(Row::by_formula(quantity, value, ours, 1e-11 * scale));
+        })
+    }
+}
+
+/// Eigenvalues, receptances, exact steps, quantiles, a logarithm and averaged spectra of SciPy.
+pub(super) fn scipy(root: &Path) -> Result<Judge, String> {
+    let ours = Ours::compute()?;
+    let mut rows = Vec::new();
+    for Value { words, value } in values(root, "scipy.csv")? {
+        let (computed, scale, unit) = ours.value(&words)?;
+        let quantity = format!("{}, {unit}", words.join(" ").trim_end());
+        rows.push(Row::by_formula(quantity, value, computed, 1e-11 * scale));
     }
     Ok(Judge {
         name: "SciPy: modes, responses, quantiles, spectra",

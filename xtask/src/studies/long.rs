@@ -1,0 +1,229 @@
+//! The examples that are studies, each for its share of the time.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{Plan, page, results};
+
+/// A study takes this many shares of the time at most; then it is stopped.
+const PATIENCE: u32 = 4;
+/// Time between two looks at a study that runs.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// An example that prints its tables in Markdown.
+pub(super) struct Study {
+    name: &'static str,
+    example: &'static str,
+    /// Arguments before and after the number of experiments.
+    around: [&'static [&'static str]; 2],
+    /// Experiments of the first run, by whose time the second is chosen.
+    probe: u64,
+    table: Option<Table>,
+}
+
+/// Table of the book that a study writes anew.
+struct Table {
+    page: &'static str,
+    mark: &'static str,
+    /// Experiments that the page states; fewer leave it as it is.
+    experiments: u64,
+}
+
+const fn study(name: &'static str, example: &'static str) -> Study {
+    Study { name, example, around: [&[], &[]], probe: 2, table: None }
+}
+
+const STUDIES: [Study; 11] = [
+    Study {
+        table: Some(Table {
+            page: "docs/book/src/studies/checks.md",
+            mark: "checks",
+            experiments: 1000,
+        }),
+        probe: 20,
+        ..study("checks", "checks_study")
+    },
+    study("faults", "fault_study"),
+    study("parts", "parts_study"),
+    study("random tests", "random_study"),
+    study("hammer", "hammer_study"),
+    study("bearings", "bearing_study"),
+    Study { around: [&[], &["auto"]], ..study("coloured noise", "coloured_noise_study") },
+    study("modes", "modal_study"),
+    study("decays", "decay_study"),
+    study("ambient", "ambient_study"),
+    Study { around: [&["coverage"], &[]], probe: 4, ..study("forces", "noise_study") },
+];
+
+/// Returns the studies whose names contain `only`.
+pub(super) fn chosen(only: &str) -> Result<Vec<&'static Study>, String> {
+    let chosen: Vec<&Study> = STUDIES.iter().filter(|study| study.name.contains(only)).collect();
+    if chosen.is_empty() {
+        let names: Vec<&str> = STUDIES.iter().map(|study| study.name).collect();
+        return Err(format!("no study \"{only}\"; there are {}", names.join(", ")));
+    }
+    Ok(chosen)
+}
+
+/// Runs studies in equal shares of the time; writes what each prints as text, the cells of all
+/// tables as Parquet, and the tables of the book that have enough experiments. Gives a line for
+/// each, and those that failed.
+pub(super) fn run(
+    root: &Path,
+    out: &Path,
+    plan: &Plan,
+    budget: Duration,
+) -> Result<(String, Vec<String>), String> {
+    let chosen = chosen(&plan.only)?;
+    let share = budget / chosen.len() as u32;
+    let programs = built(root, &chosen, &plan.profile)?;
+    let (mut told, mut cells, mut failed) = (String::new(), Vec::new(), Vec::new());
+    for study in chosen {
+        let (experiments, printed) = match study.run(&programs.join(study.example), share) {
+            Ok(run) => run,
+            Err(why) => {
+                failed.push(format!("{}: {why}", study.name));
+                continue;
+            }
+        };
+        let file = out.join(format!("{}.txt", study.name.replace(' ', "-")));
+        std::fs::write(&file, &printed).map_err(|e| format!("{}: {e}", file.display()))?;
+        let tables = tables(&printed);
+        tables.iter().for_each(|table| cells.extend(table.cells(study.name)));
+        let _ =
+            writeln!(told, "{}: {experiments} experiments, {} tables", study.name, tables.len());
+        if let (Some(place), Some(table)) = (&study.table, tables.first())
+            && plan.out.is_none()
+            && experiments >= place.experiments
+        {
+            page::rewrite(&root.join(place.page), place.mark, &table.text)?;
+            let _ = writeln!(told, "  written into {}", place.page);
+        }
+    }
+    results::write_cells(&out.join("studies.parquet"), &cells)?;
+    Ok((told, failed))
+}
+
+impl Study {
+    /// Returns the number of experiments of the longest run that the share allows, and its output.
+    fn run(&self, program: &Path, share: Duration) -> Result<(u64, String), String> {
+        let start = Instant::now();
+        let printed = self.printed(program, self.probe, share)?;
+        let each = start.elapsed().as_secs_f64() / self.probe as f64;
+        let left = share.saturating_sub(start.elapsed());
+        let experiments = (left.as_secs_f64() / each.max(1e-6)) as u64;
+        if experiments <= self.probe {
+            return Ok((self.probe, printed));
+        }
+        Ok((experiments, self.printed(program, experiments, share)?))
+    }
+
+    fn printed(&self, program: &Path, experiments: u64, share: Duration) -> Result<String, String> {
+        let mut command = Command::new(program);
+        command.args(self.around[0]).arg(experiments.to_string()).args(self.around[1]);
+        finished(&mut command, share * PATIENCE)
+    }
+}
+
+/// Builds the examples and returns the folder that has them.
+fn built(root: &Path, chosen: &[&Study], profile: &str) -> Result<PathBuf, String> {
+    let mut cargo = Command::new("cargo");
+    cargo.current_dir(root).args(["build", "--workspace", "--locked", "--quiet"]);
+    cargo.args(["--profile", profile]);
+    for study in chosen {
+        cargo.args(["--example", study.example]);
+    }
+    finished(&mut cargo, Duration::MAX)?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
+    // Cargo's folder of the profile dev has another name.
+    Ok(target.join(if profile == "dev" { "debug" } else { profile }).join("examples"))
+}
+
+/// Returns the output of a command; one that takes longer is stopped.
+fn finished(command: &mut Command, longest: Duration) -> Result<String, String> {
+    let words = |e: std::io::Error| e.to_string();
+    let mut child = command.stdout(Stdio::piped()).spawn().map_err(words)?;
+    let stdout = child.stdout.take();
+    let reader =
+        std::thread::spawn(move || stdout.map_or(Ok(String::new()), std::io::read_to_string));
+    let start = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().map_err(words)? {
+            break status;
+        }
+        if start.elapsed() > longest {
+            child.kill().map_err(words)?;
+            return Err(format!("stopped after {:.0} s", start.elapsed().as_secs_f64()));
+        }
+        std::thread::sleep(LOOK);
+    };
+    let printed = reader.join().map_err(|_| "its output ended".to_owned())?.map_err(words)?;
+    if status.success() { Ok(printed) } else { Err(format!("{status}")) }
+}
+
+/// A table in Markdown.
+struct Printed {
+    text: String,
+    lines: Vec<Vec<String>>,
+}
+
+/// Returns the tables of a text.
+fn tables(text: &str) -> Vec<Printed> {
+    let mut tables: Vec<Printed> = Vec::new();
+    let mut is_within = false;
+    for line in text.lines() {
+        let is_row = line.starts_with('|');
+        if is_row && !is_within {
+            tables.push(Printed { text: String::new(), lines: Vec::new() });
+        }
+        is_within = is_row;
+        if let (true, Some(table)) = (is_row, tables.last_mut()) {
+            table.text.push_str(line);
+            table.text.push('\n');
+            let inner = line.trim().trim_start_matches('|').trim_end_matches('|');
+            table.lines.push(inner.split(" | ").map(|cell| cell.trim().to_owned()).collect());
+        }
+    }
+    tables
+}
+
+impl Printed {
+    /// Study, row, column and value of all cells beside the first of each row.
+    fn cells(&self, study: &str) -> Vec<[String; 4]> {
+        let Some((header, rows)) = self.lines.split_first() else { return Vec::new() };
+        let rows = rows.iter().skip(1).filter(|row| row.len() > 1);
+        let cell =
+            |row: &str, column: &str, value: &str| [study, row, column, value].map(str::to_owned);
+        rows.flat_map(|row| {
+            header[1..].iter().zip(&row[1..]).map(|(column, value)| cell(&row[0], column, value))
+        })
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_become_cells() {
+        let text =
+            "words\n| a | b |\n|---|---|\n| one | 1.5 |\n| two |  |\n\n| c |\n|---|\n| x |\n";
+        let tables = tables(text);
+        assert_eq!(tables.len(), 2);
+        assert!(tables[0].text.starts_with("| a | b |\n|---|---|\n| one"));
+        let cells = tables[0].cells("s");
+        assert_eq!(cells[0], ["s", "one", "b", "1.5"]);
+        assert_eq!(cells[1], ["s", "two", "b", ""]);
+        assert!(tables[1].cells("s").is_empty());
+    }
+
+    #[test]
+    fn a_study_that_hangs_is_stopped() {
+        let mut hangs = Command::new("sleep");
+        let told = finished(hangs.arg("60"), Duration::from_millis(300)).unwrap_err();
+        assert!(told.starts_with("stopped after"), "{told}");
+    }
+}

@@ -1,0 +1,115 @@
+//! The page of the book, and tables between marks in other pages.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::binomial::{FALSE_ALARM, LOSS, Limits, STATED};
+use super::{Coverage, SHORT, short_power};
+
+/// Intervals that hold here and not on another processor, at most.
+const ROUNDING: u64 = 3;
+
+fn place(root: &Path) -> PathBuf {
+    root.join("docs/book/src/studies/coverage.md")
+}
+
+/// The table of coverages, in Markdown.
+pub(super) fn table(coverages: &[Coverage]) -> Result<String, String> {
+    let mut text = String::from(
+        "| Experiment | Parameter | Experiments | Hold | Hold, % | Alarm below | Wide above | Failed |\n|---|---|---|---|---|---|---|---|\n",
+    );
+    for Coverage { kind, parameter, experiments, held, failed } in coverages {
+        let limits = Limits::new(*experiments)?;
+        let _ = writeln!(
+            text,
+            "| {kind} | {parameter} | {experiments} | {held} | {:.2} | {} | {} | {failed} |",
+            100.0 * *held as f64 / *experiments as f64,
+            limits.fewest,
+            limits.most
+        );
+    }
+    Ok(text)
+}
+
+fn power_sentence() -> Result<String, String> {
+    Ok(format!(
+        "Where the intervals hold as they state, in {:.0} % of all experiments, a parameter raises an alarm with a probability of {FALSE_ALARM}. \
+         Where {:.0} % fewer hold, {SHORT} experiments notice it with a probability of {:.1} %.\n",
+        100.0 * STATED,
+        100.0 * LOSS,
+        100.0 * short_power()?
+    ))
+}
+
+/// Writes the table and the sentence about its power into the page.
+pub(super) fn write(root: &Path, coverages: &[Coverage]) -> Result<(), String> {
+    rewrite(&place(root), "coverage", &table(coverages)?)?;
+    rewrite(&place(root), "power", &power_sentence()?)
+}
+
+/// Replaces the text between the marks of a name; without marks the page is an error.
+pub(super) fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), String> {
+    let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
+    let text = std::fs::read_to_string(page).map_err(|e| words(&e))?;
+    let marked = marked(&text, name).ok_or_else(|| words(&format!("no mark {name}")))?;
+    let rewritten = format!("{}\n{content}{}", &text[..marked.start], &text[marked.end..]);
+    std::fs::write(page, rewritten).map_err(|e| words(&e))
+}
+
+/// Range between the marks `<!-- NAME -->` and `<!-- end of NAME -->`.
+pub(super) fn marked(text: &str, name: &str) -> Option<std::ops::Range<usize>> {
+    let begin = format!("<!-- {name} -->");
+    let start = text.find(&begin)? + begin.len();
+    let end = start + text[start..].find(&format!("<!-- end of {name} -->"))?;
+    Some(start..end)
+}
+
+/// Returns the differences of the committed page from these coverages.
+///
+/// # Errors
+/// The message of the file that fails.
+pub fn differences(root: &Path, coverages: &[Coverage]) -> Result<Vec<String>, String> {
+    let page = place(root);
+    let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
+    let text = std::fs::read_to_string(&page).map_err(|e| words(&e))?;
+    let between = |name| marked(&text, name).map(|range| text[range].trim().to_owned());
+    let mut differences = Vec::new();
+    if between("power").as_deref() != Some(power_sentence()?.trim()) {
+        differences.push("the sentence about the power".to_owned());
+    }
+    let committed = between("coverage").ok_or_else(|| words(&"no mark coverage"))?;
+    let rows: Vec<&str> = committed.lines().skip(2).collect();
+    if rows.len() != coverages.len() {
+        return Ok(vec![format!("{} rows, and {} computed", rows.len(), coverages.len())]);
+    }
+    for (row, Coverage { kind, parameter, experiments, held, .. }) in rows.iter().zip(coverages) {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let is_same = cells.len() == 8
+            && [cells[0], cells[1]] == [*kind, *parameter]
+            && cells[2].parse() == Ok(*experiments)
+            && cells[3].parse().is_ok_and(|committed: u64| committed.abs_diff(*held) <= ROUNDING);
+        if !is_same {
+            differences.push(format!("{row}\n{held} of {experiments} computed"));
+        }
+    }
+    Ok(differences)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_found_and_kept() {
+        let text = "a\n<!-- x -->\nold\n<!-- end of x -->\nb\n";
+        assert_eq!(&text[marked(text, "x").unwrap()], "\nold\n");
+        assert!(marked(text, "y").is_none() && marked("<!-- x -->", "x").is_none());
+        let folder = tempfile::tempdir().unwrap();
+        let page = folder.path().join("page.md");
+        std::fs::write(&page, text).unwrap();
+        rewrite(&page, "x", "new\n").unwrap();
+        let now = std::fs::read_to_string(&page).unwrap();
+        assert_eq!(now, text.replace("old", "new"));
+        assert!(rewrite(&page, "y", "").unwrap_err().ends_with("no mark y"));
+    }
+}
