@@ -44,6 +44,8 @@
 //!
 //! Settings are plain structs with defaults, which `serde` saves and reads; every result contains
 //! its settings and implements [`Display`](std::fmt::Display).
+// Feature badges on docs.rs, which sets this.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod batch;
 pub mod bearing;

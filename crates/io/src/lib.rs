@@ -15,6 +15,8 @@
 //! assert_eq!(record.channel(1), [0.002, 0.004, 0.002]);
 //! # Ok::<(), mechid_io::IoError>(())
 //! ```
+// Feature badges on docs.rs, which sets this.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod contents;
 mod covariance;

@@ -41,6 +41,8 @@
 //! | [`stability`] | comparison of time-stepping schemes |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
+// Feature badges on docs.rs, which sets this.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod excitation;
 pub mod selected_modes;

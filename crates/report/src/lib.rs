@@ -13,6 +13,8 @@
 //! assert!(svg.starts_with("<svg") && svg.contains("Hz"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+// Feature badges on docs.rs, which sets this.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod error;
 pub mod figures;
