@@ -392,6 +392,15 @@ impl Table {
         column.has_instants || time_unit::unit_of(column).is_some()
     }
 
+    /// Returns what a time column, by its index counted from 0, states about its unit, if that is
+    /// doubtful: a text that is not understood, a factor, or a unit of another quantity.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn doubtful_time_unit(&self, column: usize) -> Option<StatedUnit> {
+        time_unit::doubtful(&self.contents.columns[column])
+    }
+
     /// Returns the first column that is called time but states a unit of another quantity, with the
     /// text of that unit.
     pub fn unclear_time(&self) -> Option<(usize, String)> {

@@ -1,11 +1,23 @@
 //! Time columns and their units, identified by their names.
 
 use crate::contents::{Column, Override};
-use crate::units::{Evidence, Quantity, stated, without_unit};
+use crate::units::{Evidence, Quantity, StatedUnit, Unit, stated, without_unit};
 
 /// Names of a time column, without its unit and in lower case.
-const NAMES: [&str; 8] =
-    ["time", "t", "zeit", "timestamp", "time stamp", "time_stamp", "elapsed time", "x_value"];
+const NAMES: [&str; 12] = [
+    "time",
+    "t",
+    "zeit",
+    "timestamp",
+    "time stamp",
+    "time_stamp",
+    "elapsed time",
+    "x_value",
+    "messzeit",
+    "temps",
+    "tiempo",
+    "tempo",
+];
 
 /// Returns the unit of a time column, in s: from its name or else the line of units; seconds if
 /// neither states one. Instants of dates and clock times are always in seconds.
@@ -52,6 +64,25 @@ pub(super) fn unclear(column: &Column) -> Option<String> {
     let unclear = stated.evidence == Evidence::Unused && !is_clock(&stated.text);
     let is_another = stated.used().is_some_and(|unit| unit.quantity != Quantity::Time);
     (column.overriding.is_none() && (unclear || is_another)).then_some(stated.text)
+}
+
+/// Returns what a time column states about its unit, if that is doubtful.
+pub(super) fn doubtful(column: &Column) -> Option<StatedUnit> {
+    if column.overriding.is_some() || column.has_instants {
+        return None;
+    }
+    let stated = stated(&column.name, &column.unit, Some(Quantity::Time))?;
+    let is_time = |unit: &Unit| unit.quantity == Quantity::Time;
+    match stated.used() {
+        Some(unit) if is_time(unit) => {
+            let is_clear = stated.evidence == Evidence::Stated;
+            // The unit of a column called `s` has the factor 1.
+            let is_second = unit.in_si == 1.0 && stated.text == unit.name;
+            (!is_clear && !is_second).then_some(stated)
+        }
+        Some(_) => Some(StatedUnit { unit: None, evidence: Evidence::Unused, ..stated }),
+        None => Some(stated).filter(|stated| !is_clock(&stated.text)),
+    }
 }
 
 /// Returns whether a text is a pattern for clock times or dates, such as `hh:mm:ss.fff`, or a time

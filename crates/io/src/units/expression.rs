@@ -124,7 +124,7 @@ impl Parser<'_> {
             return Some(Power { base: inner, power: sign * self.exponent()?.unwrap_or(1) });
         }
         if let Some(rest) = self.rest.strip_prefix('1')
-            && !rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')
+            && rest.trim_start().starts_with('/')
         {
             self.rest = rest;
             return Some(Power { base: Expression::ONE, power: sign });

@@ -2,6 +2,9 @@
 
 mod expression;
 mod header;
+mod notes;
+mod plain;
+mod unit_words;
 mod vocabulary;
 mod words;
 
@@ -12,8 +15,9 @@ use mechid_model::ResponseQuantity;
 use self::expression::Expression;
 pub use self::header::{Evidence, StatedUnit};
 pub(crate) use self::header::{
-    label_notes, name_without_brackets, names_without_unit, number_and_rest, stated, without_unit,
+    label_notes, name_without_brackets, names_without_unit, stated, without_unit,
 };
+pub(crate) use self::plain::number_and_rest;
 use self::vocabulary::Dimension;
 
 /// Quantity that the numbers of a column measure.

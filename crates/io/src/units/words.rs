@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Quantity;
+use super::{Quantity, Unit};
 
 /// Words that mean a force.
 const FORCE: &[&str] = &[
@@ -20,6 +20,17 @@ const FORCE: &[&str] = &[
     "fx",
     "fy",
     "fz",
+    "effort",
+    "fuerza",
+    "carga",
+    "força",
+    "forza",
+    "carico",
+    "kracht",
+    "standardkraft",
+    "prüfkraft",
+    "zugkraft",
+    "loads",
 ];
 
 /// Words that mean a displacement.
@@ -38,10 +49,42 @@ const DISPLACEMENT: &[&str] = &[
     "stroke",
     "travel",
     "weg",
+    "auslenkung",
+    "verschiebung",
+    "standardweg",
+    "hub",
+    "abstand",
+    "traverse",
+    "crosshead",
+    "extension",
+    "déplacement",
+    "deplacement",
+    "course",
+    "desplazamiento",
+    "deslocamento",
+    "spostamento",
+    "verplaatsing",
 ];
 
 /// Words that mean a velocity.
-const VELOCITY: &[&str] = &["vel", "velo", "velocity", "speed", "vibration", "vib"];
+const VELOCITY: &[&str] = &[
+    "vel",
+    "velo",
+    "velocity",
+    "speed",
+    "vibration",
+    "vib",
+    "geschwindigkeit",
+    "schwinggeschwindigkeit",
+    "schnelle",
+    "vitesse",
+    "velocidad",
+    "velocidade",
+    "velocità",
+    "velocita",
+    "veff",
+    "vrms",
+];
 
 /// Words that mean an acceleration.
 const ACCELERATION: &[&str] = &[
@@ -56,13 +99,35 @@ const ACCELERATION: &[&str] = &[
     "ax",
     "ay",
     "az",
+    "beschl",
+    "accélération",
+    "aceleración",
+    "aceleracion",
+    "aceleração",
+    "aceleracao",
+    "accelerazione",
+    "versnelling",
 ];
 
 /// Words that mean a time.
-const TIME: &[&str] = &["time", "t", "zeit", "timestamp", "elapsed"];
+const TIME: &[&str] =
+    &["time", "t", "zeit", "timestamp", "elapsed", "temps", "tiempo", "tempo", "messzeit"];
 
 /// Words that mean a frequency.
-const FREQUENCY: &[&str] = &["frequency", "freq", "omega", "w", "f", "frequenz", "speed"];
+const FREQUENCY: &[&str] = &[
+    "frequency",
+    "freq",
+    "omega",
+    "w",
+    "f",
+    "frequenz",
+    "speed",
+    "fréquence",
+    "frequence",
+    "frecuencia",
+    "frequenza",
+    "freqüência",
+];
 
 /// Units that are also English words, symbols of other quantities or ends of names: they count as
 /// units only after the name of their quantity.
@@ -218,6 +283,14 @@ pub(super) fn is_ambiguous(unit: &str) -> bool {
     AMBIGUOUS.contains(&unit.to_lowercase().as_str())
 }
 
+/// Words that are units without a single size, or no size: tons of three kinds, decibels.
+const UNCLEAR: &[&str] = &["ton", "tons", "tn", "db", "percent", "%", "%fs"];
+
+/// Returns whether a word is a unit of a size that it does not say.
+pub(super) fn is_unclear(word: &str) -> bool {
+    UNCLEAR.contains(&word.to_lowercase().as_str())
+}
+
 /// Returns whether a word multiplies the unit after it, as `milli` does in `milli-g`.
 pub(super) fn is_prefix(word: &str) -> bool {
     PREFIXES.contains(&word.to_lowercase().as_str())
@@ -231,7 +304,7 @@ pub(super) fn is_label(text: &str) -> bool {
         let lower = word.to_lowercase();
         let stem = lower.trim_end_matches(|c: char| c.is_ascii_digit());
         let is_identifier = stem.len() < lower.len() && stem.chars().all(char::is_alphabetic);
-        is_identifier || LABELS.contains(&stem)
+        is_identifier || LABELS.contains(&stem) || quantity_word(word).is_some()
     })
 }
 
@@ -242,7 +315,11 @@ pub(super) fn split_words(name: &str) -> Vec<Range<usize>> {
     while let Some((at, c)) = chars.next() {
         let next = chars.peek().map(|(_, c)| *c);
         let is_minus = c == '-' && next.is_some_and(|c| c.is_ascii_digit());
-        let separates = c.is_whitespace() || "_,;:=.|#".contains(c) || c == '-' && !is_minus;
+        // The point of `in./s` belongs to the unit.
+        let is_abbreviation = c == '.' && next == Some('/');
+        let separates = c.is_whitespace()
+            || "_,;:=.|#\\@~→&![]<>".contains(c) && !is_abbreviation
+            || c == '-' && !is_minus;
         if separates {
             words.extend(start.take().map(|start| start..at));
         } else if start.is_none() {
@@ -250,5 +327,48 @@ pub(super) fn split_words(name: &str) -> Vec<Range<usize>> {
         }
     }
     words.extend(start.map(|start| start..name.len()));
-    words
+    words.into_iter().map(|word| without_quotes(name, word)).collect()
+}
+
+/// Returns a word without the quotation marks, asterisks and closing brackets around it.
+fn without_quotes(name: &str, word: Range<usize>) -> Range<usize> {
+    const AROUND: [char; 4] = ['*', '\'', '"', '`'];
+    let text = &name[word.clone()];
+    let inner = text.trim_matches(AROUND);
+    let inner = if inner.contains(['(', '{']) { inner } else { inner.trim_end_matches([')', '}']) };
+    if inner.is_empty() {
+        return word;
+    }
+    let start = word.start + text.len() - text.trim_start_matches(AROUND).len();
+    start..start + inner.len()
+}
+
+/// Reads words as a unit: `mm`, `m_s2`, `mm_per_s`.
+pub(super) fn joined_unit(words: &[&str]) -> Option<Unit> {
+    if let [prefix, unit] = words
+        && is_prefix(prefix)
+    {
+        return Unit::parse(&format!("{prefix}{unit}"));
+    }
+    match words {
+        [one] => Unit::parse(one),
+        ["lb" | "lbs" | "Lb", "f" | "force"] => Unit::parse("lbf"),
+        ["kg", "f" | "force"] => Unit::parse("kgf"),
+        ["g", "force"] | ["G", "Force" | "force"] => Unit::parse("gforce"),
+        [length, "per", time] => Unit::parse(&format!("{length}/{time}")),
+        [length, "per", time, "2" | "squared"] => Unit::parse(&format!("{length}/{time}^2")),
+        ["rad" | "radians", "s" | "sec"] => Unit::parse("rad/s"),
+        [length, time @ ("s" | "sec" | "s2" | "sec2" | "s^2" | "s²")] => {
+            Unit::parse(&format!("{length}/{time}"))
+        }
+        [length, time @ ("s-1" | "s^-1" | "s⁻¹" | "s-2" | "s^-2" | "s⁻²")] => {
+            Unit::parse(&format!("{length} {time}"))
+        }
+        [length, time @ ("s" | "sec"), "2"] => Unit::parse(&format!("{length}/{time}^2")),
+        _ => None,
+    }
+    .filter(|unit| {
+        let is_compound = matches!(unit.quantity, Quantity::Response(_) | Quantity::Frequency);
+        words.len() == 1 || is_compound || words[words.len() - 1].starts_with(['f', 'F'])
+    })
 }

@@ -79,7 +79,29 @@ const BRACKETED: [&str; 12] = [
     "W [unit: U]",
     "W <U>",
 ];
-const OTHER: [&str; 8] = ["W_U", "W.U", "W U", "W, U", "W / U", "W in U", "W-U", "WU"];
+const OTHER: [&str; 21] = [
+    "W_U",
+    "W.U",
+    "W U",
+    "W, U",
+    "W / U",
+    "W in U",
+    "W-U",
+    "WU",
+    "W\\U",
+    "W@U",
+    "W~U",
+    "W→U",
+    "W 'U'",
+    "W \"U\"",
+    "W *U*",
+    "W U]",
+    "W;U",
+    "W 1 - U",
+    "W en U",
+    "W (raw) U",
+    "W_Upk",
+];
 
 fn header(style: &str, word: &str, unit: &str) -> String {
     style.replace('W', "\u{1}").replace('U', unit).replace('\u{1}', word)
@@ -279,4 +301,63 @@ fn a_unit_may_stand_before_the_name_or_be_a_sign() {
     }
     // A unit of the SI before a name changes nothing.
     assert_eq!(stated_unit("N 12 left", "", Some(Quantity::Force)), None);
+}
+
+/// Judge: the definitions of the units. Languages of spreadsheets, signs of LaTeX and of a wrong encoding.
+#[test]
+fn headers_of_other_languages_and_encodings_are_read() {
+    let lbf = 0.45359237 * G;
+    for (name, quantity, factor) in [
+        ("Weg (Zoll)", Quantity::DISPLACEMENT, 0.0254),
+        ("Déplacement en millimètres", Quantity::DISPLACEMENT, 1e-3),
+        ("Desplazamiento: micras", Quantity::DISPLACEMENT, 1e-6),
+        ("Auslenkung [unité: mm]", Quantity::DISPLACEMENT, 1e-3),
+        ("Accélération en g", Quantity::ACCELERATION, G),
+        ("acc (units of g)", Quantity::ACCELERATION, G),
+        ("Beschl. - mm/(s^2)", Quantity::ACCELERATION, 1e-3),
+        ("acc [mm/sÂ²]", Quantity::ACCELERATION, 1e-3),
+        ("acc [$\\mathrm{mm/s^{2}}$]", Quantity::ACCELERATION, 1e-3),
+        ("acc_mmps2", Quantity::ACCELERATION, 1e-3),
+        ("Velocidad (mm/seg)", Quantity::VELOCITY, 1e-3),
+        ("velocity mm s−1", Quantity::VELOCITY, 1e-3),
+        ("Load (pounds force)", Quantity::Force, lbf),
+        ("Tiempo [milisegundos]", Quantity::Time, 1e-3),
+        ("Drehzahl [U/min]", Quantity::Frequency, 1.0 / 60.0),
+        ("frequency [mHz]", Quantity::Frequency, 1e-3),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Stated, "{name}");
+        assert!((stated.used().unwrap().in_si / factor - 1.0).abs() < 1e-12, "{name}");
+    }
+}
+
+/// Judge: the definitions of the units. What is not taken is in the finding with its factor.
+#[test]
+fn factors_and_lost_signs_are_reported_with_what_they_would_make() {
+    for (name, quantity, factor) in [
+        ("Force (10^3 N)", Quantity::Force, 1e3),
+        ("Force [N x 10^3]", Quantity::Force, 1e3),
+        ("F [±kN]", Quantity::Force, 1e3),
+        ("CH 1klbf", Quantity::Force, 453.59237 * G),
+        ("Disp [1e-6 m]", Quantity::DISPLACEMENT, 1e-6),
+        ("Disp (0.001\")", Quantity::DISPLACEMENT, 25.4e-6),
+        ("Disp [?m]", Quantity::DISPLACEMENT, 1e-6),
+        ("acc mm/s\u{fffd}", Quantity::ACCELERATION, 1e-3),
+        ("LDVµm/s", Quantity::VELOCITY, 1e-6),
+        ("Time [0.1 s]", Quantity::Time, 0.1),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(stated.evidence, Evidence::Unused, "{name}");
+        assert!((stated.unit.unwrap().in_si / factor - 1.0).abs() < 1e-12, "{name}");
+    }
+    for (name, quantity) in [
+        ("Force x1000 [N]", Quantity::Force),
+        ("Disp [mm] *10", Quantity::DISPLACEMENT),
+        ("Load kg", Quantity::Force),
+        ("Load tons", Quantity::Force),
+        ("Ω [1/s]", Quantity::Frequency),
+    ] {
+        let stated = stated_unit(name, "", Some(quantity)).unwrap_or_else(|| panic!("{name}"));
+        assert_ne!(stated.evidence, Evidence::Stated, "{name}");
+    }
 }

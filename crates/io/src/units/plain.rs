@@ -1,0 +1,125 @@
+//! Texts of headers with one spelling for each sign, and numbers with exponents.
+
+/// Signs of UTF-8 that were read as Latin-1, commands of LaTeX and rare signs, each with its plain
+/// spelling.
+const SPELLINGS: [(&str, &str); 18] = [
+    ("Âµ", "µ"),
+    ("Î¼", "µ"),
+    ("Â²", "²"),
+    ("Â³", "³"),
+    ("Â°", "°"),
+    ("Â·", "·"),
+    ("\\mathrm", ""),
+    ("\\text", ""),
+    ("\\rm", ""),
+    ("\\mu", "µ"),
+    ("\\cdot", "·"),
+    ("\\^", "^"),
+    ("\\,", " "),
+    ("$", ""),
+    ("−", "-"),
+    ("\u{a0}", " "),
+    ("\u{202f}", " "),
+    ("\u{3000}", " "),
+];
+
+/// Returns a text with one spelling for each sign.
+pub(super) fn with_plain_signs(text: &str) -> String {
+    let replace = |text: String, (from, to): (&str, &str)| text.replace(from, to);
+    SPELLINGS.into_iter().fold(text.to_owned(), replace)
+}
+
+/// Returns the readings of a text in which a sign was lost to a wrong encoding: `?m` and `mm/s?`.
+pub(super) fn with_restored_signs(text: &str) -> impl Iterator<Item = String> {
+    const LOST: [char; 2] = ['?', '\u{fffd}'];
+    let is_lost = text.contains(LOST);
+    ["µ", "²"].into_iter().filter(move |_| is_lost).map(|sign| text.replace(LOST, sign))
+}
+
+/// Ways to state that values are not the samples of a signal, in lower case.
+const TREATMENTS: [&str; 10] =
+    ["pk-pk", "0-pk", "pkpk", "peak", "p-p", "0-p", "rms", "pk", "pp", "eff"];
+
+/// Returns a text without the word at its end that states peaks, effective values or the like:
+/// `gRMS`, `mm_pk`, `in/s 0-pk`.
+pub(super) fn without_treatment(text: &str) -> Option<&str> {
+    let lower = text.to_lowercase();
+    let treatment = TREATMENTS.into_iter().find(|word| lower.ends_with(word))?;
+    let rest = text.get(..text.len().checked_sub(treatment.len())?)?;
+    let rest = rest.trim_end_matches(['_', '-', ' ']);
+    (!rest.is_empty()).then_some(rest)
+}
+
+/// Splits a positive number from the text after it: `0.1 mm`, `1e-3 m`, `10^3 N`.
+pub(crate) fn number_and_rest(text: &str) -> Option<(f64, &str)> {
+    let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (mantissa, rest) = text.split_at(end);
+    let power_of_ten = ["^", "**"].into_iter().find_map(|sign| rest.strip_prefix(sign));
+    let (exponent, rest) = match (mantissa, power_of_ten) {
+        ("10", Some(after)) => exponent(after)?,
+        _ => rest.strip_prefix(['e', 'E']).and_then(exponent).unwrap_or((0, rest)),
+    };
+    let mantissa = if power_of_ten.is_some() { "1" } else { mantissa };
+    let number: f64 = format!("{mantissa}e{exponent}").parse().ok()?;
+    (number > 0.0 && number.is_finite()).then(|| (number, rest.trim()))
+}
+
+/// Reads the digits of an exponent, with their sign.
+fn exponent(text: &str) -> Option<(i32, &str)> {
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    let len = unsigned.find(|c: char| !c.is_ascii_digit()).unwrap_or(unsigned.len());
+    let end = text.len() - unsigned.len() + len;
+    Some((text[..end].parse().ok().filter(|_| len > 0)?, &text[end..]))
+}
+
+/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`; `x10` may be a place.
+pub(super) fn multiplier(name: &str) -> Option<&str> {
+    let starts = name.char_indices().filter(|(_, c)| "*×xX".contains(*c));
+    starts.into_iter().find_map(|(at, sign)| {
+        let before = name[..at].chars().next_back();
+        let after = &name[at + sign.len_utf8()..];
+        let (number, _) = number_and_rest(after.trim_start())?;
+        let is_letter = "xX".contains(sign);
+        let is_word = !before.is_some_and(char::is_alphanumeric);
+        // A number behind a letter is a factor only if it cannot be the number of a point.
+        let is_factor = if is_letter {
+            is_word && number >= 100.0 && number.log10().fract() == 0.0
+        } else {
+            number != 1.0
+        };
+        is_factor.then(|| name[at..].trim())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_exponents_of_any_form() {
+        for (text, number, rest) in [
+            ("0.1 mm", 0.1, "mm"),
+            ("1e-3 m", 1e-3, "m"),
+            ("10^3 N", 1e3, "N"),
+            ("10^-6 m", 1e-6, "m"),
+            ("10**3N", 1e3, "N"),
+            ("100mV/g", 100.0, "mV/g"),
+            ("2 eV", 2.0, "eV"),
+        ] {
+            assert_eq!(number_and_rest(text), Some((number, rest)), "{text}");
+        }
+        for text in ["", "m", "10^", "0 m", "1e999 m"] {
+            assert_eq!(number_and_rest(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_factor_beside_a_name_is_not_the_number_of_a_point() {
+        for name in ["Force *1000", "Force x1000", "Force x 1e3", "F × 10"] {
+            assert!(multiplier(name).is_some(), "{name}");
+        }
+        for name in ["acc x10", "x 3", "Max 1000", "force", "x", "a*b"] {
+            assert_eq!(multiplier(name), None, "{name}");
+        }
+    }
+}
