@@ -40,6 +40,7 @@ mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod response_arrays;
+mod response_axis;
 mod response_columns;
 mod responses;
 mod standard;

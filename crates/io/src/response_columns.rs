@@ -3,21 +3,9 @@
 use mechid_model::ResponseQuantity;
 use nalgebra::Complex;
 
-use crate::escape::escaped;
 use crate::responses::{FrequencyResponses, ResponseFunction};
 use crate::units::{ResponseUnit, label_notes, name_without_brackets, number_and_rest};
-use crate::{Evidence, IoError, Quantity, StatedUnit, Table};
-
-/// Names, in lower case, of a column of frequencies; those before [`IN_RADIANS`] are in Hz unless a
-/// unit states otherwise.
-const FREQUENCY: [&str; 10] =
-    ["frequency_hz", "frequency", "freq", "f", "frequenz", "hz", "khz", "rpm", "omega", "w"];
-
-/// Names of a column of angular frequencies, in rad/s.
-const IN_RADIANS: [&str; 4] = ["omega", "w", "ω", "radians"];
-
-/// Names of a column of multiples of the speed of rotation.
-const ORDERS: [&str; 2] = ["order", "orders"];
+use crate::{Evidence, IoError, StatedUnit, Table};
 
 /// Name of the point in a table with a single response.
 const ALONE: &str = "1";
@@ -100,7 +88,10 @@ impl Heading {
             }
         }
         heading.part = part?;
-        heading.points = points_of(points)?;
+        heading.points = match points_in_notes(&label_notes(name)) {
+            Some(points_in_notes) => points_in_notes,
+            None => points_of(points)?,
+        };
         heading.take_notes(table, column, name);
         Some(heading)
     }
@@ -113,14 +104,20 @@ impl Heading {
     fn take_notes(&mut self, table: &Table, column: usize, name: &str) {
         let notes = label_notes(name);
         let row = label_notes(&format!("[{}]", table.unit_text(column)));
-        for note in notes.into_iter().chain(row).filter(|note| !note.is_empty()) {
+        let notes = notes.into_iter().filter(|note| points_in_note(note).is_none());
+        for note in notes.chain(row).filter(|note| !note.is_empty()) {
             let lower = note.to_lowercase();
             let is_level = lower.split([' ', ':', '(']).next() == Some("db");
             if let (Part::Phase(_), Some(unit)) = (self.part, angle(&lower)) {
                 self.part = Part::Phase(Some(unit));
             } else if is_level && matches!(self.part, Part::Magnitude | Part::Level) {
                 self.part = Part::Level;
-                let reference = lower.find("re").map_or("", |at| note[at + 2..].trim());
+                // `dB re 1 m/s²/N`, `dB(g/N)`.
+                let after = note[2..].trim_start_matches([' ', ':']);
+                let reference = after.strip_prefix("re ").or(after.strip_prefix("ref "));
+                let reference = reference.unwrap_or(after).trim();
+                let inner = reference.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+                let reference = inner.unwrap_or(reference);
                 self.take_unit(number_and_rest(reference).unwrap_or((1.0, reference)));
             } else if !self.take_unit((1.0, &note)) && !matches!(self.part, Part::Phase(_)) {
                 let evidence = Evidence::Unused;
@@ -153,6 +150,18 @@ fn original(name: &str, lower: &str) -> String {
     at.and_then(|at| name.get(at..at + lower.len())).unwrap_or(lower).to_owned()
 }
 
+/// Returns the points of response and force in brackets, such as those of `H(2,1)`.
+fn points_in_notes(notes: &[String]) -> Option<[String; 2]> {
+    notes.iter().find_map(|note| points_in_note(note))
+}
+
+fn points_in_note(note: &str) -> Option<[String; 2]> {
+    let (response, reference) = note.split_once([',', ';'])?;
+    let points = [response, reference].map(|point| point.trim().to_owned());
+    let is_number = |point: &String| !point.is_empty() && point.bytes().all(|b| b.is_ascii_digit());
+    points.iter().all(is_number).then_some(points)
+}
+
 /// Returns the points of response and force in a name, such as `h_2_1`, `H21` or `frf_12+Z_1+Z`;
 /// `None` if it has none.
 pub(crate) fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
@@ -172,73 +181,6 @@ pub(crate) fn points_of(mut words: Vec<String>) -> Option<[String; 2]> {
     let mut next = || words.next().unwrap_or_else(|| ALONE.into());
     let points = [next(), next()];
     words.next().is_none().then_some(points)
-}
-
-/// Returns the column of frequencies, by its name or its field in a struct.
-fn frequency_column(table: &Table) -> Option<usize> {
-    let names = || FREQUENCY.iter().chain(&IN_RADIANS);
-    let of_struct = |at: &usize| {
-        let leaf = table.names()[*at].rsplit_once(['.', '/']).map(|(_, leaf)| leaf.to_lowercase());
-        leaf.is_some_and(|leaf| names().any(|name| *name == leaf))
-    };
-    names().find_map(|name| table.find(name).ok()).or_else(|| (0..table.width()).find(of_struct))
-}
-
-/// Returns the frequencies of a table, in Hz; a text that may be their unit is added to `doubts`.
-pub(crate) fn frequencies(
-    table: &Table,
-    doubts: &mut Vec<(String, StatedUnit, Quantity)>,
-) -> Result<Vec<f64>, IoError> {
-    let named = frequency_column(table);
-    let column = match named {
-        Some(column) => column,
-        None if !table.complex().is_empty() => {
-            return Err(IoError::Description {
-                file: table.file().into(),
-                what: format!(
-                    "it has responses, and no vector of their frequencies: save it as {}",
-                    FREQUENCY[..4].join(" or ")
-                ),
-            });
-        }
-        None if ORDERS.iter().any(|name| table.find(name).is_ok()) => {
-            return Err(IoError::Description {
-                file: table.file().into(),
-                what: "the frequencies are orders, multiples of a speed of rotation that it does not state: \
-                       multiply them by it"
-                    .into(),
-            });
-        }
-        None => 0,
-    };
-    let values = table.values(column)?;
-    let mut stated = table.stated_unit(column, Some(Quantity::Frequency));
-    let name = table.short_name(column).to_lowercase();
-    if stated.is_none() && IN_RADIANS.contains(&name.as_str()) {
-        let unit = crate::Unit::parse("rad/s");
-        stated = Some(StatedUnit { text: name, unit, evidence: Evidence::Likely });
-    } else if stated.is_none() && named.is_none() && !table.names()[column].is_empty() {
-        let text = table.names()[column].clone();
-        stated = Some(StatedUnit { text, unit: None, evidence: Evidence::Unused });
-    }
-    let Some(stated) = stated else { return Ok(values.to_vec()) };
-    let factor = match stated.used() {
-        Some(unit) if unit.quantity == Quantity::Frequency => unit.in_si,
-        Some(unit) => {
-            return Err(IoError::OtherQuantity {
-                file: table.file().into(),
-                column: table.label(column),
-                unit: unit.name.clone(),
-                quantity: unit.quantity,
-                wanted: Quantity::Frequency,
-            });
-        }
-        None => 1.0,
-    };
-    if stated.evidence != Evidence::Stated {
-        doubts.push((table.label(column), stated, Quantity::Frequency));
-    }
-    Ok(values.iter().map(|value| value * factor).collect())
 }
 
 /// Adds the responses in the columns of a table.
@@ -353,67 +295,4 @@ fn invert(values: &mut [Complex<f64>], mut errors: Option<&mut [f64]>) -> Result
         *value = value.inv();
     }
     values.iter().position(|value| !value.is_finite()).map_or(Ok(()), |at| Err(at + 1))
-}
-
-/// Sorts the frequencies in rising order and removes the mirrored half of a two-sided spectrum,
-/// with a remark.
-pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
-    let hz = &responses.frequency_hz;
-    if let Some(short) = responses.functions.iter().find(|one| one.values.len() != hz.len()) {
-        let (count, points) = (short.values.len(), [&short.response, &short.reference]);
-        let what = format!(
-            "the response at {} to {} has {count} values for {} frequencies",
-            escaped(points[0]),
-            escaped(points[1]),
-            hz.len()
-        );
-        return Err(IoError::Description { file: responses.file.clone(), what });
-    }
-    let mut order: Vec<usize> = (0..hz.len()).collect();
-    order.sort_by(|a, b| hz[*a].total_cmp(&hz[*b]));
-    let negative = hz.iter().filter(|hz| **hz < 0.0).count();
-    order.retain(|at| hz[*at] >= 0.0);
-    if let Some(pair) = order.windows(2).find(|pair| hz[pair[0]] == hz[pair[1]]) {
-        let what = format!("the frequency {} Hz stands there twice", hz[pair[0]]);
-        return Err(IoError::Description { file: responses.file.clone(), what });
-    }
-    let mirrored = mirrored(responses, &order);
-    order.truncate(order.len() - mirrored);
-    if order.iter().copied().eq(0..hz.len()) {
-        return Ok(());
-    }
-    if negative + mirrored > 0 {
-        let count = negative + mirrored;
-        responses
-            .remarks
-            .push(format!("left out: {count} mirrored values, of negative frequencies"));
-    }
-    let pick = |values: &[f64]| order.iter().map(|at| values[*at]).collect::<Vec<f64>>();
-    for function in &mut responses.functions {
-        function.values = order.iter().map(|at| function.values[*at]).collect();
-        function.standard_error = function.standard_error.as_deref().map(pick);
-    }
-    for coherence in &mut responses.coherence {
-        coherence.values = pick(&coherence.values);
-    }
-    responses.frequency_hz = pick(&responses.frequency_hz);
-    Ok(())
-}
-
-/// Returns how many of the last values, in rising order, mirror the first ones: the lines above
-/// half the sampling rate.
-fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
-    /// Maximum relative difference between a value and its mirror image, from the rounding of
-    /// printed numbers.
-    const SAME: f64 = 1e-6;
-    let len = order.len();
-    if len < 4 || responses.frequency_hz[order[0]] != 0.0 {
-        return 0;
-    }
-    let is_mirrored = responses.functions.iter().all(|function| {
-        let value = |at: usize| function.values[order[at]];
-        let size = (1..len).map(|at| value(at).norm()).fold(0.0, f64::max);
-        (1..len).all(|at| (value(len - at).conj() - value(at)).norm() <= SAME * size)
-    });
-    if is_mirrored { (len - 1) / 2 } else { 0 }
 }

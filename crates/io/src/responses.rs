@@ -9,7 +9,8 @@ use nalgebra::Complex;
 use crate::limits::ReadOptions;
 use crate::table::source::{Kind, Source};
 use crate::{
-    IoError, Quantity, StatedUnit, Table, escaped, response_arrays, response_columns, uff,
+    IoError, Quantity, StatedUnit, Table, escaped, response_arrays, response_axis,
+    response_columns, uff,
 };
 
 /// Frequency responses in a file, at common frequencies and in SI units.
@@ -193,7 +194,7 @@ impl FrequencyResponses {
 
     fn from_table(table: &Table) -> Result<Self, IoError> {
         let mut responses = Self { file: table.file().into(), ..Self::default() };
-        responses.frequency_hz = response_columns::frequencies(table, &mut responses.doubts)?;
+        responses.frequency_hz = response_axis::frequencies(table, &mut responses.doubts)?;
         match table.complex() {
             [] => response_columns::add_functions(table, &mut responses)?,
             arrays => response_arrays::add_functions(table, arrays, &mut responses)?,
@@ -212,7 +213,7 @@ impl FrequencyResponses {
             let (file, available) = (responses.file, table.available());
             return Err(IoError::Responses { file, available });
         }
-        response_columns::sort(&mut responses)?;
+        response_axis::sort(&mut responses)?;
         let quantity = constant(table, DERIVATIVE)?.and_then(|order| {
             let of = |quantity: &ResponseQuantity| derivative(*quantity) == order;
             ResponseQuantity::ALL.into_iter().find(of)

@@ -136,6 +136,21 @@ fn tables_in_every_form() {
     assert_eq!(whole.coherence[1].reference.as_deref(), Some("1"));
 }
 
+/// Judge: 20 log₁₀ of the size, and the order times the speed.
+#[test]
+fn levels_orders_and_points_in_brackets() {
+    let level =
+        parse("f,\"H(2,1) mag [dB(g/N)]\",\"H(2,1) phase [deg]\"\n1,20,0\n2,40,0\n").unwrap();
+    let function = &level.functions[0];
+    assert_eq!((function.response.as_str(), function.reference.as_str()), ("2", "1"));
+    assert_eq!(function.quantity, Some(ResponseQuantity::Acceleration));
+    assert!((function.values[0].re - 98.0665).abs() < 1e-12, "{}", function.values[0]);
+    let orders = parse("order,speed_rpm,real,imaginary\n1,1500,1,0\n2,1500,1,0\n").unwrap();
+    assert_eq!(orders.frequency_hz, [25.0, 50.0]);
+    let message = parse("order,real,imaginary\n1,1,0\n").unwrap_err().to_string();
+    assert!(message.contains("multiply them by it") && message.contains("speed_rpm"), "{message}");
+}
+
 #[test]
 fn broken_tables_are_refused() {
     for (text, message) in [
