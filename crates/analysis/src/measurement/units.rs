@@ -172,8 +172,8 @@ const DAY_NUMBERS: f64 = 20_000.0;
 /// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Returns a finding if the sampling rate of a time column without a unit is so low and the record
-/// so long that it may be in milliseconds, or so high that it may be in days.
+/// Returns a finding if a time column has a doubtful unit. Without a unit this is a sampling rate so
+/// low and a record so long that it may be in milliseconds, or a rate so high that it may be in days.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,
@@ -181,6 +181,9 @@ pub(crate) fn doubtful_time(
 ) -> Option<Finding> {
     let TimeAxis::Column(name) = time else { return None };
     let column = table.find(name).ok()?;
+    if let Some(stated) = table.doubtful_time_unit(column) {
+        return doubt(&table.label(column), &stated, Quantity::Time);
+    }
     let (rate_hz, duration_s) = (1.0 / sampling.dt(), sampling.len() as f64 * sampling.dt());
     let first = table.values(column).ok().and_then(|times| times.first().copied()).unwrap_or(0.0);
     let is_slow = rate_hz <= SLOW_HZ || (rate_hz <= RATHER_SLOW_HZ && duration_s >= LONG_S);

@@ -190,3 +190,18 @@ fn a_column_of_another_quantity_is_refused() {
     let told = refused(folder.path(), "frf other.csv --force 3 --velocity 4");
     assert!(told.contains("is in g, a unit of acceleration; --force takes"), "{told}");
 }
+
+/// What a time column says and is not read is asked about, with the factor that it would make.
+#[test]
+fn a_time_column_with_a_factor_or_an_unknown_unit_is_asked_about() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let roles = "--time 1 --force force --displacement displacement --period 256";
+    for (name, factor) in [("Time [0.1 s]", Some(0.1)), ("Time [samples]", None)] {
+        timed(folder, "a.csv", name, 1.0);
+        let report = json(folder, &format!("identify a.csv {roles}"));
+        let checks = report["checks"].as_array().unwrap();
+        let finding = checks.iter().find(|check| check["subject"] == "unit").unwrap();
+        assert_eq!(finding["finding"]["factor"].as_f64(), factor, "{finding}");
+    }
+}
