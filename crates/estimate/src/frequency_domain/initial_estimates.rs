@@ -247,23 +247,30 @@ impl<'a> InitialEstimates<'a> {
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
         let (n, last) = (self.data.dof(), equation.parameters.len());
         let mut gram = DMatrix::zeros(last + 1, last + 1);
-        // Coefficients of the noise of displacements and forces in each column.
-        let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); last + 1];
         for (line, &omega) in self.data.omega().iter().enumerate() {
             let powers = powers(omega).map(|power| power * weights[line]);
+            // Coefficients of the noise of each displacement and force in the columns.
+            let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); 2 * n];
             for (at, (_, p)) in equation.parameters.iter().enumerate() {
-                enters[at] = vec![(p.column(), powers[p.matrix() as usize])];
+                enters[p.column()].push((at, powers[p.matrix() as usize]));
             }
-            let known = self.known(equation.row).map(|(m, c, v)| (c, -powers[m as usize] * v));
-            enters[last] = known.collect();
-            enters[last].push((n + equation.row, Complex::from(weights[line])));
+            for (m, column, value) in self.known(equation.row) {
+                enters[column].push((last, -powers[m as usize] * value));
+            }
+            enters[n + equation.row].push((last, Complex::from(weights[line])));
+            // Most channels have noise of their own: most covariances are 0.
             let covariance = self.noise.covariance(line);
-            for b in 0..=last {
-                for a in 0..=b {
-                    for (i, left) in &enters[a] {
-                        for (j, right) in &enters[b] {
-                            // E[Δz̄_i Δz_j] is the conjugate of the entry (i, j) of the covariance.
-                            gram[(a, b)] += (left.conj() * right * covariance[(*j, *i)]).re;
+            let entering = || enters.iter().enumerate().filter(|(_, columns)| !columns.is_empty());
+            for (j, right) in entering() {
+                for (i, left) in entering() {
+                    // E[Δz̄_i Δz_j] is the conjugate of the entry (i, j) of the covariance.
+                    let expected = covariance[(j, i)];
+                    if expected == Complex::ZERO {
+                        continue;
+                    }
+                    for (b, of_b) in right {
+                        for (a, of_a) in left.iter().filter(|(a, _)| a <= b) {
+                            gram[(*a, *b)] += (of_a.conj() * of_b * expected).re;
                         }
                     }
                 }
