@@ -118,3 +118,49 @@ def test_a_response_table_states_its_quantity_or_is_asked():
         mechid.identify_responses(bare)
     with pytest.raises(TypeError, match="`segments` needs its `count`"):
         mechid.ResponseTable(hz, accelerance, segments={"samples": 100, "fs": FS})
+
+
+def test_dates_with_a_time_zone_are_instants():
+    index = pd.Timestamp("2023-03-14", tz="Europe/Berlin") + pd.to_timedelta(T, "s")
+    frame = pd.DataFrame({"force": FORCE, "acc": ACC}, index=index)
+    assert mechid.Measurement.from_table(frame, force="force", acceleration="acc").fs == pytest.approx(FS)
+
+
+def test_a_series_is_converted_from_the_unit_that_it_states():
+    frame = pd.DataFrame({"Force [kN]": FORCE / 1e3, "acc [g]": ACC / 9.80665})
+    found = mechid.identify(frame["Force [kN]"], acceleration=frame["acc [g]"], fs=FS, **PERIOD)
+    assert found.parameters["m"].value == pytest.approx(2.0)
+    array = xr.DataArray(ACC / 9.80665, dims="time", attrs={"units": "g"})
+    found = mechid.identify(FORCE, acceleration=array, fs=FS, **PERIOD)
+    assert found.parameters["m"].value == pytest.approx(2.0)
+    with pytest.raises(mechid.MechidError, match="a unit of displacement"):
+        mechid.identify(FORCE, acceleration=pd.Series(ACC, name="x [mm]"), fs=FS, **PERIOD)
+
+
+def test_channels_of_sep_5_are_found_without_their_unit_and_take_another():
+    channels = [
+        {"name": "force [kN]", "data": FORCE / 1e3, "fs": FS},
+        {"name": "acc", "data": ACC / 9.80665, "fs": FS, "unit_str": "m/s^2"},
+    ]
+    assert mass(channels, unit={"acc": "g"}) == pytest.approx(2.0)
+    assert mass(channels, scale={"acc": 9.80665}) == pytest.approx(2.0)
+
+
+def test_keywords_of_other_packages_are_named():
+    for wrong, right in [("sample_rate", "fs"), ("disp", "displacement"), ("perod", "period")]:
+        with pytest.raises(TypeError, match=f"'{wrong}'; did you mean `{right}`"):
+            mechid.identify(FORCE, ACC, fs=FS, **{wrong: 1})
+
+
+def test_machines_tables_and_modes_travel_too():
+    found = mechid.identify({"force": FORCE, "acc": ACC}, force="force", acceleration="acc", fs=FS, **PERIOD)
+    machine = pickle.loads(pickle.dumps(found.machine()))
+    np.testing.assert_array_equal(machine.mass, found.machine().mass)
+    hz = np.arange(1.0, 40.0)
+    s = 2j * np.pi * hz
+    table = mechid.ResponseTable(hz, s**2 / (2 * s**2 + 30 * s + 5000), quantity="acceleration")
+    again = pickle.loads(pickle.dumps(copy.deepcopy(table)))
+    assert mechid.identify_responses(again).parameters["m"].value == pytest.approx(2.0)
+    responses = mechid.frf({"force": FORCE, "acc": ACC}, force="force", acceleration="acc", fs=FS, **PERIOD)
+    np.testing.assert_array_equal(responses.to_frame()[1, 1], responses.response())
+    assert len(repr(mechid.multisine(64, 64.0, lines="3:23"))) < 100

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
@@ -193,7 +194,8 @@ class Measurement:
         Parameters
         ----------
         force, displacement, velocity, acceleration : array_like of real numbers
-            Shape (samples,) or (samples, degrees of freedom), in N, m, m/s and m/s².
+            Shape (samples,) or (samples, degrees of freedom), in N, m, m/s and m/s². A series whose name
+            (``"x [mm]"``) or ``attrs`` state another unit is converted.
         fs : float
             Sampling rate, in Hz.
         name : str
@@ -217,6 +219,9 @@ class Measurement:
             counts.append(len(found))
             columns += found
         names, channels = _named(tuple(counts))
+        units = [_series_unit(given) for given in arrays]
+        if any(units):
+            names, channels = _with_units(names, units, channels)
         return cls._of(name, fs, list(zip(names, columns, strict=True)), channels, window)
 
     @classmethod
@@ -268,7 +273,11 @@ class Measurement:
         channels: dict[str, list[str]] = {}
         columns: list[tuple[str, NDArray[np.float64]]] = []
         given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
-        source = _Sep5(table) if isinstance(table, Sequence) else _Frame(table, unit, scale)
+        source: _Sep5 | _Frame
+        if isinstance(table, Sequence):
+            source = _Sep5(table, unit, scale)
+        else:
+            source = _Frame(table, unit, scale)
         used = [name for names in given.values() for name in _names("columns", names) if name != "0"]
         if isinstance(source, _Sep5):
             source.check_starts(used)
@@ -401,7 +410,12 @@ def _copied(arrays: Mapping[str, Any], fs: float, name: str, window: Window) -> 
 class _Sep5:
     """Channels in the form of the SDyPy enhancement proposal 5."""
 
-    def __init__(self, channels: Sequence[Mapping[str, object]]) -> None:
+    def __init__(
+        self,
+        channels: Sequence[Mapping[str, object]],
+        unit: Mapping[str, str] | None,
+        scale: Mapping[str, float] | None,
+    ) -> None:
         for number, channel in enumerate(channels, 1):
             for field in ("name", "data"):
                 if field not in channel:
@@ -409,21 +423,35 @@ class _Sep5:
         self._channels = {str(channel["name"]): channel for channel in channels}
         if len(self._channels) < len(channels):
             raise ValueError("several channels have the same name")
+        self._unit = {self._find(name): text for name, text in (unit or {}).items()}
+        self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
 
-    def __getitem__(self, name: str) -> ArrayLike:
-        channel = self._channels.get(name)
-        if channel is None:
-            raise no_column(name, self._channels)
-        values: ArrayLike = channel["data"]  # type: ignore[assignment]
+    def _find(self, wanted: str) -> str:
+        if wanted in self._channels:
+            return wanted
+        names = list(self._channels)
+        at = None if wanted.isdigit() else _mechid.find_column(names, wanted)
+        if at is None:
+            raise no_column(wanted, names)
+        return names[at]
+
+    def __getitem__(self, wanted: str) -> ArrayLike:
+        values: ArrayLike = self._channels[self._find(wanted)]["data"]  # type: ignore[assignment]
         return values
 
-    def label(self, name: str, kind: str) -> tuple[str, float]:
-        unit = self._channels.get(name, {}).get("unit_str")
+    def label(self, wanted: str, kind: str) -> tuple[str, float]:
+        """Return the name of a channel with its unit, and a factor for its numbers."""
+        name = self._find(wanted)
+        if name in self._scale:
+            return f"[{_SI[kind]}] {name}", self._scale[name]
+        if name in self._unit:
+            return f"[{self._unit[name]}] {name}", 1.0
+        unit = self._channels[name].get("unit_str")
         return (f"{name} [{unit}]" if unit else name), 1.0
 
     def check_starts(self, names: Sequence[str]) -> None:
         """Refuse channels that begin at different instants, by any field that says so."""
-        used = {name: self._channels[name] for name in names if name in self._channels}
+        used = {name: self._channels[self._find(name)] for name in names}
         for field in ("start_timestamp", "start_time", "timestamp", "time"):
             starts = {name: _start(channel.get(field)) for name, channel in used.items()}
             if len(set(starts.values())) > 1:
@@ -434,7 +462,7 @@ class _Sep5:
 
     def fs(self, given: Mapping[str, Names], time: str | None) -> float | None:
         names = [name for kind, names in given.items() for name in _names(kind, names)]
-        used = [self._channels[name] for name in names if name in self._channels]
+        used = [self._channels[self._find(name)] for name in names if name != "0"]
         rates: set[float] = set()
         for channel in used:
             rate, instants = channel.get("fs"), channel.get("time")
@@ -554,7 +582,7 @@ class _Frame:
                 if isinstance(shared.get(key), (int, float)):
                     return float(shared[key])
         index = getattr(self._table, "index", None)
-        instants = np.asarray(index) if index is not None and not callable(index) else None
+        instants = _instants(index) if index is not None and not callable(index) else None
         named = getattr(index, "name", None)
         is_time = named is not None and _mechid.time_column([str(named)]) is not None
         if instants is not None and (instants.dtype.kind in "mMf" or is_time):
@@ -566,9 +594,18 @@ class _Frame:
         return _rate_of(f"[{unit}] {name}" if unit else name, self[name])
 
 
+def _instants(values: object) -> NDArray[Any]:
+    """Return instants as an array: dates with a time zone as those of UTC."""
+    if np.asarray(values).dtype.kind == "O":
+        convert = getattr(getattr(values, "dt", values), "tz_convert", None)
+        if convert is not None:
+            return np.asarray(convert(None))
+    return np.asarray(values)
+
+
 def _rate_of(name: str, instants: object) -> float:
     """Return the sampling rate, in Hz, of numbers in the unit that the name states, or of dates."""
-    array = np.asarray(instants)
+    array = _instants(instants)
     if array.dtype.kind in "mM":
         # Whole nanoseconds: the differences are exact.
         nanoseconds = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]")
@@ -617,6 +654,17 @@ def measurements(
     return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
 
 
+_SYNONYMS = {
+    **dict.fromkeys(("sample_rate", "sampling_rate", "samplerate", "rate", "rate_hz", "sr", "dt"), "fs"),
+    **dict.fromkeys(("acc", "accel", "a"), "acceleration"),
+    **dict.fromkeys(("vel", "v"), "velocity"),
+    **dict.fromkeys(("disp", "x"), "displacement"),
+    "f": "force",
+    "units": "unit",
+}
+"""Keywords of other packages, by what they are here."""
+
+
 def _unexpected(function: str, name: str, known: Iterable[str]) -> TypeError:
     """Return the error for a keyword that there is not."""
     import difflib
@@ -626,8 +674,9 @@ def _unexpected(function: str, name: str, known: Iterable[str]) -> TypeError:
 
     signature = inspect.signature(getattr(mechid, function, lambda: None))
     others = [p.name for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
-    close = difflib.get_close_matches(name, [*known, *others], n=1, cutoff=0.5)
-    hint = f"; did you mean `{close[0]}`?" if close else ""
+    close = difflib.get_close_matches(name, [*known, *others], n=1, cutoff=0.6)
+    meant = _SYNONYMS.get(name.lower()) or (close[0] if close else None)
+    hint = f"; did you mean `{meant}`?" if meant else ""
     return TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
 
 
@@ -728,6 +777,7 @@ class ResponseTable:
         segments: Mapping[str, Any] | None = None,
         name: str = "arrays",
     ) -> None:
+        self._made: tuple[Any, ...]
         hz = _finite("frequency_hz", np.asarray(frequency_hz, dtype=np.float64))
         values = _finite("response", np.asarray(response, dtype=np.complex128))
         if hz.ndim != 1 or values.ndim not in (1, 3) or len(values) != len(hz):
@@ -762,9 +812,8 @@ class ResponseTable:
             "forces": driven,
             "segments": None if segments is None else _segments(segments),
         }
-        self._inner = _mechid.ResponseTable.from_arrays(
-            json.dumps(layout), hz, values, errors, coherent
-        )
+        self._made = json.dumps(layout), hz, values, errors, coherent
+        self._inner = _mechid.ResponseTable.from_arrays(*self._made)
 
     @classmethod
     @careful
@@ -777,6 +826,7 @@ class ResponseTable:
             If the file cannot be read, or has no frequency response.
         """
         table = cls.__new__(cls)
+        table._made = (os.fspath(path),)
         table._inner = _mechid.ResponseTable.read(path)
         return table
 
@@ -785,9 +835,27 @@ class ResponseTable:
         """Name of the table in messages."""
         return self._inner.name
 
+    def __copy__(self) -> ResponseTable:
+        return self
+
+    def __deepcopy__(self, memo: object) -> ResponseTable:
+        return self
+
+    def __reduce__(self) -> tuple[object, tuple[Any, ...]]:
+        return _made_again, (self._made,)
+
     def __repr__(self) -> str:
         quantity = self._inner.quantity or "no quantity stated"
         return f"<ResponseTable {self.name!r}: {quantity}, {self._inner.frequencies} frequencies>"
+
+
+def _made_again(made: tuple[Any, ...]) -> ResponseTable:
+    """Return a table that was pickled: of arrays, or of the file that it was read from."""
+    if len(made) == 1:
+        return ResponseTable.read(made[0])
+    table = ResponseTable.__new__(ResponseTable)
+    table._made, table._inner = made, _mechid.ResponseTable.from_arrays(*made)
+    return table
 
 
 def _segments(given: Mapping[str, Any]) -> list[float]:
@@ -815,6 +883,27 @@ def _finite(name: str, values: _Numbers) -> _Numbers:
     if not np.isfinite(values).all():
         raise ValueError(f"`{name}` has a value that is not finite")
     return values
+
+
+def _series_unit(values: object) -> str | None:
+    """Return what a series of pandas or xarray states about its unit, in an attribute or in brackets."""
+    attrs, name = getattr(values, "attrs", None), getattr(values, "name", None)
+    units = attrs.get("units", attrs.get("unit")) if isinstance(attrs, Mapping) else None
+    if isinstance(units, Mapping):
+        units = units.get(name)
+    if isinstance(units, str):
+        return units
+    in_brackets = re.findall(r"[\[({<]([^\])}>]+)[\])}>]", name) if isinstance(name, str) else []
+    return "; ".join(in_brackets) or None
+
+
+def _with_units(names: list[str], units: list[str | None], channels: str) -> tuple[list[str], str]:
+    """Return names that state the units of their series, one for each kind, and the channels."""
+    groups = json.loads(channels)
+    unit_of = {name: unit for unit, group in zip(units, groups.values(), strict=True) for name in group}
+    stated = {name: f"{name} [{unit}]" if unit else name for name, unit in unit_of.items()}
+    renamed = {kind: [stated[name] for name in group] for kind, group in groups.items()}
+    return [stated[name] for name in names], json.dumps(renamed)
 
 
 def matrix(name: str, values: object) -> NDArray[np.float64]:

@@ -34,6 +34,15 @@ def labelled() -> Any:
     return _labelled
 
 
+def _pandas() -> Any:
+    """Return pandas."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError("this needs pandas, which is not installed: pip install pandas") from None
+    return pandas
+
+
 @final
 @dataclass(frozen=True, slots=True)
 class Uncertain:
@@ -357,10 +366,7 @@ class Estimated(Drawn):
         ImportError
             If pandas is not installed: ``pip install pandas``.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("this needs pandas, which is not installed: pip install pandas") from None
+        pandas = _pandas()
         rows = self._told["parameters"]
         columns = ("value", "standard_error", "unit", "known")
         table = {column: [row[column] for row in rows] for column in columns}
@@ -961,6 +967,21 @@ class FrequencyResponses(Drawn):
                 return found
         raise KeyError((motion, force))
 
+    def to_frame(self) -> DataFrame:
+        """Return the responses as a pandas data frame: a column of complex numbers for each motion and force.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed: ``pip install pandas``.
+        """
+        pandas = _pandas()
+        index = pandas.Index(self.frequency_hz, name="frequency_hz")
+        table = {pair: self.response(*pair) for pair in self.pairs}
+        frame = pandas.DataFrame(table, index=index)
+        frame.columns.names = ["motion", "force"]
+        return frame
+
     def to_xarray(self) -> Dataset:
         """Return responses, standard errors and coherence, as an xarray dataset with units.
 
@@ -1105,6 +1126,26 @@ class Modes(Drawn):
         """Stabilisation diagram and mode indicator, if they were asked for."""
         told = self._told.get("diagrams")
         return None if told is None else MappingProxyType(told)
+
+    def to_frame(self) -> DataFrame:
+        """Return the modes as a pandas data frame, one row each: frequency, damping ratio, their errors.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed: ``pip install pandas``.
+        """
+        pandas = _pandas()
+        frequencies = [mode.natural_frequency_hz for mode in self.modes]
+        ratios = [mode.damping_ratio for mode in self.modes]
+        table = {
+            "natural_frequency_hz": [one.value for one in frequencies],
+            "natural_frequency_hz_standard_error": [one.std_error for one in frequencies],
+            "damping_ratio": [one.value for one in ratios],
+            "damping_ratio_standard_error": [one.std_error for one in ratios],
+            "driven_share": self.driven_shares,
+        }
+        return pandas.DataFrame(table, index=pandas.RangeIndex(1, len(frequencies) + 1, name="mode"))
 
     def __repr__(self) -> str:
         frequencies = ", ".join(f"{mode.natural_frequency_hz.value:.5g} Hz" for mode in self.modes)
@@ -1475,6 +1516,9 @@ class Multisine:
     def _of(cls, fs: float, found: _mechid._Sampled) -> Multisine:
         force, lines, amplitudes, phases, measures = found
         return cls(fs, force, tuple(lines), amplitudes, phases, *measures)
+
+    def __repr__(self) -> str:
+        return f"<Multisine: {len(self.force)} samples at {self.fs:g} Hz, {len(self.lines)} lines, peak {self.peak:.5g} N>"
 
 
 def machine_of(

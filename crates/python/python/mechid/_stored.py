@@ -69,7 +69,8 @@ def stored(held: Mapping[str, Any]) -> dict[str, Any]:
                 continue
             try:
                 answers[name] = (True, value()) if callable(value) else (False, value)
-            except MechidError:
+            except (MechidError, TypeError):
+                # What needs arguments is a question.
                 continue
         kept["_inner"] = answers
     return kept

@@ -347,6 +347,11 @@ def _degrees(values: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> np.ndar
 def _axes(ax: Axes | None) -> Axes:
     if ax is not None:
         return ax
-    from matplotlib import pyplot
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise ImportError(
+            "this needs matplotlib, which is not installed: pip install matplotlib"
+        ) from None
 
     return pyplot.subplots()[1]
