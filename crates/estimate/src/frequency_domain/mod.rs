@@ -51,6 +51,7 @@ mod initial_estimates;
 mod instrumental;
 mod likelihood_ratio;
 mod line;
+mod line_block;
 mod misfit;
 mod multi_start;
 mod normal_equations;

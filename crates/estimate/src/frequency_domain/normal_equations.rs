@@ -1,7 +1,6 @@
 //! Normal equations of a Jacobian with Kronecker products as rows, in coordinates with a small
 //! condition number.
 
-use std::ops::Range;
 use std::rc::Rc;
 
 use mechid_model::Matrix;
@@ -12,16 +11,17 @@ use mechid_spectra::transient;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::line_block::LineBlock;
 use crate::Unknowns;
-use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_LINES, GRAM_RIDGE};
+use crate::limits::{GRAM_DEPENDENT, GRAM_LANCZOS, GRAM_RIDGE};
 
 /// Indices of the unknowns in the equations of motion.
 #[derive(Debug)]
 pub(super) struct Layout {
     dof: usize,
     unknowns: usize,
-    /// Columns of [M C K] that are unknown in at least one equation; then the columns of
-    /// transients.
+    /// Columns of the transients, each zero outside its record; then columns of [M C K] that are
+    /// unknown in at least one equation.
     columns: Vec<(Matrix, usize)>,
     equations: Vec<Equation>,
 }
@@ -87,7 +87,7 @@ impl Layout {
             .collect();
         let mut columns: Vec<_> = free.iter().map(|p| (p.matrix(), p.column())).collect();
         columns.extend(&ends);
-        columns.sort_unstable_by_key(|(matrix, column)| (*matrix as usize, *column));
+        columns.sort_unstable_by_key(|(matrix, column)| (*column < n, *matrix as usize, *column));
         columns.dedup();
         let equation = |row: usize| {
             let of_row = free.iter().enumerate().filter(move |(_, p)| p.row() == row);
@@ -132,13 +132,14 @@ impl Layout {
         factors: &mut Factors,
         tangent: Option<&DMatrix<f64>>,
     ) -> Option<NormalEquations> {
-        let triangle = self.orthonormalise(factors, tangent.is_some())?;
+        let mut lines = LineBlock::all(&factors.regressors);
+        let triangle = self.orthonormalise(factors, &mut lines, tangent.is_some())?;
         let mut coordinates = Coordinates {
             blocks: self.blocks(triangle),
             scale: DVector::from_element(self.unknowns, 1.0),
             related: None,
         };
-        let mut gram = self.gram(&self.products(factors), &coordinates);
+        let mut gram = self.gram(&self.products(factors, &lines), &coordinates);
         for at in 0..self.unknowns {
             let length = gram[(at, at)].sqrt();
             coordinates.scale[at] = if length > 0.0 { length } else { 1.0 };
@@ -159,32 +160,52 @@ impl Layout {
     /// its W, and replaces them by R⁻ᵀφ. Dependent regressors are allowed for `related` entries: a
     /// degree of freedom without force has dependent regressors, but its relations determine its
     /// entries.
-    fn orthonormalise(&self, factors: &mut Factors, related: bool) -> Option<DMatrix<f64>> {
+    fn orthonormalise(
+        &self,
+        factors: &mut Factors,
+        blocks: &mut [LineBlock],
+        related: bool,
+    ) -> Option<DMatrix<f64>> {
         let lines = factors.weights.nrows() / 2;
         let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
         let power = diagonal.fold(DVector::zeros(2 * lines), |sum, part| sum + part);
-        let mut weighted = factors.regressors.transpose();
-        for mut column in weighted.column_iter_mut() {
-            for (at, value) in column.iter_mut().enumerate() {
-                *value *= power[at % lines].sqrt();
-            }
-        }
-        let mut factor = TriangularFactor::new(self.columns.len());
-        if !factor.push(&[weighted.as_view()]) {
-            return None;
+        let mut r = DMatrix::zeros(self.columns.len(), self.columns.len());
+        for block in blocks.iter_mut() {
+            block.close(&r);
+            let rows = DMatrix::from_fn(2 * block.lines.len(), block.columns.len(), |row, at| {
+                let line = block.lines.start + row / 2;
+                let value = factors.regressors[(block.columns[at], line + lines * (row % 2))];
+                value * power[line].sqrt()
+            });
+            block.push(&mut r, &rows)?;
         }
         if related {
-            let lengths = factor.r().column_iter().map(|column| GRAM_RIDGE * column.norm());
-            let lengths = DVector::from_iterator(self.columns.len(), lengths);
-            if !factor.push(&[DMatrix::from_diagonal(&lengths).as_view()]) {
-                return None;
+            for at in 0..self.columns.len() {
+                let mut row = LineBlock { lines: 0..0, columns: vec![at] };
+                row.close(&r);
+                let mut ridge = DMatrix::zeros(1, row.columns.len());
+                ridge[0] = GRAM_RIDGE * r.column(at).norm();
+                row.push(&mut r, &ridge)?;
             }
         }
-        let r = factor.r().clone();
         let independent = |at: usize| r[(at, at)].abs() > GRAM_DEPENDENT * r.column(at).norm();
-        let solved = (0..self.columns.len()).all(independent)
-            && r.tr_solve_upper_triangular_mut(&mut factors.regressors);
-        solved.then_some(r)
+        if !(0..self.columns.len()).all(independent) {
+            return None;
+        }
+        for block in blocks {
+            block.close(&r);
+            let triangle = block.triangle(&r);
+            for first in [block.lines.start, lines + block.lines.start] {
+                let part = factors.regressors.columns(first, block.lines.len());
+                let mut part = part.select_rows(&block.columns);
+                triangle.tr_solve_upper_triangular_mut(&mut part).then_some(())?;
+                let mut to = factors.regressors.columns_mut(first, block.lines.len());
+                for (row, &column) in part.row_iter().zip(&block.columns) {
+                    to.row_mut(column).copy_from(&row);
+                }
+            }
+        }
+        Some(r)
     }
 
     fn blocks(&self, triangle: DMatrix<f64>) -> Vec<Block> {
@@ -207,26 +228,36 @@ impl Layout {
     }
 
     /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
-    fn products(&self, factors: &Factors) -> DMatrix<f64> {
-        let lines = factors.weights.nrows() / 2;
-        let starts: Vec<usize> = (0..lines).step_by(GRAM_LINES).collect();
-        let parts = starts
-            .into_par_iter()
-            .map(|start| self.products_of_lines(factors, start..lines.min(start + GRAM_LINES)));
+    fn products(&self, factors: &Factors, blocks: &[LineBlock]) -> DMatrix<f64> {
         // The sum has one order, whatever the number of threads.
-        let parts: Vec<DMatrix<f64>> = parts.collect();
-        let pairs = self.columns.len() * (self.columns.len() + 1) / 2;
-        parts.into_iter().fold(DMatrix::zeros(pairs, self.dof * self.dof), |sum, part| sum + part)
+        let parts: Vec<DMatrix<f64>> =
+            blocks.par_iter().map(|block| self.products_of_lines(factors, block)).collect();
+        let pair = |a: usize, b: usize| b * (b + 1) / 2 + a;
+        let count = self.columns.len();
+        let mut sums = DMatrix::zeros(pair(0, count), self.dof * self.dof);
+        for (block, part) in blocks.iter().zip(parts) {
+            let columns = block.columns.iter().enumerate();
+            let pairs =
+                columns.flat_map(|(at, &b)| block.columns[..=at].iter().map(move |&a| pair(a, b)));
+            for (place, row) in pairs.zip(part.row_iter()) {
+                let mut to = sums.row_mut(place);
+                to += row;
+            }
+        }
+        sums
     }
 
-    fn products_of_lines(&self, factors: &Factors, range: Range<usize>) -> DMatrix<f64> {
-        let (q, lines) = (self.columns.len(), factors.weights.nrows() / 2);
+    /// Returns the sums over a block, for pairs of its columns.
+    fn products_of_lines(&self, factors: &Factors, block: &LineBlock) -> DMatrix<f64> {
+        let LineBlock { lines: range, columns } = block;
+        let (q, lines) = (columns.len(), factors.weights.nrows() / 2);
+        let parts = [range.start, lines + range.start]
+            .map(|first| factors.regressors.columns(first, range.len()).select_rows(columns));
         let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
         let mut pairs = DMatrix::zeros(sums.nrows(), range.len());
         for imaginary in [false, true] {
-            for (line, mut column) in range.clone().zip(pairs.column_iter_mut()) {
-                let re = &factors.regressors.as_slice()[q * line..q * (line + 1)];
-                let im = &factors.regressors.as_slice()[q * (lines + line)..][..q];
+            for (line, mut column) in pairs.column_iter_mut().enumerate() {
+                let [re, im] = [0, 1].map(|at| &parts[at].as_slice()[q * line..][..q]);
                 let mut rest = column.as_mut_slice();
                 for b in 0..q {
                     let (pairs_of_b, next) = rest.split_at_mut(b + 1);
