@@ -154,23 +154,72 @@ impl Covariance {
     }
 
     /// Returns pole, shape and participations of a mode with their joint covariance.
-    ///
-    /// To first order the error of entry i of the shape is A⁺ times the noise of output i minus B_i
-    /// dθ; an unmeasured force on the mode multiplies all entries by the same complex factor.
     pub(crate) fn mode_parameters(
         &self,
         fit: &Fit<'_>,
         mode: usize,
         shape: &[C],
     ) -> ModeParameters {
+        let (outputs, inputs) = (shape.len(), fit.lines.inputs());
+        let (values, covariance) = self.joint(fit, &[(mode, shape)]);
+        let (gauge, degrees_of_freedom) = (fit.model.gauge[mode], self.degrees_of_freedom);
+        ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
+    }
+
+    /// Returns the parameters of some modes with given shapes, mode after mode, and their joint
+    /// covariance.
+    ///
+    /// To first order the error of entry i of a shape is A⁺ times the noise of output i minus B_i
+    /// dθ; an unmeasured force on a mode multiplies all its entries by the same complex factor.
+    pub(crate) fn joint(
+        &self,
+        fit: &Fit<'_>,
+        modes: &[(usize, &[C])],
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let (outputs, inputs) = (self.sensor.len(), fit.lines.inputs());
+        let size_of_mode = 2 + 2 * outputs + 2 * inputs;
+        let size = modes.len() * size_of_mode;
+        let mut values = DVector::zeros(size);
+        let mut response = DMatrix::zeros(size, self.scale.len());
+        let mut cross = DMatrix::zeros(size, self.scale.len());
+        let mut own = DMatrix::zeros(size, size);
+        for (index, &(mode, shape)) in modes.iter().enumerate() {
+            let first = index * size_of_mode;
+            let part = self.mode_response(fit, mode, shape);
+            values.rows_mut(first, size_of_mode).copy_from(&part.values);
+            response.rows_mut(first, size_of_mode).copy_from(&part.response);
+            cross.rows_mut(first, size_of_mode).copy_from(&part.cross);
+            let by_force = &part.common * &self.process[mode].own * part.common.transpose();
+            own.view_mut((first, first), (size_of_mode, size_of_mode)).copy_from(&by_force);
+        }
+        for output in 0..outputs {
+            let variance = fit.weights.level[output].powi(2);
+            for (a, &(mode, _)) in modes.iter().enumerate() {
+                for (b, &(other, _)) in modes.iter().enumerate() {
+                    let row = a * size_of_mode + ModeParameters::shape_index(output);
+                    let column = b * size_of_mode + ModeParameters::shape_index(output);
+                    let noise = self.sensor[output].view((2 * mode, 2 * other), (2, 2)) * variance;
+                    let mut block = own.view_mut((row, column), (2, 2));
+                    block += noise;
+                }
+            }
+        }
+        let cross_covariance = cross * &self.inverse * response.transpose();
+        let covariance = &response * &self.parameters * response.transpose()
+            + own
+            + &cross_covariance
+            + cross_covariance.transpose();
+        (values, covariance)
+    }
+
+    /// Returns the parameters of one mode, and how they change with the parameters of the search and
+    /// with an unmeasured force on the mode.
+    fn mode_response(&self, fit: &Fit<'_>, mode: usize, shape: &[C]) -> ModeResponse {
         let (model, levels) = (&fit.model, &fit.weights.level);
         let (outputs, inputs, loads) = (shape.len(), fit.lines.inputs(), fit.lines.loads.len());
         let (size, gauge) = (2 + 2 * outputs + 2 * inputs, model.gauge[mode]);
         let mut values = DVector::zeros(size);
         let mut response = DMatrix::zeros(size, self.scale.len());
-        let mut sensor_part = DMatrix::zeros(size, size);
-        // Change of the entries with the complex factor that the unmeasured force puts on the
-        // shape.
         let mut common = DMatrix::zeros(size, 2);
         let mut cross = DMatrix::zeros(size, self.scale.len());
         let pole = model.poles[mode];
@@ -183,8 +232,6 @@ impl Covariance {
             (values[at], values[at + 1]) = (value.re, value.im);
             let followed = self.response_of_unknowns(mode, output) * -level;
             response.rows_mut(at, 2).copy_from(&followed);
-            let noise = self.sensor[output].view((2 * mode, 2 * mode), (2, 2)) * level.powi(2);
-            sensor_part.view_mut((at, at), (2, 2)).copy_from(&noise);
             common.rows_mut(at, 2).copy_from(&(rotation(direction) * level));
             let with_score = self.process[mode].cross.map(|value| (value * direction).re * level);
             cross.rows_mut(at, 2).copy_from(&with_score);
@@ -198,20 +245,24 @@ impl Covariance {
                 (response[(at, pair)], response[(at + 1, pair + 1)]) = (1.0, 1.0);
             }
         }
-        let cross_covariance = cross * &self.inverse * response.transpose();
-        let covariance = &response * &self.parameters * response.transpose()
-            + sensor_part
-            + &common * &self.process[mode].own * common.transpose()
-            + &cross_covariance
-            + cross_covariance.transpose();
-        let degrees_of_freedom = self.degrees_of_freedom;
-        ModeParameters { outputs, inputs, gauge, values, covariance, degrees_of_freedom }
+        ModeResponse { values, response, common, cross }
     }
 
     /// Returns the covariance of ln(−Re λ) and ln Im λ of a mode.
     pub(crate) fn pole_covariance(&self, mode: usize) -> Matrix2<f64> {
         self.parameters.fixed_view::<2, 2>(2 * mode, 2 * mode).into_owned()
     }
+}
+
+/// Parameters of one mode and what changes them.
+struct ModeResponse {
+    values: DVector<f64>,
+    /// Derivatives by the parameters of the search.
+    response: DMatrix<f64>,
+    /// Derivatives by the complex factor that an unmeasured force puts on the shape.
+    common: DMatrix<f64>,
+    /// Covariance of that factor with the score.
+    cross: DMatrix<f64>,
 }
 
 /// Returns the real 2 × 2 matrix that multiplies (real part, imaginary part) by a complex number.

@@ -1,5 +1,7 @@
 //! The identified modes of a record, and what they predict.
 
+use std::ops::Range;
+
 use mechid_numerics::Uncertain;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
@@ -10,7 +12,9 @@ use crate::compare::{ComparedMode, Comparison, Measured, PairingRule, compare};
 use crate::constraint::{self, ConstraintTest, ModalConstraint};
 use crate::covariance::Covariance;
 use crate::indicators::IndicatorError;
+use crate::limits::GROUP_HALF_WIDTHS;
 use crate::lines::Lines;
+use crate::modal_model::{ModalGroup, ModalModel};
 use crate::mode::{DroppedCandidate, IdentifiedMode};
 use crate::mode_parameters::ModeParameters;
 use crate::model::ResidualPowers;
@@ -33,10 +37,7 @@ pub struct ModalEstimate {
     others: Vec<IdentifiedMode>,
     dropped: Vec<DroppedCandidate>,
     powers: ResidualPowers,
-    pub(crate) reference: f64,
-    /// Real coefficients of the residual powers: `[output][input][power]`.
-    residuals: Vec<Vec<Vec<f64>>>,
-    inputs: usize,
+    model: ModalModel,
     explained: Vec<f64>,
     noise_level: Vec<f64>,
     noise_spectrum: Vec<Vec<f64>>,
@@ -59,6 +60,10 @@ impl ModalEstimate {
         let (requested, unrequested): (Vec<usize>, Vec<usize>) =
             (0..model.modes()).partition(|mode| stated[*mode]);
         let parameters = |mode: usize| covariance.mode_parameters(fit, mode, &shapes[mode]);
+        let free_of = |modes: &[usize]| {
+            let modes: Vec<_> = modes.iter().map(|mode| (*mode, &shapes[*mode][..])).collect();
+            covariance.joint(fit, &modes).1
+        };
         let constrained = |(index, &mode): (usize, &usize)| {
             let free = parameters(mode);
             let tests = constraint::test(constraints, &free, index);
@@ -69,8 +74,11 @@ impl ModalEstimate {
         };
         let (modes, (parameters_of_modes, tests)): (Vec<_>, (Vec<_>, Vec<_>)) =
             requested.par_iter().enumerate().map(constrained).unzip();
-        let unrequested_mode =
-            |mode| identified_mode(fit, noise, &parameters(mode), mode, gains[mode]);
+        let others: Vec<ModeParameters> =
+            unrequested.par_iter().map(|mode| parameters(*mode)).collect();
+        let unrequested_mode = |(parameters, mode): (&ModeParameters, &usize)| {
+            identified_mode(fit, noise, parameters, *mode, gains[*mode])
+        };
         let columns = model.residual_columns(lines);
         let inputs = lines.inputs();
         let residuals = (0..lines.outputs.len())
@@ -79,17 +87,35 @@ impl ModalEstimate {
                 (0..inputs).map(|input| unknowns[columns[input].clone()].to_vec()).collect()
             })
             .collect();
+        let terms = parameters_of_modes.iter().chain(&others).map(ModeParameters::term).collect();
+        let groups = if constraints.is_empty() {
+            let neighbours = neighbours(&parameters_of_modes).into_iter();
+            let group = |range: Range<usize>| {
+                ModalGroup::new(range.clone().collect(), &free_of(&requested[range]))
+            };
+            neighbours.map(group).collect()
+        } else {
+            // A constrained estimate has a covariance for each mode alone.
+            let alone = |(index, one): (usize, &ModeParameters)| {
+                ModalGroup::new(vec![index], &one.covariance)
+            };
+            parameters_of_modes.iter().enumerate().map(alone).collect()
+        };
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
             modes,
             parameters: parameters_of_modes,
             constraint_tests: tests.concat(),
-            others: unrequested.into_par_iter().map(unrequested_mode).collect(),
+            others: others.iter().zip(&unrequested).map(unrequested_mode).collect(),
             dropped,
             powers: model.powers.clone(),
-            reference: model.reference,
-            residuals,
-            inputs,
+            model: ModalModel {
+                terms,
+                reference: model.reference,
+                powers: model.powers.forces.clone(),
+                residuals,
+                groups,
+            },
             explained: explained(fit),
             noise_level: noise.sensor.iter().map(level).collect(),
             noise_spectrum: noise.sensor.clone(),
@@ -171,22 +197,14 @@ impl ModalEstimate {
         self.iterations
     }
 
+    /// Returns the modes and residual terms as frequency responses with their covariance.
+    pub fn model(&self) -> &ModalModel {
+        &self.model
+    }
+
     /// Returns the frequency response at ω (rad/s), outputs × inputs.
     pub fn response(&self, omega: f64) -> DMatrix<C> {
-        let s = C::new(0.0, omega);
-        let scaled_frequency = C::new(0.0, omega / self.reference);
-        DMatrix::from_fn(self.residuals.len(), self.inputs, |output, input| {
-            let modal_term = |mode: &IdentifiedMode| {
-                let residue = mode.residue(output, input);
-                residue / (s - mode.pole) + residue.conj() / (s - mode.pole.conj())
-            };
-            let modal: C = self.modes.iter().chain(&self.others).map(modal_term).sum();
-            let residual_terms = self.powers.forces.iter().zip(&self.residuals[output][input]);
-            modal
-                + residual_terms
-                    .map(|(power, value)| scaled_frequency.powi(*power) * *value)
-                    .sum::<C>()
-        })
+        self.model.response(omega)
     }
 
     /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its
@@ -197,7 +215,7 @@ impl ModalEstimate {
     /// [`ModalError::Size`] if the numbers of inputs or outputs differ.
     pub fn synthesis(&self, data: &LineData) -> Result<DMatrix<C>, ModalError> {
         let (inputs, outputs) = (data.inputs().ncols(), data.outputs().ncols());
-        let (model_inputs, model_outputs) = (self.inputs, self.residuals.len());
+        let (model_inputs, model_outputs) = (self.model.inputs(), self.model.outputs());
         if inputs != model_inputs || outputs != model_outputs {
             return Err(ModalError::Size { inputs, outputs, model_inputs, model_outputs });
         }
@@ -211,6 +229,23 @@ impl ModalEstimate {
         add_transients(&lines, &modes, &self.powers.transients, &mut predicted);
         Ok(predicted)
     }
+}
+
+/// Returns the ranges of modes, by rising frequency, whose errors are not independent.
+fn neighbours(modes: &[ModeParameters]) -> Vec<Range<usize>> {
+    let poles: Vec<C> = modes.iter().map(ModeParameters::pole).collect();
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (index, pole) in poles.iter().enumerate() {
+        let is_near = |before: C| {
+            let width = GROUP_HALF_WIDTHS * -pole.re.min(before.re);
+            (pole.im - before.im).abs() < width
+        };
+        match ranges.last_mut() {
+            Some(last) if is_near(poles[index - 1]) => last.end = index + 1,
+            _ => ranges.push(index..index + 1),
+        }
+    }
+    ranges
 }
 
 fn explained(fit: &Fit<'_>) -> Vec<f64> {

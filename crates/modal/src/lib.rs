@@ -17,6 +17,7 @@
 //! | covariance of poles, participations and shapes | `covariance.rs`, `scores.rs`, `mode_parameters.rs` |
 //! | real shapes, reciprocity | `constraint.rs` |
 //! | number of modes: candidates, likelihood, rules | `order.rs`, `rules.rs` |
+//! | frequency responses with their covariance | `modal_model.rs` |
 //! | prediction of other records | `estimate.rs`, `synthesis.rs` |
 
 pub mod ambient;
@@ -33,6 +34,7 @@ pub mod indicators;
 mod initial_poles;
 mod limits;
 mod lines;
+mod modal_model;
 mod mode;
 mod mode_parameters;
 mod model;
@@ -57,5 +59,6 @@ pub use error::ModalError;
 pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
 pub use initial_poles::{initial_mode_count, stabilisation_of};
+pub use modal_model::{ModalGroup, ModalModel, ModalTerm};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};
 pub use model::ResidualPowers;

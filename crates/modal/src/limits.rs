@@ -87,6 +87,9 @@ pub const DEPENDENT_INPUTS: f64 = 1e-6;
 /// Distance in half-widths within which two modes may explain the same response: only one of them
 /// is removed at a time.
 pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
+/// Distance in half-widths beyond which the errors of two modes count as independent in the covariance
+/// of a modal model; within it their covariance is kept whole.
+pub const GROUP_HALF_WIDTHS: f64 = 10.0;
 /// Distance from a mode, in half-widths, within which its unmeasured force may hide another mode.
 pub const HIDDEN_HALF_WIDTHS: f64 = 3.0;
 /// Minimum share of the residual around a mode that the measured forces explain at which a hidden mode

@@ -6,6 +6,7 @@ use mechid_numerics::Uncertain;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 
 use crate::indicators::ShapeWithCovariance;
+use crate::modal_model::ModalTerm;
 use crate::mode::IdentifiedMode;
 
 type C = Complex<f64>;
@@ -51,6 +52,16 @@ impl ModeParameters {
     /// Returns a participation.
     pub(crate) fn participation(&self, input: usize) -> C {
         self.complex(self.participation_index(input))
+    }
+
+    /// Returns the term of the mode in the modal sum.
+    pub(crate) fn term(&self) -> ModalTerm {
+        let pair = |z: C| [z.re, z.im];
+        ModalTerm {
+            pole: pair(self.pole()),
+            shape: (0..self.outputs).map(|output| pair(self.shape(output))).collect(),
+            participation: (0..self.inputs).map(|input| pair(self.participation(input))).collect(),
+        }
     }
 
     /// Returns the input that fixes the phase of the forces: the gauge, or the strongest input of a

@@ -6,6 +6,7 @@ mod constraints;
 mod forced;
 mod generator;
 mod refusals;
+mod responses;
 mod score;
 mod sources;
 mod subframe;

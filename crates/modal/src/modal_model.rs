@@ -1,0 +1,233 @@
+//! Frequency responses of identified modes and residual terms, with the covariance of the modes.
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::model::Kernel;
+
+type C = Complex<f64>;
+
+/// Modes and residual terms of a test: its frequency responses, valid in the band of the test.
+///
+/// Output i at ω answers forces f by Σ_r [φ_ir L_rᵀf/(jω − λ_r) + φ_ir* L_rᴴf/(jω − λ_r*)] + Σ_n
+/// c_inᵀf (jω/ω₀)ⁿ. The covariance holds poles, shapes and participations; residual terms, and
+/// modes outside the band, count as exact.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.6 (modal sum and residual terms).
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ModalModel {
+    /// Modes in the band, then the modes outside it that belong to the model.
+    pub terms: Vec<ModalTerm>,
+    /// Angular frequency ω₀ that scales the residual terms, in rad/s.
+    pub reference: f64,
+    /// Powers n of the residual terms.
+    pub powers: Vec<i32>,
+    /// Coefficients c of the residual terms, in the unit of the output per N: one list for each
+    /// output, in it one for each input, in it one for each power.
+    pub residuals: Vec<Vec<Vec<f64>>>,
+    /// Modes whose errors belong together, with their covariance.
+    pub groups: Vec<ModalGroup>,
+}
+
+/// One mode of the sum.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ModalTerm {
+    /// Real and imaginary part of the pole λ, in rad/s.
+    pub pole: [f64; 2],
+    /// Real and imaginary part of the shape φ at each output.
+    pub shape: Vec<[f64; 2]>,
+    /// Real and imaginary part of the participation L of each input: the residue of output and
+    /// input is shape times participation.
+    pub participation: Vec<[f64; 2]>,
+}
+
+/// Modes whose errors belong together.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ModalGroup {
+    /// Indices of the modes.
+    pub modes: Vec<usize>,
+    /// Covariance, a row of the lower triangle each, of ln(−Re λ), ln Im λ, real and imaginary part
+    /// of each entry of the shape, then of each participation, mode after mode.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl ModalGroup {
+    /// Creates a group from a symmetric covariance.
+    pub(crate) fn new(modes: Vec<usize>, covariance: &DMatrix<f64>) -> Self {
+        let row = |row: usize| (0..=row).map(|column| covariance[(row, column)]).collect();
+        Self { modes, covariance: (0..covariance.nrows()).map(row).collect() }
+    }
+
+    fn entry(&self, a: usize, b: usize) -> f64 {
+        self.covariance[a.max(b)][a.min(b)]
+    }
+}
+
+impl ModalTerm {
+    fn pole(&self) -> C {
+        complex(&self.pole)
+    }
+
+    /// Returns Σ_j L_j f_j and Σ_j L_j* f_j.
+    fn modal_force(&self, forces: &[C]) -> (C, C) {
+        let pairs = || self.participation.iter().map(complex).zip(forces);
+        (pairs().map(|(l, f)| l * f).sum(), pairs().map(|(l, f)| l.conj() * f).sum())
+    }
+
+    /// Number of parameters of the mode in a covariance.
+    fn parameters(&self) -> usize {
+        2 + 2 * self.shape.len() + 2 * self.participation.len()
+    }
+
+    /// Returns the derivatives of the response of an output to forces by the parameters of the mode
+    /// that change it, with their indices.
+    fn derivatives(&self, output: usize, omega: f64, forces: &[C]) -> Vec<(usize, C)> {
+        let pole = self.pole();
+        let Kernel { value, mirror, slope, mirror_slope } = Kernel::from_force(pole, omega);
+        let (force, mirror_force) = self.modal_force(forces);
+        let shape = complex(&self.shape[output]);
+        let moved = shape * force * slope;
+        let moved_mirror = shape.conj() * mirror_force * mirror_slope;
+        let (direct, conjugate) = (force * value, mirror_force * mirror);
+        let at = 2 + 2 * output;
+        let mut all = vec![
+            (0, (moved + moved_mirror) * pole.re),
+            (1, C::i() * (moved - moved_mirror) * pole.im),
+            (at, direct + conjugate),
+            (at + 1, C::i() * (direct - conjugate)),
+        ];
+        let (direct, conjugate) = (shape * value, shape.conj() * mirror);
+        for (input, force) in forces.iter().enumerate() {
+            let at = 2 + 2 * self.shape.len() + 2 * input;
+            all.push((at, force * (direct + conjugate)));
+            all.push((at + 1, C::i() * force * (direct - conjugate)));
+        }
+        all
+    }
+}
+
+fn complex([re, im]: &[f64; 2]) -> C {
+    C::new(*re, *im)
+}
+
+impl ModalModel {
+    /// Returns the number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.residuals.len()
+    }
+
+    /// Returns the number of inputs.
+    pub fn inputs(&self) -> usize {
+        self.residuals.first().map_or(0, Vec::len)
+    }
+
+    /// Returns whether all lists have the sizes that belong together, so that no index is out of
+    /// range: of a model that was read from a file.
+    pub fn is_consistent(&self) -> bool {
+        let (outputs, inputs) = (self.outputs(), self.inputs());
+        let fits = |term: &ModalTerm| {
+            term.shape.len() == outputs && term.participation.len() == inputs && term.pole[0] < 0.0
+        };
+        let whole = |rows: &Vec<Vec<f64>>| {
+            rows.len() == inputs && rows.iter().all(|row| row.len() == self.powers.len())
+        };
+        let grouped = |group: &ModalGroup| {
+            let known = group.modes.iter().all(|mode| *mode < self.terms.len());
+            let size = group.covariance.len();
+            let rows = (1..).zip(&group.covariance);
+            known
+                && size == group.modes.iter().map(|mode| self.terms[*mode].parameters()).sum()
+                && rows.into_iter().all(|(length, row)| row.len() == length)
+        };
+        self.reference > 0.0
+            && self.terms.iter().all(fits)
+            && self.residuals.iter().all(whole)
+            && self.groups.iter().all(grouped)
+    }
+
+    /// Returns the frequency response at ω (rad/s), outputs × inputs.
+    pub fn response(&self, omega: f64) -> DMatrix<C> {
+        let scaled = C::new(0.0, omega / self.reference);
+        let mut response = DMatrix::from_fn(self.outputs(), self.inputs(), |output, input| {
+            let terms = self.powers.iter().zip(&self.residuals[output][input]);
+            terms.map(|(power, value)| scaled.powi(*power) * *value).sum()
+        });
+        for term in &self.terms {
+            let Kernel { value, mirror, .. } = Kernel::from_force(term.pole(), omega);
+            for (output, shape) in term.shape.iter().map(complex).enumerate() {
+                for (input, participation) in term.participation.iter().map(complex).enumerate() {
+                    let residue = shape * participation;
+                    response[(output, input)] += residue * value + residue.conj() * mirror;
+                }
+            }
+        }
+        response
+    }
+
+    /// Returns the covariance E[δy δyᴴ] of the response to given forces at ω (rad/s) that the errors
+    /// of the modes cause, outputs × outputs.
+    pub fn response_covariance(&self, omega: f64, forces: &[C]) -> DMatrix<C> {
+        let outputs = self.outputs();
+        let mut covariance = DMatrix::zeros(outputs, outputs);
+        for group in &self.groups {
+            let all: Vec<_> =
+                (0..outputs).map(|i| self.gradient(group, i, omega, forces)).collect();
+            for i in 0..outputs {
+                for j in 0..=i {
+                    let sum = product(group, &all[i], &all[j]);
+                    covariance[(i, j)] += sum;
+                    if i != j {
+                        covariance[(j, i)] += sum.conj();
+                    }
+                }
+            }
+        }
+        covariance
+    }
+
+    /// Returns the diagonal of [`ModalModel::response_covariance`].
+    pub fn response_variance(&self, omega: f64, forces: &[C]) -> Vec<f64> {
+        let variance = |output: usize| {
+            let of_group = |group: &ModalGroup| {
+                let gradient = self.gradient(group, output, omega, forces);
+                product(group, &gradient, &gradient).re
+            };
+            self.groups.iter().map(of_group).sum()
+        };
+        (0..self.outputs()).map(variance).collect()
+    }
+
+    /// Returns the derivatives of an output by the parameters of a group.
+    fn gradient(
+        &self,
+        group: &ModalGroup,
+        output: usize,
+        omega: f64,
+        forces: &[C],
+    ) -> Vec<(usize, C)> {
+        let mut first = 0;
+        let mut all = Vec::new();
+        for mode in &group.modes {
+            let term = &self.terms[*mode];
+            let own = term.derivatives(output, omega, forces);
+            all.extend(own.into_iter().map(|(index, value)| (first + index, value)));
+            first += term.parameters();
+        }
+        all
+    }
+}
+
+/// Returns Σ_ab g_a C_ab h_b* with the covariance of a group.
+fn product(group: &ModalGroup, g: &[(usize, C)], h: &[(usize, C)]) -> C {
+    let row = |(a, left): &(usize, C)| {
+        let sum: C = h.iter().map(|(b, right)| right.conj() * group.entry(*a, *b)).sum();
+        left * sum
+    };
+    g.iter().map(row).sum()
+}
