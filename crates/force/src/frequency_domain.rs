@@ -1,6 +1,5 @@
 //! The dynamic stiffness, line by line.
 
-use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -10,7 +9,7 @@ use crate::identified::IdentifiedForce;
 use crate::lines::{check_lines, noise_weight};
 use crate::measurement::Measurement;
 use crate::noise::{Noise, channel_sizes};
-use crate::transfer::Transfer;
+use crate::transfer::{FrequencyResponse, Transfer};
 use crate::unexplained::Residual;
 
 /// F_n = (K − ω²M + iωC) X_n at the chosen lines of a whole period, zero at all others.
@@ -20,8 +19,9 @@ use crate::unexplained::Residual;
 /// choice of only the excited lines excludes the noise of all others. The Nyquist line of an even
 /// record has no phase: leave it out.
 ///
-/// The standard error, if the noise level is known, covers measurement noise only; it is the same
-/// at every instant. No unbiased method does better at these lines (Cramér-Rao).
+/// The standard error covers measurement noise, if its level is known, and the uncertainty of a
+/// system that states it ([`FrequencyResponse::response_covariance`]); it is the same at every
+/// instant. No unbiased method does better at these lines (Cramér-Rao).
 ///
 /// Cost: one transform per channel, one n×n solve and one small SVD per line.
 ///
@@ -36,13 +36,17 @@ use crate::unexplained::Residual;
 /// # Source
 /// Dissertation section 6.2 suggests it; eq. (4.6.9) is its real form for one degree of freedom.
 pub fn frequency_domain(
-    system: &SecondOrderSystem,
+    system: &dyn FrequencyResponse,
     measured: &Measurement,
     forced: &[usize],
     lines: &[usize],
     noise: &Noise,
 ) -> Result<IdentifiedForce, ForceError> {
-    measured.check(system.dof(), forced)?;
+    let places = system.places();
+    measured.check(system.sensors().max(places), forced)?;
+    if let Some(&dof) = forced.iter().find(|dof| **dof >= places) {
+        return Err(ForceError::NoSuchDof { dof, dofs: places });
+    }
     let spectrum = Spectrum::of(measured.record());
     check_lines(&spectrum, lines)?;
     let level = noise.resolve(measured, &spectrum, lines)?;
@@ -51,34 +55,94 @@ pub fn frequency_domain(
     let transfer = Transfer { system, channels: measured.channels(), forced, scale: &scale };
 
     let sampling = measured.sampling();
-    let mut force = DMatrix::<Complex<f64>>::zeros(spectrum.len(), system.dof());
-    let mut variance = vec![0.0; system.dof()];
+    let mut force = DMatrix::<Complex<f64>>::zeros(spectrum.len(), places);
+    let mut variance = Variance::new(measured.channels().len(), places);
     for &n in lines {
         let inverse = transfer.inverse(n, spectrum.omega(n))?;
         let forces = &inverse * spectrum.lines().row(n).transpose();
+        let weight = noise_weight(sampling.len(), n);
         for (f, &dof) in forced.iter().enumerate() {
             force[(n, dof)] = forces[f];
-            variance[dof] += noise_weight(sampling.len(), n)
-                * inverse.row(f).iter().zip(&scale).map(|(g, s)| g.norm_sqr() * s * s).sum::<f64>();
+            let noise = |channel: usize| (inverse[(f, channel)].norm() * scale[channel]).powi(2);
+            variance.noise[dof] += weight * (0..scale.len()).map(noise).sum::<f64>();
         }
+        variance.add_system(&transfer, n, spectrum.omega(n), &inverse, forces.as_slice())?;
     }
     let force = Spectrum::from_lines(sampling, force)?;
     let level = level.as_deref();
     let residual = measured
         .exceeds(forced)
         .then(|| Residual::from_lines(system, measured, forced, &force, lines, level));
-    let standard_error = level.map(|_| {
-        let constant =
-            DMatrix::from_fn(sampling.len(), system.dof(), |_, dof| variance[dof].sqrt());
-        Record::new(sampling, constant)
+    let residual = residual.transpose()?.map(|residual| match variance.is_known {
+        true => residual.with_machine(&variance.residual),
+        false => residual,
+    });
+    let standard_error = (level.is_some() || variance.is_known).then(|| {
+        let noise = |dof: usize| if level.is_some() { variance.noise[dof] } else { 0.0 };
+        let error = |_, dof: usize| (noise(dof) + variance.system[dof]).sqrt();
+        Record::new(sampling, DMatrix::from_fn(sampling.len(), places, error))
     });
     let force = IdentifiedForce::from_record(force.to_record()?)
         .with_standard_error(standard_error.transpose()?)
-        .with_residual(residual.transpose()?);
+        .with_residual(residual);
     Ok(match measured.band_hz() {
         Some(band_hz) => force.with_band(band_hz),
         None => force,
     })
+}
+
+/// Mean squares over a period that errors cause.
+struct Variance {
+    /// In each force, from noise of the channels of standard deviation `scale`.
+    noise: Vec<f64>,
+    /// In each force, from the uncertainty of the system.
+    system: Vec<f64>,
+    /// In the residual of each channel, from the uncertainty of the system, `1 × channels`.
+    residual: DMatrix<f64>,
+    /// `true` if the system states its uncertainty.
+    is_known: bool,
+}
+
+impl Variance {
+    fn new(channels: usize, places: usize) -> Self {
+        let zeros = || vec![0.0; places];
+        let residual = DMatrix::zeros(1, channels);
+        Self { noise: zeros(), system: zeros(), residual, is_known: false }
+    }
+
+    /// Adds what the uncertainty of the system does on a line: to first order δF = −G δH F, and the
+    /// residual changes by −(I − H G) δH F, with the inverse G of H.
+    fn add_system(
+        &mut self,
+        transfer: &Transfer<'_>,
+        line: usize,
+        omega: f64,
+        inverse: &DMatrix<Complex<f64>>,
+        forces: &[Complex<f64>],
+    ) -> Result<(), ForceError> {
+        let Transfer { system, channels, forced, scale } = transfer;
+        let Some(covariance) = system.response_covariance(channels, forced, omega, forces) else {
+            return Ok(());
+        };
+        self.is_known = true;
+        // The mean square of an oscillation is half the square of its amplitude.
+        let half = if line == 0 { 1.0 } else { 0.5 };
+        let of_forces = inverse * &covariance * inverse.adjoint();
+        for (f, &dof) in forced.iter().enumerate() {
+            self.system[dof] += half * of_forces[(f, f)].re.max(0.0);
+        }
+        let mut response = transfer.scaled(line, omega)?;
+        for (mut row, scale) in response.row_iter_mut().zip(*scale) {
+            row *= Complex::from(*scale);
+        }
+        let channels = channels.len();
+        let rest = DMatrix::identity(channels, channels) - response * inverse;
+        let of_residual = &rest * covariance * rest.adjoint();
+        for (channel, sum) in self.residual.iter_mut().enumerate() {
+            *sum += half * of_residual[(channel, channel)].re.max(0.0);
+        }
+        Ok(())
+    }
 }
 
 /// Returns the lines within the band of the measurement.

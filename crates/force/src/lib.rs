@@ -99,5 +99,6 @@ pub use nonlinear::{continuous_nonlinear, continuous_nonlinear_with_noise};
 pub use open_operator::OPEN_UNKNOWNS;
 pub use regularised::{ForceUnknowns, RegularisedForce, regularised};
 pub use rule::{Filter, Rule};
+pub use transfer::FrequencyResponse;
 pub use uncertainty::{with_uncertain_nonlinear_system, with_uncertain_system};
 pub use unexplained::Unexplained;

@@ -10,9 +10,76 @@ use crate::measurement::Channel;
 
 type Line = Complex<f64>;
 
+/// What turns forces into measured channels, frequency by frequency: M, C and K, or modes.
+pub trait FrequencyResponse {
+    /// Returns the number of places where a force can act.
+    fn places(&self) -> usize;
+
+    /// Returns the number of places where a channel can measure; [`Channel::dof`] counts them.
+    fn sensors(&self) -> usize {
+        self.places()
+    }
+
+    /// Returns measured channels × forces at ω (rad/s); `None` where it is not finite.
+    fn response(
+        &self,
+        channels: &[Channel],
+        forced: &[usize],
+        omega: f64,
+    ) -> Option<DMatrix<Complex<f64>>>;
+
+    /// Returns the dynamic stiffness, if channels and forces are the degrees of freedom of one
+    /// matrix: places × places, in N/m.
+    fn stiffness_matrix(&self, _omega: f64) -> Option<DMatrix<Complex<f64>>> {
+        None
+    }
+
+    /// Returns the covariance E[δy δyᴴ] of the channels' responses to given forces (one for each
+    /// entry of `forced`) that the uncertainty of the system causes; `None` if the system is exact
+    /// or its uncertainty is counted elsewhere.
+    fn response_covariance(
+        &self,
+        _channels: &[Channel],
+        _forced: &[usize],
+        _omega: f64,
+        _forces: &[Complex<f64>],
+    ) -> Option<DMatrix<Complex<f64>>> {
+        None
+    }
+}
+
+impl FrequencyResponse for SecondOrderSystem {
+    fn places(&self) -> usize {
+        self.dof()
+    }
+
+    fn response(
+        &self,
+        channels: &[Channel],
+        forced: &[usize],
+        omega: f64,
+    ) -> Option<DMatrix<Complex<f64>>> {
+        let forces = DMatrix::from_fn(self.dof(), forced.len(), |i, j| {
+            Complex::new(if i == forced[j] { 1.0 } else { 0.0 }, 0.0)
+        });
+        let motion = self.dynamic_stiffness(omega).lu().solve(&forces)?;
+        let is_finite = motion.iter().all(|z| z.re.is_finite() && z.im.is_finite());
+        is_finite.then(|| {
+            DMatrix::from_fn(channels.len(), forced.len(), |i, j| {
+                let channel = channels[i];
+                motion[(channel.dof, j)] * channel.quantity.per_displacement(omega)
+            })
+        })
+    }
+
+    fn stiffness_matrix(&self, omega: f64) -> Option<DMatrix<Complex<f64>>> {
+        Some(self.dynamic_stiffness(omega))
+    }
+}
+
 /// The system between the forced degrees of freedom and the measured channels.
 pub(crate) struct Transfer<'a> {
-    pub system: &'a SecondOrderSystem,
+    pub system: &'a dyn FrequencyResponse,
     pub channels: &'a [Channel],
     pub forced: &'a [usize],
     /// Standard deviation of each channel's noise, or its size: the divisor of its row.
@@ -22,21 +89,14 @@ pub(crate) struct Transfer<'a> {
 impl Transfer<'_> {
     /// Measured channels × forces, each row divided by the scale of its channel.
     pub fn scaled(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
-        let n = self.system.dof();
-        let forces = DMatrix::from_fn(n, self.forced.len(), |i, j| {
-            Complex::new(if i == self.forced[j] { 1.0 } else { 0.0 }, 0.0)
-        });
-        let motion = self
+        let mut response = self
             .system
-            .dynamic_stiffness(omega)
-            .lu()
-            .solve(&forces)
-            .filter(|motion| motion.iter().all(|z| z.re.is_finite() && z.im.is_finite()))
+            .response(self.channels, self.forced, omega)
             .ok_or(ForceError::Resonance { line, omega })?;
-        Ok(DMatrix::from_fn(self.channels.len(), self.forced.len(), |i, j| {
-            let channel = self.channels[i];
-            motion[(channel.dof, j)] * channel.quantity.per_displacement(omega) / self.scale[i]
-        }))
+        for (mut row, scale) in response.row_iter_mut().zip(self.scale) {
+            row /= Complex::from(*scale);
+        }
+        Ok(response)
     }
 
     /// Forces × measured channels: the matrix that turns a measured line into forces.
@@ -44,8 +104,10 @@ impl Transfer<'_> {
     /// With every degree of freedom forced and measured once this is the dynamic stiffness itself;
     /// otherwise the weighted least-squares inverse of the transfer matrix.
     pub fn inverse(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
-        if self.measures_everything_once() {
-            return self.direct(line, omega);
+        if self.measures_everything_once()
+            && let Some(stiffness) = self.system.stiffness_matrix(omega)
+        {
+            return self.direct(&stiffness, line, omega);
         }
         let transfer = self.scaled(line, omega)?;
         let svd = svd(transfer.clone())?;
@@ -67,14 +129,18 @@ impl Transfer<'_> {
     }
 
     fn measures_everything_once(&self) -> bool {
-        let n = self.system.dof();
+        let n = self.system.places();
         let mut measured = vec![false; n];
-        self.channels.iter().for_each(|c| measured[c.dof] = true);
+        self.channels.iter().filter(|c| c.dof < n).for_each(|c| measured[c.dof] = true);
         self.forced.len() == n && self.channels.len() == n && measured.iter().all(|m| *m)
     }
 
-    fn direct(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
-        let stiffness = self.system.dynamic_stiffness(omega);
+    fn direct(
+        &self,
+        stiffness: &DMatrix<Line>,
+        line: usize,
+        omega: f64,
+    ) -> Result<DMatrix<Line>, ForceError> {
         let mut inverse = DMatrix::zeros(self.forced.len(), self.channels.len());
         for (c, channel) in self.channels.iter().enumerate() {
             let derivative = channel.quantity.per_displacement(omega);

@@ -11,7 +11,7 @@ use crate::error::ForceError;
 use crate::lines::noise_weight;
 use crate::measurement::{Measurement, Start};
 use crate::state_space::Machine;
-use crate::transfer::Transfer;
+use crate::transfer::{FrequencyResponse, Transfer};
 
 /// Part of one measured channel that the identified force does not explain.
 ///
@@ -74,7 +74,7 @@ impl Residual {
     /// White noise of standard deviation σ has the RMS value σ √(Σ w) on them, with w the variance
     /// of each part of a line under noise of unit variance.
     pub fn from_lines(
-        system: &SecondOrderSystem,
+        system: &dyn FrequencyResponse,
         measured: &Measurement,
         forced: &[usize],
         force: &Spectrum,
