@@ -87,8 +87,9 @@ pub use mechid_model::ResponseQuantity;
 pub use mechid_signal::HitRule;
 pub use modal::ModalSummary;
 pub use modes::{
-    ModeComparison, ModeSet, Modes, ModesSettings, compare_modes, modes, modes_of_responses,
+    ModalSystem, ModeComparison, ModeSet, Modes, ModesSettings, compare_modes, modes,
+    modes_of_responses, predict_with_modes,
 };
 pub use predict::{Predict, Predicted, predict};
-pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};
+pub use reconstruct::{Reconstruct, Reconstructed, reconstruct, reconstruct_with_modes};
 pub use sweep::{SweepSettings, SweepSummary, sweep_experiment, sweep_record};

@@ -6,7 +6,7 @@ use mechid_estimate::EstimateError;
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
 use mechid_nonlinear as nonlinear;
 use mechid_nonlinear::ChannelPhase;
-use mechid_signal::{Extent, measures, message};
+use mechid_signal::{Extent, Record, Sampling, measures, message};
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::AnalysisError;
@@ -29,7 +29,16 @@ pub struct Predict {
 #[derive(Debug)]
 pub struct Predicted {
     summary: PredictionSummary,
-    response: Response,
+    motion: PredictedMotion,
+}
+
+/// Predicted time histories.
+#[derive(Debug)]
+pub(crate) enum PredictedMotion {
+    /// Every degree of freedom of a machine.
+    Machine(Response),
+    /// Responses of a modal test, samples × columns.
+    Modes { names: Vec<String>, record: Record },
 }
 
 /// Numbers of a prediction.
@@ -71,6 +80,9 @@ pub struct PredictionError {
     pub rmse: f64,
     /// RMSE over the RMS of the measured response about its mean (pure number).
     pub nrmse: f64,
+    /// RMS of the errors that those of the modes cause, in this unit; `None` for a machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
 }
 
 /// Predicts the response of a machine to the force of a record.
@@ -136,7 +148,7 @@ pub fn predict(
         remarks,
         analysis: how.clone(),
     };
-    Ok(Predicted { summary, response })
+    Ok(Predicted::new(summary, PredictedMotion::Machine(response)))
 }
 
 /// Number of parts of a record; the first and the last are compared.
@@ -229,7 +241,7 @@ fn steady_from_rest(
 }
 
 impl PredictionError {
-    fn new(
+    pub(crate) fn new(
         (name, quantity, dof): (String, ResponseQuantity, usize),
         measured: &[f64],
         predicted: &[f64],
@@ -242,7 +254,13 @@ impl PredictionError {
         let size: Vec<f64> = measured.iter().map(|x| x - about).collect();
         let (rmse, size) = (measures::rms(&error), measures::rms(&size));
         let (degree_of_freedom, unit) = (dof + 1, quantity.unit());
-        Self { quantity, degree_of_freedom, name, unit, rmse, nrmse: rmse / size }
+        let nrmse = rmse / size;
+        Self { quantity, degree_of_freedom, name, unit, rmse, nrmse, standard_error: None }
+    }
+
+    /// Returns the same with the RMS of the errors that those of the modes cause.
+    pub(crate) fn with_standard_error(self, standard_error: f64) -> Self {
+        Self { standard_error: Some(standard_error), ..self }
     }
 }
 
@@ -252,15 +270,39 @@ impl Predicted {
         &self.summary
     }
 
-    /// Returns displacement, velocity and acceleration (samples × degrees of freedom, in m, m/s and
-    /// m/s²).
-    pub fn response(&self) -> &Response {
-        &self.response
+    pub(crate) fn new(summary: PredictionSummary, motion: PredictedMotion) -> Self {
+        Self { summary, motion }
+    }
+
+    /// Returns displacement, velocity and acceleration of a machine (samples × degrees of freedom,
+    /// in m, m/s and m/s²); `None` of modes.
+    pub fn response(&self) -> Option<&Response> {
+        match &self.motion {
+            PredictedMotion::Machine(response) => Some(response),
+            PredictedMotion::Modes { .. } => None,
+        }
+    }
+
+    /// Returns the time axis.
+    pub fn sampling(&self) -> Sampling {
+        match &self.motion {
+            PredictedMotion::Machine(response) => response.sampling(),
+            PredictedMotion::Modes { record, .. } => record.sampling(),
+        }
     }
 
     /// Returns the columns of a record of the prediction, with their names: every measured kind of
-    /// response, or displacements, in m, m/s or m/s².
+    /// response, or displacements, in m, m/s or m/s²; of modes the measured responses, or all.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
+        match &self.motion {
+            PredictedMotion::Machine(response) => self.machine_columns(response),
+            PredictedMotion::Modes { names, record } => {
+                (0..).zip(names).map(|(at, name)| (name.clone(), record.channel(at))).collect()
+            }
+        }
+    }
+
+    fn machine_columns<'a>(&self, response: &'a Response) -> Vec<(String, &'a [f64])> {
         let measured = |kind: &ResponseQuantity| {
             self.summary.channels.iter().any(|channel| channel.quantity == *kind)
         };
@@ -268,13 +310,13 @@ impl Predicted {
         if kinds.is_empty() {
             kinds.push(ResponseQuantity::Displacement);
         }
-        let dofs = self.response.dof();
+        let dofs = response.dof();
         let name = |kind: ResponseQuantity, dof: usize| match dofs {
             1 => kind.to_string(),
             _ => format!("{kind} {}", dof + 1),
         };
         let of = |kind: ResponseQuantity| {
-            let record = channels(&self.response, kind);
+            let record = channels(response, kind);
             (0..dofs).map(move |dof| (name(kind, dof), record.channel(dof)))
         };
         kinds.into_iter().flat_map(of).collect()
@@ -296,6 +338,9 @@ impl fmt::Display for Predicted {
         let from = self.summary.first_judged;
         let header = [&format!("error from sample {from} on"), "RMSE", "unit", "NRMSE"];
         let mut rows = vec![header.map(String::from).to_vec()];
+        if self.summary.channels.iter().any(|channel| channel.standard_error.is_some()) {
+            rows[0].push("± of the modes".into());
+        }
         for channel in &self.summary.channels {
             rows.push(vec![
                 channel.name.clone(),
@@ -303,6 +348,8 @@ impl fmt::Display for Predicted {
                 channel.unit.into(),
                 format!("{} %", significant(100.0 * channel.nrmse, 3)),
             ]);
+            let error = channel.standard_error.map(|error| significant(error, 2));
+            rows.last_mut().into_iter().for_each(|row| row.extend(error.clone()));
         }
         write!(f, "\n{}", text_table(&rows))?;
         f.write_str(&paragraph(remarks))

@@ -76,11 +76,11 @@ pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, Ma
 pub use mechid_analysis::{
     BearingData, Channels, DecaySettings, Decayed, Detrend, ElementData, FrfSettings, Identified,
     IdentifiedBearing, IdentifiedElements, IdentifiedResponses, Identify, IdentifyBearing,
-    IdentifyElements, IdentifyResponses, InspectSettings, Machine, Measurement, ModeComparison,
-    ModeSet, Modes, ModesSettings, Predict, Predicted, Reading, Reconstruct, Reconstructed,
-    ResultRow, SavedAnalysis, Segmentation, Window, compare_modes, decay, frf, frf_of_records,
-    identify, identify_bearing, identify_elements, identify_responses, inspect, modes,
-    modes_of_responses, predict, reconstruct,
+    IdentifyElements, IdentifyResponses, InspectSettings, Machine, Measurement, ModalSystem,
+    ModeComparison, ModeSet, Modes, ModesSettings, Predict, Predicted, Reading, Reconstruct,
+    Reconstructed, ResultRow, SavedAnalysis, Segmentation, Window, compare_modes, decay, frf,
+    frf_of_records, identify, identify_bearing, identify_elements, identify_responses, inspect,
+    modes, modes_of_responses, predict, predict_with_modes, reconstruct, reconstruct_with_modes,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_checks as checks;

@@ -1,7 +1,7 @@
 //! Response of a machine to the force of a record.
 
 use mechid::Predict;
-use mechid::model::ResponseQuantity;
+use mechid::model::{Response, ResponseQuantity};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Named};
@@ -41,7 +41,9 @@ impl Predicted {
 
     /// Returns every kind of response.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
-        let of = |kind| (kind, self.0.response().quantity(kind).clone());
-        arrays::responses(py, ResponseQuantity::ALL.map(of).into())
+        let of = |response: &Response| {
+            ResponseQuantity::ALL.map(|kind| (kind, response.quantity(kind).clone())).into()
+        };
+        arrays::responses(py, self.0.response().map(of).unwrap_or_default())
     }
 }

@@ -229,7 +229,9 @@ fn used(d: &mut Draw, identified: &Identified, record: &Measurement) -> Result<(
     let how = Predict { settle: d.one_in(3).then(|| d.size()) };
     if let Some(predicted) = passed(predict(record, &machine, &how))? {
         printed(&predicted)?;
-        finite(predicted.response().displacement())?;
+        if let Some(response) = predicted.response() {
+            finite(response.displacement())?;
+        }
     }
     Ok(())
 }

@@ -75,6 +75,7 @@ pub(super) fn modes(
         checks: checks::channel_checks(measurements)?,
         notes: notes(&estimate),
         diagrams: None,
+        model: None,
         analysis: settings.clone(),
     };
     let data = LineData::from_open_record(None, &record, estimate.band_hz)?;

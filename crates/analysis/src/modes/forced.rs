@@ -227,6 +227,10 @@ impl Context {
         let modes: Vec<ModalModeRow> = fitted
             .map(|(mode, fitted)| row(mode, fitted, &self.outputs, &self.driving_points))
             .collect();
+        let mut model = estimate.model().clone();
+        for term in &mut model.terms {
+            term.pole[0] += self.added_decay.unwrap_or(0.0);
+        }
         let mean = |shares: &[f64]| shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         let outputs = self.outputs.iter().enumerate().map(|(at, output)| OutputRow {
             column: output.name.clone(),
@@ -252,6 +256,7 @@ impl Context {
             checks: rows,
             notes: notes(&estimate).into_iter().chain(self.notes).collect(),
             diagrams: None,
+            model: Some(model),
             analysis: settings.clone(),
         };
         let spectrum = spectrum(&data, &estimate)?;

@@ -8,12 +8,14 @@ mod comparison;
 mod diagrams;
 mod forced;
 mod mode_set;
+mod prediction;
 pub(crate) mod resonances;
 mod rows;
 mod settings;
 mod sources;
 mod summary;
 mod synthesis;
+mod system;
 mod tables;
 mod validation;
 
@@ -27,6 +29,7 @@ use self::diagrams::DiagramData;
 pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
 pub use self::mode_set::ModeSet;
+pub use self::prediction::predict_with_modes;
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
 pub(crate) use self::sources::driven_band;
@@ -34,6 +37,7 @@ pub use self::summary::{
     DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
     SegmentsRow, TableRow,
 };
+pub use self::system::ModalSystem;
 use self::tables::Tables;
 use crate::AnalysisError;
 use crate::measurement::Measurement;

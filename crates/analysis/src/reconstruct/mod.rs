@@ -5,6 +5,7 @@
 //! | `options` | settings, as values |
 //! | `motion` | the measured responses |
 //! | `method` | the choice of the method, and its result |
+//! | `modal` | the force by the modes of a test |
 //! | `chunks` | the reconstruction of a record that is not in memory |
 //! | `shown` | the band in which responses without a displacement show a force |
 //! | `unexplained`, `periods`, `kinematics` | warnings about the result |
@@ -14,6 +15,7 @@
 mod chunks;
 mod kinematics;
 pub(crate) mod method;
+mod modal;
 mod motion;
 pub mod options;
 mod peak_line;
@@ -33,6 +35,7 @@ use serde::{Serialize, Serializer};
 
 use self::kinematics::KinematicConsistency;
 use self::method::{Found, How, Request};
+pub use self::modal::reconstruct_with_modes;
 use self::motion::Recorded;
 pub use self::options::{Method, ParameterRule, Reconstruct};
 use self::summary::{Chosen, ForceRow, ForceSummary};
@@ -176,6 +179,15 @@ impl Serialize for Reconstructed {
     }
 }
 
+/// What a summary says of the system.
+struct System<'a> {
+    name: &'a str,
+    /// Number of places where forces may act.
+    dofs: usize,
+    /// `true` if its uncertainty is known.
+    uncertain: bool,
+}
+
 /// A reconstruction before its computation.
 struct Task {
     recorded: Recorded,
@@ -224,12 +236,13 @@ impl Task {
         };
         how.remarks.extend(shown::remark(&recorded.channels, request, &how));
         how.remarks.extend(rates.remarks(recorded.columns()));
-        Ok((self.summary(machine, settings, &how, &tally), force))
+        let system = System { name: &machine.name, dofs, uncertain: !machine.is_exact() };
+        Ok((self.summary(&system, settings, &how, &tally), force))
     }
 
     fn summary(
         &self,
-        machine: &Machine,
+        system: &System<'_>,
         settings: &Reconstruct,
         how: &How,
         tally: &Tally<'_>,
@@ -240,7 +253,7 @@ impl Task {
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();
         let channels = Measured::all(recorded, unexplained);
-        let (dofs, uncertain) = (machine.system().dof(), !machine.is_exact());
+        let System { name, dofs, uncertain } = *system;
         remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
         let forces = tally.forces(&request.forced);
         remarks.extend(forces.iter().filter_map(ForceRow::doubt));
@@ -258,7 +271,7 @@ impl Task {
         }
         ForceSummary {
             file: recorded.file().to_owned(),
-            machine: machine.name.clone(),
+            machine: name.to_owned(),
             method: how.method,
             why: how.why.clone(),
             samples: recorded.sampling.len(),

@@ -37,26 +37,39 @@ pub struct Held {
 }
 
 impl Recorded {
-    /// Selects the responses and the window of a measurement; a periodic window is averaged over
-    /// its periods.
+    /// Selects the responses of a machine and the window of a measurement; a periodic window is
+    /// averaged over its periods.
     pub fn new(
         measured: &measurement::Measurement,
         dofs: usize,
         periodic: bool,
     ) -> Result<Self, AnalysisError> {
-        let source = Arc::clone(measured.source());
-        let (mut columns, mut channels) = (Vec::new(), Vec::new());
+        let source = measured.source();
+        let mut columns = Vec::new();
         for kind in ResponseQuantity::ALL {
             let named = source.channels.response(kind);
             if !named.is_empty() && named.len() != dofs {
                 let got = named.len();
                 return Err(AnalysisError::MotionCount { response: kind, got, dofs });
             }
-            for (dof, _) in named.iter().enumerate().filter(|(_, c)| *c != ABSENT) {
-                columns.push(source.names.response_name(kind, dof));
-                channels.push(Channel { dof, quantity: kind });
-            }
+            let present = named.iter().enumerate().filter(|(_, column)| *column != ABSENT);
+            columns.extend(present.map(|(dof, _)| (kind, dof, dof)));
         }
+        Self::with_columns(measured, &columns, periodic)
+    }
+
+    /// Selects responses, each with its quantity, its number among the columns of this quantity and
+    /// the degree of freedom or output that it measures, in the order of the columns.
+    pub fn with_columns(
+        measured: &measurement::Measurement,
+        selected: &[(ResponseQuantity, usize, usize)],
+        periodic: bool,
+    ) -> Result<Self, AnalysisError> {
+        let source = Arc::clone(measured.source());
+        let name = |&(kind, column, _): &_| source.names.response_name(kind, column);
+        let columns = selected.iter().map(name).collect();
+        let channels: Vec<Channel> =
+            selected.iter().map(|&(quantity, _, dof)| Channel { dof, quantity }).collect();
         if channels.is_empty() {
             return Err(AnalysisError::NoMotion);
         }

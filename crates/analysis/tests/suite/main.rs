@@ -17,6 +17,7 @@ mod hammer;
 mod headlines;
 mod modal;
 mod modes;
+mod modes_applied;
 mod nonlinear;
 mod other_models;
 mod parts;

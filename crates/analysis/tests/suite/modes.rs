@@ -24,10 +24,10 @@ const MODES: [(f64, f64); 3] = [(20.0, 0.01), (41.0, 0.015), (66.0, 0.008)];
 const SHAPES: [[f64; 4]; 3] = [[0.3, 0.5, 0.4, 0.2], [0.4, 0.1, -0.5, -0.3], [0.5, -0.4, 0.2, 0.6]];
 
 /// Points of the forces among the four.
-const FORCES: [usize; 2] = [0, 3];
+pub const FORCES: [usize; 2] = [0, 3];
 
 /// Receptance at s, 4 × 2, of modes whose frequencies are multiplied by `factors`.
-fn receptance(s: C, factors: [f64; 3]) -> DMatrix<C> {
+pub fn receptance(s: C, factors: [f64; 3]) -> DMatrix<C> {
     DMatrix::from_fn(4, 2, |i, j| {
         let of_mode = |mode: usize| {
             let (hz, zeta) = MODES[mode];
@@ -73,11 +73,11 @@ fn table(
     FrequencyResponses { file: "table".into(), frequency_hz, functions, ..Default::default() }
 }
 
-fn plain(factors: [f64; 3], seed: u64) -> FrequencyResponses {
+pub fn plain(factors: [f64; 3], seed: u64) -> FrequencyResponses {
     table(Displacement, 0.05, 0.01, seed, |omega| receptance(C::new(0.0, omega), factors))
 }
 
-fn modes(table: &FrequencyResponses) -> Modes {
+pub fn modes(table: &FrequencyResponses) -> Modes {
     modes_of_responses(std::slice::from_ref(table), &ModesSettings::default()).unwrap()
 }
 

@@ -297,7 +297,7 @@ fn a_force_alone_is_enough_for_a_prediction() {
     let machine = found.machine().unwrap();
     let at_rest = predict(&test, &machine, &Predict::default()).unwrap();
     assert!(at_rest.summary().channels.is_empty());
-    assert_eq!(at_rest.response().displacement().channel(0)[0], 0.0);
+    assert_eq!(at_rest.response().unwrap().displacement().channel(0)[0], 0.0);
     let settle = Predict { settle: Some(10) };
     let refused = predict(&test, &machine, &settle).unwrap_err().to_string();
     assert!(refused.contains("`settle`"), "{refused}");

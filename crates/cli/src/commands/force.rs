@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mechid::Reconstruct;
 use mechid::analysis::identify::Band;
 use mechid::analysis::reconstruct::{
     ForceChunk, Method, ParameterRule, reconstruct_in_chunks, reconstruct_with,
+    reconstruct_with_modes,
 };
-use mechid::analysis::{AnalysisError, Machine};
+use mechid::analysis::{AnalysisError, Machine, ModalSystem};
 use mechid::io::{BegunFile, CsvFile, LineSpec};
 use mechid::report::{FigureStyle, spectrum_csv};
+use mechid::{Reconstruct, Reconstructed};
 
 use crate::args::word::{one_of, word};
 use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
@@ -24,6 +25,11 @@ use crate::outcome::{Files, Outcome};
 /// counts in the standard error of the force. A machine with nonlinear terms needs displacement,
 /// velocity and acceleration of every degree of freedom.
 ///
+/// The system may also be the result of `mechid modes --json`: the forces and responses are then
+/// those of the modal test, by name or in order, --forced counts its forces, and the force is found
+/// line by line in the band of the test, of whole periods or of a record that begins and ends at rest
+/// (--at-rest).
+///
 /// A long text is read a stretch at a time. The methods continuous and discretised hold no open
 /// record either; any other method, --spectrum and --plot hold all of it, of the columns used
 /// alone. Of whole periods only their mean is held.
@@ -32,11 +38,14 @@ use crate::outcome::{Files, Outcome};
   mechid identify record.csv --force force --displacement displacement --json > machine.json
   mechid force run.csv --system machine.json --displacement displacement --output force.csv
   mechid force run.csv --system rotor.json --displacement x,0 --forced 2 --period 256 \\
-      --lines 1:40 --output force.csv --spectrum lines.csv --plot force.svg")]
+      --lines 1:40 --output force.csv --spectrum lines.csv --plot force.svg
+  mechid modes plate.csv --force hammer --acceleration a1,a2,a3 --json > modes.json
+  mechid force impact.csv --system modes.json --acceleration a1,a2,a3 --at-rest --output force.csv")]
 pub struct ForceArgs {
     #[command(flatten)]
     input: RecordArgs,
-    /// The machine: a report of `mechid identify --json`, or a description with a system
+    /// The machine: a report of `mechid identify --json`, a description with a system, or a result of
+    /// `mechid modes --json`
     #[arg(long, value_name = "IDENTIFIED.json")]
     system: PathBuf,
     #[command(flatten)]
@@ -96,17 +105,32 @@ impl ForceArgs {
 
     /// Reads, reconstructs, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let machine = Machine::read(&self.system)?;
-        let run = self.input.open(&self.responses.channels())?;
+        let modes = ModalSystem::read(&self.system)?;
         let how = self.settings();
         let mut rows = ForceRows { path: self.output.as_deref(), rows: None };
         let mut take = |chunk: &ForceChunk<'_>| rows.append(chunk);
+        if let Some(modes) = &modes {
+            let run = self.input.open(&self.responses.channels())?;
+            let reconstructed = reconstruct_with_modes(&run, modes, &how, &mut take)?;
+            return self.delivered(rows, &reconstructed);
+        }
+        let machine = Machine::read(&self.system)?;
+        let run = self.input.open(&self.responses.channels())?;
         if self.spectrum.is_none() && self.plot.plot.is_none() {
             let summary = reconstruct_in_chunks(&run, &machine, &how, &mut take)?;
             return rows.deliver(Outcome::new(summary.to_string(), &summary)?);
         }
         let reconstructed = reconstruct_with(&run, &machine, &how, &mut take)?;
-        let mut outcome = rows.deliver(Outcome::new(reconstructed.to_string(), &reconstructed)?)?;
+        self.delivered(rows, &reconstructed)
+    }
+
+    /// Reports a force, and adds the requested files.
+    fn delivered(
+        &self,
+        rows: ForceRows<'_>,
+        reconstructed: &Reconstructed,
+    ) -> Result<Outcome, CliError> {
+        let mut outcome = rows.deliver(Outcome::new(reconstructed.to_string(), reconstructed)?)?;
         if let Some(path) = &self.spectrum {
             let mut file = BegunFile::begin(path)?;
             for text in spectrum_csv(reconstructed.force(), reconstructed.lines()) {
@@ -114,7 +138,7 @@ impl ForceArgs {
             }
             outcome = outcome.with_begun(file);
         }
-        outcome.with_result_plot(&self.plot, &reconstructed, FigureStyle::default())
+        outcome.with_result_plot(&self.plot, reconstructed, FigureStyle::default())
     }
 
     /// Returns the settings of the reconstruction.

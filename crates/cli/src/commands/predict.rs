@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::analysis::Machine;
+use mechid::analysis::{Machine, ModalSystem, predict_with_modes};
 use mechid::io::CsvFile;
 use mechid::{Predict, predict};
 
@@ -13,6 +13,10 @@ use crate::outcome::{Files, Outcome};
 
 /// Predict the response of an identified machine, linear or not, to a measured force
 ///
+/// The model may also be the result of `mechid modes --json`: the forces and responses are then those
+/// of the modal test, by name or in order, and the prediction holds in its band, from rest or, with
+/// --period, in the steady state.
+///
 /// With --period the steady state under the mean of the periods, otherwise the whole window from
 /// its first sample on, at rest before it or from the state that --settle fits. Between the samples
 /// the force is band-limited. Response columns are compared with the prediction. The window is held
@@ -21,9 +25,12 @@ use crate::outcome::{Files, Outcome};
 #[command(after_help = "Examples:
   mechid identify rig.csv --force f --displacement x --period 1024 --nonlinear 'k3: x1^3' --json \\
       > machine.json
-  mechid predict machine.json run.csv --force f --displacement x --settle 500 --output run-predicted.csv")]
+  mechid predict machine.json run.csv --force f --displacement x --settle 500 --output run-predicted.csv
+  mechid modes frame.csv --force f1,f2 --acceleration a1,a2 --json > modes.json
+  mechid predict modes.json run.csv --force f1,f2 --acceleration a1,a2 --output run-predicted.csv")]
 pub struct PredictArgs {
-    /// The machine: a report of `mechid identify --json`, or a description with a system
+    /// The machine: a report of `mechid identify --json`, a description with a system, or a result of
+    /// `mechid modes --json`
     #[arg(value_name = "MODEL.json")]
     model: PathBuf,
     #[command(flatten)]
@@ -50,15 +57,25 @@ impl PredictArgs {
 
     /// Reads, predicts, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let machine = Machine::read(&self.model)?;
-        let record = self.input.open(&self.channels.channels())?;
-        let predicted = predict(&record, &machine, &Predict { settle: self.settle })?;
+        let modes = ModalSystem::read(&self.model)?;
+        let how = Predict { settle: self.settle };
+        let predicted = match &modes {
+            Some(modes) => {
+                let record = self.input.open(&self.channels.channels())?;
+                predict_with_modes(&record, modes, &how)?
+            }
+            None => {
+                let machine = Machine::read(&self.model)?;
+                let record = self.input.open(&self.channels.channels())?;
+                predict(&record, &machine, &how)?
+            }
+        };
         let outcome = Outcome::new(predicted.to_string(), &predicted)?;
         let Some(path) = &self.output else { return Ok(outcome) };
         let columns = predicted.columns();
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let values: Vec<&[f64]> = columns.iter().map(|(_, values)| *values).collect();
-        let mut rows = CsvFile::begin(path, predicted.response().sampling(), &names)?;
+        let mut rows = CsvFile::begin(path, predicted.sampling(), &names)?;
         rows.append(&values)?;
         Ok(outcome.with_begun(rows.finish()?))
     }

@@ -1,0 +1,172 @@
+//! Response of modes to the forces of a record.
+
+use std::f64::consts::TAU;
+
+use mechid_force::within_band;
+use mechid_signal::{Extent, Record, Sampling, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use super::system::ModalSystem;
+use crate::AnalysisError;
+use crate::measurement::{Block, Measurement};
+use crate::predict::{Predict, Predicted, PredictedMotion, PredictionError, PredictionSummary};
+use crate::text::significant;
+
+/// Predicts the response of the modes of a test to the forces of a record, in the band of the test.
+///
+/// With a period, it is the steady state under the mean period; otherwise the response from rest
+/// over the whole window. Outside the band nothing is predicted, and measured responses are compared
+/// in it. The standard error of a channel is the RMS of what the errors of the modes cause; the
+/// errors of the residual terms are not in it.
+///
+/// # Errors
+/// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns are not those of the modes,
+/// if no line of the record is in the band, or for `settle`, and an error if the record cannot be
+/// read.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), sections 5.2 and 6.2 (response of the modal sum).
+pub fn predict_with_modes(
+    measured: &Measurement,
+    system: &ModalSystem,
+    how: &Predict,
+) -> Result<Predicted, AnalysisError> {
+    let channels = measured.channels();
+    if channels.force.is_empty() {
+        return Err(AnalysisError::NoForce);
+    }
+    if how.settle.is_some() {
+        let why = "modes are predicted from rest, or in a steady state with `period`".into();
+        return Err(AnalysisError::Setting { setting: "settle", why });
+    }
+    let inputs = system.inputs_of(&channels.force)?;
+    let columns = system.outputs_of(channels)?;
+    let (block, steady) = (measured.whole_block()?, measured.window_settings().period.is_some());
+    let response = Response::new(system, &block, &inputs, steady)?;
+    let extent = if steady { Extent::WholePeriod } else { Extent::Open };
+    let mut errors = Vec::new();
+    for (quantity, column, output) in &columns {
+        let kinds = block.responses();
+        let Some((_, record)) = kinds.iter().find(|(kind, _)| kind == quantity) else { continue };
+        let one = Record::from_channel(record.sampling(), record.channel(*column).to_vec())?;
+        let measured_in_band = within_band(&one, system.band_hz, extent)?;
+        let own = response.record.channel(*output).to_vec();
+        let own = Record::from_channel(record.sampling(), own)?;
+        let own = within_band(&own, system.band_hz, extent)?;
+        let name = (system.outputs[*output].0.clone(), *quantity, *output);
+        let error = PredictionError::new(name, measured_in_band.channel(0), own.channel(0), steady);
+        errors.push(error.with_standard_error(response.standard_error[*output]));
+    }
+    let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
+    let mut remarks = block.unit_notes();
+    remarks.push(format!(
+        "the modes predict the response from {low} to {high} Hz, and are judged there"
+    ));
+    let predicted: Vec<usize> = match columns.as_slice() {
+        [] => (0..system.outputs.len()).collect(),
+        some => some.iter().map(|(_, _, output)| *output).collect(),
+    };
+    let names = predicted.iter().map(|output| system.outputs[*output].0.clone()).collect();
+    let data: Vec<&[f64]> = predicted.iter().map(|at| response.record.channel(*at)).collect();
+    let motion = PredictedMotion::Modes {
+        names,
+        record: Record::from_channels(response.record.sampling(), &data)?,
+    };
+    let summary = PredictionSummary {
+        file: block.file.clone(),
+        machine: system.name.clone(),
+        first_sample: block.first_sample,
+        last_sample: block.last_sample(),
+        first_judged: block.first_sample,
+        steady,
+        channels: errors,
+        remarks,
+        analysis: how.clone(),
+    };
+    Ok(Predicted::new(summary, motion))
+}
+
+/// Response of all outputs.
+struct Response {
+    /// Samples × outputs.
+    record: Record,
+    /// RMS over the samples of what the errors of the modes cause, one for each output.
+    standard_error: Vec<f64>,
+}
+
+impl Response {
+    fn new(
+        system: &ModalSystem,
+        block: &Block,
+        inputs: &[usize],
+        steady: bool,
+    ) -> Result<Self, AnalysisError> {
+        let len = block.force.len();
+        let force = if steady {
+            block.force.period_mean(block.period)?
+        } else {
+            followed_by_rest(system, &block.force)?
+        };
+        let spectrum = Spectrum::of(&force);
+        let sampling = force.sampling();
+        let outputs = system.outputs.len();
+        let mut lines = DMatrix::zeros(spectrum.len(), outputs);
+        let mut power = vec![0.0; outputs];
+        let mut any = false;
+        // The last line of an even record has no phase.
+        for n in 0..sampling.len().div_ceil(2) {
+            let (omega, [low, high]) = (spectrum.omega(n), system.band_hz);
+            if !(low * TAU..=high * TAU).contains(&omega) {
+                continue;
+            }
+            any = true;
+            let mut forces = vec![Complex::default(); system.inputs.len()];
+            for (column, input) in inputs.iter().enumerate() {
+                forces[*input] = spectrum.line(n, column);
+            }
+            let vector = nalgebra::DVector::from_column_slice(&forces);
+            lines.set_row(n, &(system.model.response(omega) * vector).transpose());
+            for (sum, variance) in
+                power.iter_mut().zip(system.model.response_variance(omega, &forces))
+            {
+                *sum += 0.5 * variance;
+            }
+        }
+        if !any {
+            let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
+            let why =
+                format!("no line of the record is in the band of the modes, {low} to {high} Hz");
+            return Err(AnalysisError::Setting { setting: "samples", why });
+        }
+        let all = Spectrum::from_lines(sampling, lines)?.to_record()?;
+        let record = if steady { repeated(&all, block)? } else { all.window(0, len)? };
+        // The response to an open record lies in its first part.
+        let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
+        let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
+        Ok(Self { record, standard_error })
+    }
+}
+
+/// Returns the forces followed by zeros, until the slowest mode has decayed, so that the response
+/// does not run into its own beginning.
+fn followed_by_rest(system: &ModalSystem, force: &Record) -> Result<Record, AnalysisError> {
+    /// Logarithm of the decay of a response before the record repeats: below 0.1 %.
+    const DECAYS: f64 = 7.0;
+    /// Largest number of records of rest.
+    const MOST: usize = 8;
+    let slowest = system.model.terms.iter().map(|term| -term.pole[0]).fold(f64::INFINITY, f64::min);
+    let (len, rate_hz) = (force.len(), force.sampling().rate_hz());
+    let rest = ((DECAYS / slowest * rate_hz).ceil() as usize).clamp(len, MOST * len);
+    let sampling = Sampling::from_rate_hz(rate_hz, len + rest)?;
+    let mut data = DMatrix::zeros(len + rest, force.channels());
+    data.rows_mut(0, len).copy_from(force.data());
+    Ok(Record::new(sampling, data)?)
+}
+
+/// Returns a period as often as the window has it.
+fn repeated(period: &Record, block: &Block) -> Result<Record, AnalysisError> {
+    let data = DMatrix::from_fn(block.force.len(), period.channels(), |k, column| {
+        period.data()[(k % period.len(), column)]
+    });
+    Ok(Record::new(block.force.sampling(), data)?)
+}

@@ -1,0 +1,130 @@
+//! Modes of a test that predict other records and find their forces, judged by the closed form.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::identify::Band;
+use mechid_analysis::{
+    Channels, Measurement, ModalSystem, Predict, Reconstruct, predict_with_modes,
+    reconstruct_with_modes,
+};
+use mechid_model::ResponseQuantity::Displacement;
+use mechid_signal::{Record, Sampling, Spectrum, measures};
+use nalgebra::{Complex, DMatrix};
+
+use crate::modes::{FORCES, modes, plain, receptance};
+
+type C = Complex<f64>;
+
+const RATE_HZ: f64 = 256.0;
+const SAMPLES: usize = 8192;
+
+/// Two pulses of 30 and 50 Hz, which last a tenth of a second and begin at rest.
+fn pulses() -> Record {
+    let pulse = |k: usize, at: f64, hz: f64| {
+        let t = k as f64 / RATE_HZ - at;
+        3.0 * (-(t / 0.05).powi(2)).exp() * (TAU * hz * t).cos()
+    };
+    let data = DMatrix::from_fn(SAMPLES, 2, |k, force| match force {
+        0 => pulse(k, 2.0, 30.0),
+        _ => pulse(k, 3.0, 50.0),
+    });
+    Record::new(Sampling::from_rate_hz(RATE_HZ, SAMPLES).unwrap(), data).unwrap()
+}
+
+/// Exact response to pulses whose decays end within the record: that of a period.
+fn response(forces: &Record) -> Record {
+    let spectrum = Spectrum::of(forces);
+    let mut lines = DMatrix::<C>::zeros(spectrum.len(), 4);
+    for n in 0..spectrum.len() - 1 {
+        let forces = spectrum.lines().row(n).transpose();
+        let motion = receptance(C::new(0.0, spectrum.omega(n)), [1.0; 3]) * forces;
+        lines.set_row(n, &motion.transpose());
+    }
+    Spectrum::from_lines(forces.sampling(), lines).unwrap().to_record().unwrap()
+}
+
+fn measurement(forces: &Record, motion: &Record) -> Measurement {
+    let channels = Channels::new("f1,f2", Displacement, "x1,x2,x3,x4");
+    let forced = ["f1", "f2"].into_iter().zip(0..).map(|(name, at)| (name, forces.channel(at)));
+    let moved =
+        ["x1", "x2", "x3", "x4"].into_iter().zip(0..).map(|(name, at)| (name, motion.channel(at)));
+    let columns: Vec<(&str, &[f64])> = forced.chain(moved).collect();
+    Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap()
+}
+
+/// Root of the mean square of the errors over their stated standard errors, each an RMS of a record.
+fn ratio(pairs: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let squares: Vec<f64> =
+        pairs.into_iter().map(|(error, stated)| (error / stated).powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn predictions_and_forces_err_as_they_state() {
+    let forces = pulses();
+    let record = measurement(&forces, &response(&forces));
+    let (mut predicted, mut found) = (Vec::new(), Vec::new());
+    for seed in 0..6 {
+        let system = ModalSystem::new(&modes(&plain([1.0; 3], seed))).unwrap();
+        let prediction = predict_with_modes(&record, &system, &Predict::default()).unwrap();
+        for channel in &prediction.summary().channels {
+            assert!(channel.nrmse < 0.01, "{prediction}");
+            predicted.push((channel.rmse, channel.standard_error.unwrap()));
+        }
+        let how = Reconstruct { at_rest: true, ..Reconstruct::default() };
+        let force = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
+        let difference = force.force().record().data() - forces.data();
+        for (at, row) in force.summary().forces.iter().enumerate() {
+            let error = measures::rms(difference.column(at).as_slice());
+            assert!(error < 0.05 * measures::rms(forces.channel(at)), "{force}");
+            found.push((error, row.standard_error.unwrap()));
+        }
+    }
+    // 6 experiments of some 15 parameters each: the ratio scatters by a fifth.
+    assert!((0.5..2.0).contains(&ratio(predicted.iter().copied())), "{predicted:?}");
+    assert!((0.5..2.0).contains(&ratio(found.iter().copied())), "{found:?}");
+}
+
+#[test]
+fn one_of_the_forces_is_found_from_some_of_the_responses() {
+    let both = pulses();
+    let mut data = both.data().clone();
+    data.column_mut(0).fill(0.0);
+    let forces = Record::new(both.sampling(), data).unwrap();
+    let record = measurement(&forces, &response(&forces));
+    let system = ModalSystem::new(&modes(&plain([1.0; 3], 3))).unwrap();
+    let json = serde_json::to_value(modes(&plain([1.0; 3], 3)).summary()).unwrap();
+    assert_eq!(ModalSystem::from_json("table", json).unwrap(), system);
+    assert_eq!(system.inputs.len(), FORCES.len());
+    let how = Reconstruct { at_rest: true, ..Reconstruct::default().forced([2]) };
+    let force = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
+    let difference = force.force().record().data() - forces.data();
+    assert_eq!(difference.column(0).amax(), 0.0);
+    let error = measures::rms(difference.column(1).as_slice());
+    assert!(error < 0.02 * measures::rms(forces.channel(1)), "{force}");
+    for channel in &force.summary().channels {
+        assert!(channel.unexplained.unwrap() < 0.02, "{force}");
+    }
+    // The wrong place: the responses cannot be explained.
+    let how = Reconstruct { at_rest: true, ..Reconstruct::default().forced([1]) };
+    let wrong = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
+    assert!(wrong.to_string().contains("leaves unexplained"), "{wrong}");
+}
+
+#[test]
+fn what_modes_cannot_do_is_refused() {
+    let forces = pulses();
+    let record = measurement(&forces, &response(&forces));
+    let system = ModalSystem::new(&modes(&plain([1.0; 3], 1))).unwrap();
+    let refused = |how: Reconstruct| {
+        reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap_err().to_string()
+    };
+    assert!(refused(Reconstruct::default()).contains("at rest"));
+    let at_rest = Reconstruct { at_rest: true, ..Reconstruct::default() };
+    let outside = at_rest.clone().band(Band { low_hz: 100.0, high_hz: 120.0 });
+    assert!(refused(outside).contains("the modes are those of"));
+    assert!(refused(at_rest.forced([3])).contains('3'));
+    let settle = Predict { settle: Some(100) };
+    let message = predict_with_modes(&record, &system, &settle).unwrap_err().to_string();
+    assert!(message.contains("from rest"), "{message}");
+}
