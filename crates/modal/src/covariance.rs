@@ -212,8 +212,8 @@ impl Covariance {
         (values, covariance)
     }
 
-    /// Returns the parameters of one mode, and how they change with the parameters of the search and
-    /// with an unmeasured force on the mode.
+    /// Returns the parameters of one mode, and how they change with the parameters of the search
+    /// and with an unmeasured force on the mode.
     fn mode_response(&self, fit: &Fit<'_>, mode: usize, shape: &[C]) -> ModeResponse {
         let (model, levels) = (&fit.model, &fit.weights.level);
         let (outputs, inputs, loads) = (shape.len(), fit.lines.inputs(), fit.lines.loads.len());

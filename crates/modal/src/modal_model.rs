@@ -170,8 +170,8 @@ impl ModalModel {
         response
     }
 
-    /// Returns the covariance E[δy δyᴴ] of the response to given forces at ω (rad/s) that the errors
-    /// of the modes cause, outputs × outputs.
+    /// Returns the covariance E[δy δyᴴ] of the response to given forces at ω (rad/s) that the
+    /// errors of the modes cause, outputs × outputs.
     pub fn response_covariance(&self, omega: f64, forces: &[C]) -> DMatrix<C> {
         let outputs = self.outputs();
         let mut covariance = DMatrix::zeros(outputs, outputs);

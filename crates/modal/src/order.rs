@@ -63,12 +63,12 @@ pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     (0..modes).map(loss).collect()
 }
 
-/// Returns the best candidate beside a mode of the fit whose response to the measured forces explains
-/// most of the residual around it.
+/// Returns the best candidate beside a mode of the fit whose response to the measured forces
+/// explains most of the residual around it.
 ///
-/// If two close modes are fitted as one, the unmeasured force of this mode takes up what remains, and
-/// the weights hide the other mode. Noise and unmeasured forces are independent of the measured ones:
-/// they explain little of such a residual.
+/// If two close modes are fitted as one, the unmeasured force of this mode takes up what remains,
+/// and the weights hide the other mode. Noise and unmeasured forces are independent of the measured
+/// ones: they explain little of such a residual.
 pub(crate) fn hidden(fit: &Fit<'_>, required: f64) -> Option<Candidate> {
     let is_beside = |omega: f64| {
         let near = |pole: &C| (omega - pole.im).abs() < HIDDEN_HALF_WIDTHS * -pole.re;

@@ -15,9 +15,9 @@ use crate::text::significant;
 /// Predicts the response of the modes of a test to the forces of a record, in the band of the test.
 ///
 /// With a period, it is the steady state under the mean period; otherwise the response from rest
-/// over the whole window. Outside the band nothing is predicted, and measured responses are compared
-/// in it. The standard error of a channel is the RMS of what the errors of the modes cause; the
-/// errors of the residual terms are not in it.
+/// over the whole window. Outside the band nothing is predicted, and measured responses are
+/// compared in it. The standard error of a channel is the RMS of what the errors of the modes
+/// cause; the errors of the residual terms are not in it.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns are not those of the modes,

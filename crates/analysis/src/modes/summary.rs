@@ -63,8 +63,8 @@ pub struct ModesSummary {
     /// Stabilisation diagram and mode indicator, if they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagrams: Option<Diagrams>,
-    /// Frequency responses of modes and residual terms with the covariance of the modes, in SI units
-    /// of outputs and forces; `None` without forces.
+    /// Frequency responses of modes and residual terms with the covariance of the modes, in SI
+    /// units of outputs and forces; `None` without forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModalModel>,
     /// Notes to read before using the numbers.

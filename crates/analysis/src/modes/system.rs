@@ -125,8 +125,8 @@ impl ModalSystem {
         Err(AnalysisError::Setting { setting: "force", why })
     }
 
-    /// Returns the output of each response column of a record, quantity by quantity: by its name, or
-    /// in order if all of this quantity are there.
+    /// Returns the output of each response column of a record, quantity by quantity: by its name,
+    /// or in order if all of this quantity are there.
     pub(crate) fn outputs_of(
         &self,
         channels: &Channels,

@@ -52,7 +52,8 @@ fn measurement(forces: &Record, motion: &Record) -> Measurement {
     Measurement::from_columns(forces.sampling(), &columns, &channels).unwrap()
 }
 
-/// Root of the mean square of the errors over their stated standard errors, each an RMS of a record.
+/// Root of the mean square of the errors over their stated standard errors, each an RMS of a
+/// record.
 fn ratio(pairs: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     let squares: Vec<f64> =
         pairs.into_iter().map(|(error, stated)| (error / stated).powi(2)).collect();

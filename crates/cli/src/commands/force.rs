@@ -27,8 +27,8 @@ use crate::outcome::{Files, Outcome};
 ///
 /// The system may also be the result of `mechid modes --json`: the forces and responses are then
 /// those of the modal test, by name or in order, --forced counts its forces, and the force is found
-/// line by line in the band of the test, of whole periods or of a record that begins and ends at rest
-/// (--at-rest).
+/// line by line in the band of the test, of whole periods or of a record that begins and ends at
+/// rest (--at-rest).
 ///
 /// A long text is read a stretch at a time. The methods continuous and discretised hold no open
 /// record either; any other method, --spectrum and --plot hold all of it, of the columns used

@@ -26,8 +26,8 @@ fn two_forces_and_a_close_pair() {
     check(&pair(8), 10);
 }
 
-/// In this record the first search sees one mode where there are two, 0.3 % apart; an unmeasured force
-/// on it takes up what the second one does.
+/// In this record the first search sees one mode where there are two, 0.3 % apart; an unmeasured
+/// force on it takes up what the second one does.
 #[test]
 fn an_unmeasured_force_hides_no_mode() {
     let mut close = pair(8);

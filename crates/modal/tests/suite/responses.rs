@@ -28,9 +28,9 @@ fn squared_ratio(case: &Case, seeds: std::ops::Range<u64>) -> f64 {
     squares / variances
 }
 
-/// The judge is the modal sum of the true structure. The ratio is 1 on average; three records, whose
-/// errors a few resonances dominate, scatter by 40 %. Errors of a pair 0.3 % apart nearly cancel in
-/// the sum of the two modes: counted one by one they would give a ratio below 0.01.
+/// The judge is the modal sum of the true structure. The ratio is 1 on average; three records,
+/// whose errors a few resonances dominate, scatter by 40 %. Errors of a pair 0.3 % apart nearly
+/// cancel in the sum of the two modes: counted one by one they would give a ratio below 0.01.
 #[test]
 fn the_covariance_of_responses_is_that_of_their_errors() {
     let mut close = pair(8);
