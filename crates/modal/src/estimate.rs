@@ -270,8 +270,7 @@ fn explained(fit: &Fit<'_>) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the log-likelihood at the weights of a fit, without constants.
-pub(crate) fn log_likelihood(fit: &Fit<'_>) -> f64 {
+fn log_likelihood(fit: &Fit<'_>) -> f64 {
     let outputs = fit.weights.level.len() as f64;
     let lines = fit.lines.len() as f64;
     let shapes: f64 = fit.weights.shape.iter().map(|value| value.ln()).sum();

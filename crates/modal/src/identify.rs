@@ -8,14 +8,14 @@ use nalgebra::Complex;
 use crate::ModalError;
 use crate::constraint::ModalConstraint;
 use crate::covariance::Covariance;
-use crate::estimate::{ModalEstimate, log_likelihood};
+use crate::estimate::ModalEstimate;
 use crate::initial_poles::initial_poles;
 use crate::limits::{MAX_DAMPING, NEIGHBOUR_HALF_WIDTHS};
 use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
 use crate::model::{Model, ResidualPowers};
 use crate::noise::{Noise, shapes};
-use crate::order::{add_best, hidden, removal_losses, required_gain};
+use crate::order::{add_best, removal_losses, required_gain};
 use crate::projection::Weights;
 use crate::residues::with_participations;
 use crate::rules::drop_reasons;
@@ -144,7 +144,9 @@ impl<'a> Identification<'a> {
 
     /// Searches with the weights of the current noise estimate.
     fn search_with_noise(&mut self) {
-        weigh(&mut self.fit, &self.noise);
+        let shapes = shapes(&self.fit.projection, &self.fit.weights, self.fit.model.modes());
+        self.fit.weights = self.noise.weights(self.lines, &self.fit.model, &shapes);
+        self.fit.refresh();
         self.fit.search_roughly();
         log::debug!(
             "{} modes, {} steps, cost {:.1}",
@@ -182,36 +184,8 @@ impl<'a> Identification<'a> {
                 }
             }
         }
-        self.add_hidden(required, most);
         if let Some(most) = self.settings.modes {
             self.remove_beyond(most);
-        }
-    }
-
-    /// Adds modes beside others whose unmeasured forces took their response, if the likelihood of
-    /// fit and noise together rises by the penalty of their parameters.
-    fn add_hidden(&mut self, required: f64, most: usize) {
-        while self.settings.unmeasured_forces && self.modes_in_band() < most {
-            let mut trial = self.fit.clone();
-            weigh(&mut trial, &Noise::from_fit(&self.fit, None));
-            let Some(candidate) = hidden(&trial, required) else { return };
-            trial.model.push(&candidate);
-            trial.refresh();
-            trial.search_roughly();
-            let noise = Noise::from_fit(&trial, Some(Vec::new()));
-            weigh(&mut trial, &noise);
-            trial.search_roughly();
-            let gain = 2.0 * (log_likelihood(&trial) - log_likelihood(&self.fit));
-            let hz = candidate.pole.im / TAU;
-            log::debug!("hidden mode {hz:.3} Hz, gain {gain:.0}, required {required:.0}");
-            if gain < required {
-                return;
-            }
-            (self.fit, self.noise) = (trial, noise);
-            self.update_noise();
-            if self.remove_impossible() {
-                return;
-            }
         }
     }
 
@@ -411,13 +385,6 @@ impl<'a> Identification<'a> {
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))
     }
-}
-
-/// Weights a fit by a noise estimate.
-fn weigh(fit: &mut Fit<'_>, noise: &Noise) {
-    let shapes = shapes(&fit.projection, &fit.weights, fit.model.modes());
-    fit.weights = noise.weights(fit.lines, &fit.model, &shapes);
-    fit.refresh();
 }
 
 /// Returns the initial residual powers.
