@@ -71,8 +71,8 @@ pub(crate) const GRAM_LANCZOS: usize = 80;
 /// Maximum deviation of the misfit ratio of a correct model from 1, in standard deviations.
 pub(crate) const FIT_PLAUSIBLE: f64 = 6.0;
 
-/// Maximum number of sensitivities (residuals times parameters times parts) of a fit whose parts are
-/// compared and in which omitted terms are sought: 128 MiB of numbers.
+/// Maximum number of sensitivities (residuals times parameters times parts) of a fit whose parts
+/// are compared and in which omitted terms are sought: 128 MiB of numbers.
 pub(crate) const MAX_PARTS: usize = 1 << 24;
 
 /// Maximum number of sensitivities (residuals times parameters) for a covariance with correlated

@@ -10,7 +10,7 @@ use crate::measurement::Channel;
 
 type Line = Complex<f64>;
 
-/// What turns forces into measured channels, frequency by frequency: M, C and K, or modes.
+/// Ratio of measured channels to forces, frequency by frequency: that of M, C and K, or of modes.
 pub trait FrequencyResponse {
     /// Returns the number of places where a force can act.
     fn places(&self) -> usize;
@@ -35,8 +35,9 @@ pub trait FrequencyResponse {
     }
 
     /// Returns the covariance E[δy δyᴴ] of the channels' responses to given forces (one for each
-    /// entry of `forced`) that the uncertainty of the system causes; `None` if the system is exact
-    /// or its uncertainty is counted elsewhere.
+    /// entry of `forced`, in N) that the uncertainty of the system causes, channels × channels in
+    /// the products of their units; `None` if the system is exact or its uncertainty is counted
+    /// elsewhere.
     fn response_covariance(
         &self,
         _channels: &[Channel],

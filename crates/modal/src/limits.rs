@@ -87,8 +87,8 @@ pub const DEPENDENT_INPUTS: f64 = 1e-6;
 /// Distance in half-widths within which two modes may explain the same response: only one of them
 /// is removed at a time.
 pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
-/// Distance in half-widths beyond which the errors of two modes count as independent in the
-/// covariance of a modal model; within it their covariance is kept whole.
+/// Largest distance in half-widths of two modes whose covariance is kept in a modal model; the
+/// errors of modes farther apart count as independent.
 pub const GROUP_HALF_WIDTHS: f64 = 10.0;
 /// Minimum noise of a sensor, relative to the root-mean-square of its output: lower noise is
 /// rounding, and in data without noise ever more modes would be significant.

@@ -44,8 +44,8 @@ use crate::outcome::{Files, Outcome};
 pub struct ForceArgs {
     #[command(flatten)]
     input: RecordArgs,
-    /// The machine: a report of `mechid identify --json`, a description with a system, or a result of
-    /// `mechid modes --json`
+    /// The machine: a report of `mechid identify --json`, a description with a system, or a result
+    /// of `mechid modes --json`
     #[arg(long, value_name = "IDENTIFIED.json")]
     system: PathBuf,
     #[command(flatten)]

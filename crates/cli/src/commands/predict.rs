@@ -13,9 +13,9 @@ use crate::outcome::{Files, Outcome};
 
 /// Predict the response of an identified machine, linear or not, to a measured force
 ///
-/// The model may also be the result of `mechid modes --json`: the forces and responses are then those
-/// of the modal test, by name or in order, and the prediction holds in its band, from rest or, with
-/// --period, in the steady state.
+/// The model may also be the result of `mechid modes --json`: the forces and responses are then
+/// those of the modal test, by name or in order, and the prediction holds in its band, from rest
+/// or, with --period, in the steady state.
 ///
 /// With --period the steady state under the mean of the periods, otherwise the whole window from
 /// its first sample on, at rest before it or from the state that --settle fits. Between the samples
@@ -29,8 +29,8 @@ use crate::outcome::{Files, Outcome};
   mechid modes frame.csv --force f1,f2 --acceleration a1,a2 --json > modes.json
   mechid predict modes.json run.csv --force f1,f2 --acceleration a1,a2 --output run-predicted.csv")]
 pub struct PredictArgs {
-    /// The machine: a report of `mechid identify --json`, a description with a system, or a result of
-    /// `mechid modes --json`
+    /// The machine: a report of `mechid identify --json`, a description with a system, or a result
+    /// of `mechid modes --json`
     #[arg(value_name = "MODEL.json")]
     model: PathBuf,
     #[command(flatten)]

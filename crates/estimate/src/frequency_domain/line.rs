@@ -174,8 +174,8 @@ pub(super) fn noisy_forces(covariance: &ComplexMatrix) -> impl Iterator<Item = u
     (0..n).filter(move |force| covariance.column(n + force).iter().any(|z| *z != Complex::ZERO))
 }
 
-/// Returns L of a Hermitian positive definite matrix L Lᴴ, of which the lower triangle is given, in
-/// the lower triangle; `None` for any other matrix.
+/// Returns L in the lower triangle, from the lower triangle of a Hermitian positive definite matrix
+/// L Lᴴ; `None` for any other matrix.
 pub(super) fn lower_factor(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
     // nalgebra does not reject negative pivots but computes their complex roots.
     let lower = matrix.cholesky()?.unpack_dirty();

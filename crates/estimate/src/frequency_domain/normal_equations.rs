@@ -229,7 +229,7 @@ impl Layout {
 
     /// Returns 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
     fn products(&self, factors: &Factors, blocks: &[LineBlock]) -> DMatrix<f64> {
-        // The sum has one order, whatever the number of threads.
+        // The sum has the same order for any number of threads.
         let parts: Vec<DMatrix<f64>> =
             blocks.par_iter().map(|block| self.products_of_lines(factors, block)).collect();
         let pair = |a: usize, b: usize| b * (b + 1) / 2 + a;

@@ -84,6 +84,9 @@ impl Whitened {
     ) -> Option<Self> {
         let n = data.dof();
         let matrices = unknowns.assemble(values.as_slice());
+        let [mass, damping, stiffness] = matrices.clone();
+        // Films alone have no mass; their weights do without leverages, as all their studies have.
+        SecondOrderSystem::new(mass, damping, stiffness).ok()?;
         let mut residual = DVector::zeros(2 * n * data.len());
         let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());
         let mut line = Line::new(n);

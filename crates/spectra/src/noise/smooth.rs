@@ -188,7 +188,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     };
     let orders = (0..=MAX_ORDER.min(lines / LINES_PER_ORDER)).into_par_iter();
     let of_orders: Vec<(f64, Smooth)> = orders.map(of_order).collect();
-    // Of equal costs the lower order is chosen.
+    // The lower of two orders with equal costs is chosen.
     let best = of_orders.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let white = || (f64::INFINITY, Form { order: 0, bumps: Vec::new() });
     let (cost, form) = best.map_or_else(white, |(cost, smooth)| (cost, smooth.form));

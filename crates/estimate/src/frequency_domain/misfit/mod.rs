@@ -175,7 +175,7 @@ impl<'a> Misfit<'a> {
                 row.scale(shares[at].sqrt());
                 exists.then(|| 2.0 * row.white().norm_squared())
             });
-        // The sum has one order, whatever the number of threads.
+        // The sum has the same order for any number of threads.
         let costs: Vec<Option<f64>> = costs.collect();
         let cost: f64 = costs.into_iter().sum::<Option<f64>>()?;
         cost.is_finite().then_some(cost)

@@ -162,7 +162,7 @@ pub(super) fn most_conspicuous(
             let counts = inside > other || count * nu >= QUIET_DEVIATIONS;
             if counts { [mean / inside, mean / other] } else { [1.0, 1.0] }
         });
-        // As ln x ≤ x − 1, most bands are excluded without a logarithm.
+        // Most bands are excluded without a logarithm, because ln x ≤ x − 1.
         let bound = |[inside, other]: [f64; 2]| count * (inside - 1.0) + others * (other - 1.0);
         let gain = |[inside, other]: [f64; 2]| count * inside.ln() + others * other.ln();
         let possible = ratios.clone().map(bound).sum::<f64>() >= least;
