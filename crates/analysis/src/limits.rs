@@ -30,6 +30,14 @@ pub const PAIR_BYTES: usize = 128;
 /// channel: the number of lines is half the number of samples.
 pub const FEW_CHANNELS: usize = 2 * STRETCH_BYTES / PAIR_BYTES;
 
+/// Logarithm of the decay of the slowest mode in the zeros that follow the forces of a prediction:
+/// what comes round from the end is below 0.1 % of the response.
+pub const REST_DECAY: f64 = 7.0;
+
+/// Largest number of records of zeros that follow the forces of a prediction by modes, for their
+/// memory.
+pub const REST_RECORDS: usize = 8;
+
 /// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 /// Minimum share of the variance of a response that the modes of a test must explain. With less,

@@ -54,16 +54,12 @@ impl ModalEstimate {
         stated: &[bool],
         constraints: &[ModalConstraint],
     ) -> Self {
-        let (lines, model) = (fit.lines, &fit.model);
+        let model = &fit.model;
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
         let gains = removal_losses(fit);
         let (requested, unrequested): (Vec<usize>, Vec<usize>) =
             (0..model.modes()).partition(|mode| stated[*mode]);
         let parameters = |mode: usize| covariance.mode_parameters(fit, mode, &shapes[mode]);
-        let free_of = |modes: &[usize]| {
-            let modes: Vec<_> = modes.iter().map(|mode| (*mode, &shapes[*mode][..])).collect();
-            covariance.joint(fit, &modes).1
-        };
         let constrained = |(index, &mode): (usize, &usize)| {
             let free = parameters(mode);
             let tests = constraint::test(constraints, &free, index);
@@ -74,24 +70,24 @@ impl ModalEstimate {
         };
         let (modes, (parameters_of_modes, tests)): (Vec<_>, (Vec<_>, Vec<_>)) =
             requested.par_iter().enumerate().map(constrained).unzip();
-        let others: Vec<ModeParameters> =
+        let parameters_of_others: Vec<ModeParameters> =
             unrequested.par_iter().map(|mode| parameters(*mode)).collect();
         let unrequested_mode = |(parameters, mode): (&ModeParameters, &usize)| {
             identified_mode(fit, noise, parameters, *mode, gains[*mode])
         };
-        let columns = model.residual_columns(lines);
-        let inputs = lines.inputs();
-        let residuals = (0..lines.outputs.len())
-            .map(|output| {
-                let unknowns = fit.projection.unknowns_of(output, &fit.weights);
-                (0..inputs).map(|input| unknowns[columns[input].clone()].to_vec()).collect()
-            })
+        let terms = parameters_of_modes
+            .iter()
+            .chain(&parameters_of_others)
+            .map(ModeParameters::term)
             .collect();
-        let terms = parameters_of_modes.iter().chain(&others).map(ModeParameters::term).collect();
         let groups = if constraints.is_empty() {
             let neighbours = neighbours(&parameters_of_modes).into_iter();
             let group = |range: Range<usize>| {
-                ModalGroup::new(range.clone().collect(), &free_of(&requested[range]))
+                let modes: Vec<_> = requested[range.clone()]
+                    .iter()
+                    .map(|mode| (*mode, &shapes[*mode][..]))
+                    .collect();
+                ModalGroup::new(range.collect(), &covariance.joint(fit, &modes).1)
             };
             neighbours.map(group).collect()
         } else {
@@ -106,14 +102,14 @@ impl ModalEstimate {
             modes,
             parameters: parameters_of_modes,
             constraint_tests: tests.concat(),
-            others: others.iter().zip(&unrequested).map(unrequested_mode).collect(),
+            others: parameters_of_others.iter().zip(&unrequested).map(unrequested_mode).collect(),
             dropped,
             powers: model.powers.clone(),
             model: ModalModel {
                 terms,
                 reference: model.reference,
                 powers: model.powers.forces.clone(),
-                residuals,
+                residuals: residual_coefficients(fit),
                 groups,
             },
             explained: explained(fit),
@@ -229,6 +225,17 @@ impl ModalEstimate {
         add_transients(&lines, &modes, &self.powers.transients, &mut predicted);
         Ok(predicted)
     }
+}
+
+/// Returns the coefficients of the residual terms: `[output][input][power]`.
+fn residual_coefficients(fit: &Fit<'_>) -> Vec<Vec<Vec<f64>>> {
+    let columns = fit.model.residual_columns(fit.lines);
+    let of_output = |output: usize| {
+        let unknowns = fit.projection.unknowns_of(output, &fit.weights);
+        let of_input = |input: usize| unknowns[columns[input].clone()].to_vec();
+        (0..fit.lines.inputs()).map(of_input).collect()
+    };
+    (0..fit.lines.outputs.len()).map(of_output).collect()
 }
 
 /// Returns the ranges of modes, by rising frequency, whose errors are not independent.

@@ -96,7 +96,7 @@ impl ModalTerm {
         let moved_mirror = shape.conj() * mirror_force * mirror_slope;
         let (direct, conjugate) = (force * value, mirror_force * mirror);
         let at = 2 + 2 * output;
-        let mut all = vec![
+        let mut derivatives = vec![
             (0, (moved + moved_mirror) * pole.re),
             (1, C::i() * (moved - moved_mirror) * pole.im),
             (at, direct + conjugate),
@@ -105,10 +105,10 @@ impl ModalTerm {
         let (direct, conjugate) = (shape * value, shape.conj() * mirror);
         for (input, force) in forces.iter().enumerate() {
             let at = 2 + 2 * self.shape.len() + 2 * input;
-            all.push((at, force * (direct + conjugate)));
-            all.push((at + 1, C::i() * force * (direct - conjugate)));
+            derivatives.push((at, force * (direct + conjugate)));
+            derivatives.push((at + 1, C::i() * force * (direct - conjugate)));
         }
-        all
+        derivatives
     }
 }
 
@@ -176,11 +176,11 @@ impl ModalModel {
         let outputs = self.outputs();
         let mut covariance = DMatrix::zeros(outputs, outputs);
         for group in &self.groups {
-            let all: Vec<_> =
+            let gradients: Vec<_> =
                 (0..outputs).map(|i| self.gradient(group, i, omega, forces)).collect();
             for i in 0..outputs {
                 for j in 0..=i {
-                    let sum = product(group, &all[i], &all[j]);
+                    let sum = product(group, &gradients[i], &gradients[j]);
                     covariance[(i, j)] += sum;
                     if i != j {
                         covariance[(j, i)] += sum.conj();
@@ -212,14 +212,14 @@ impl ModalModel {
         forces: &[C],
     ) -> Vec<(usize, C)> {
         let mut first = 0;
-        let mut all = Vec::new();
+        let mut gradient = Vec::new();
         for mode in &group.modes {
             let term = &self.terms[*mode];
-            let own = term.derivatives(output, omega, forces);
-            all.extend(own.into_iter().map(|(index, value)| (first + index, value)));
+            let derivatives = term.derivatives(output, omega, forces).into_iter();
+            gradient.extend(derivatives.map(|(index, value)| (first + index, value)));
             first += term.parameters();
         }
-        all
+        gradient
     }
 }
 

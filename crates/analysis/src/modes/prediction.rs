@@ -8,6 +8,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::system::ModalSystem;
 use crate::AnalysisError;
+use crate::limits::{REST_DECAY, REST_RECORDS};
 use crate::measurement::{Block, Measurement};
 use crate::predict::{Predict, Predicted, PredictedMotion, PredictionError, PredictionSummary};
 use crate::text::significant;
@@ -50,11 +51,12 @@ pub fn predict_with_modes(
         let Some((_, record)) = kinds.iter().find(|(kind, _)| kind == quantity) else { continue };
         let one = Record::from_channel(record.sampling(), record.channel(*column).to_vec())?;
         let measured_in_band = within_band(&one, system.band_hz, extent)?;
-        let own = response.record.channel(*output).to_vec();
-        let own = Record::from_channel(record.sampling(), own)?;
-        let own = within_band(&own, system.band_hz, extent)?;
+        let values = response.record.channel(*output).to_vec();
+        let predicted = Record::from_channel(record.sampling(), values)?;
+        let predicted = within_band(&predicted, system.band_hz, extent)?;
         let name = (system.outputs[*output].0.clone(), *quantity, *output);
-        let error = PredictionError::new(name, measured_in_band.channel(0), own.channel(0), steady);
+        let error =
+            PredictionError::new(name, measured_in_band.channel(0), predicted.channel(0), steady);
         errors.push(error.with_standard_error(response.standard_error[*output]));
     }
     let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
@@ -62,6 +64,13 @@ pub fn predict_with_modes(
     remarks.push(format!(
         "the modes predict the response from {low} to {high} Hz, and are judged there"
     ));
+    if !steady {
+        remarks.push(
+            "the prediction begins at rest: motion that the record begins with is not in it, nor in \
+             the standard errors"
+                .into(),
+        );
+    }
     let predicted: Vec<usize> = match columns.as_slice() {
         [] => (0..system.outputs.len()).collect(),
         some => some.iter().map(|(_, _, output)| *output).collect(),
@@ -138,8 +147,8 @@ impl Response {
                 format!("no line of the record is in the band of the modes, {low} to {high} Hz");
             return Err(AnalysisError::Setting { setting: "samples", why });
         }
-        let all = Spectrum::from_lines(sampling, lines)?.to_record()?;
-        let record = if steady { repeated(&all, block)? } else { all.window(0, len)? };
+        let motion = Spectrum::from_lines(sampling, lines)?.to_record()?;
+        let record = if steady { repeated(&motion, block)? } else { motion.window(0, len)? };
         // The response to an open record lies in its first part.
         let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
         let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
@@ -150,15 +159,12 @@ impl Response {
 /// Returns the forces followed by zeros, until the slowest mode has decayed, so that the response
 /// does not run into its own beginning.
 fn followed_by_rest(system: &ModalSystem, force: &Record) -> Result<Record, AnalysisError> {
-    /// Logarithm of the decay of a response before the record repeats: below 0.1 %.
-    const DECAYS: f64 = 7.0;
-    /// Largest number of records of rest.
-    const MOST: usize = 8;
     let slowest = system.model.terms.iter().map(|term| -term.pole[0]).fold(f64::INFINITY, f64::min);
     let (len, rate_hz) = (force.len(), force.sampling().rate_hz());
-    let rest = ((DECAYS / slowest * rate_hz).ceil() as usize).clamp(len, MOST * len);
-    let sampling = Sampling::from_rate_hz(rate_hz, len + rest)?;
-    let mut data = DMatrix::zeros(len + rest, force.channels());
+    let decay = (REST_DECAY / slowest * rate_hz).ceil() as usize;
+    let zeros = decay.clamp(len, REST_RECORDS * len);
+    let sampling = Sampling::from_rate_hz(rate_hz, len + zeros)?;
+    let mut data = DMatrix::zeros(len + zeros, force.channels());
     data.rows_mut(0, len).copy_from(force.data());
     Ok(Record::new(sampling, data)?)
 }

@@ -131,34 +131,36 @@ impl ModalSystem {
         &self,
         channels: &Channels,
     ) -> Result<Vec<(ResponseQuantity, usize, usize)>, AnalysisError> {
-        let mut all = Vec::new();
+        let mut columns_and_outputs = Vec::new();
         for quantity in ResponseQuantity::ALL {
             let columns = channels.response(quantity);
-            let own: Vec<usize> =
+            let outputs: Vec<usize> =
                 (0..self.outputs.len()).filter(|at| self.outputs[*at].1 == quantity).collect();
             let named = |at: usize| {
                 let name = channels.response_name(quantity, at);
-                own.iter().copied().find(|output| self.outputs[*output].0 == name)
+                outputs.iter().copied().find(|output| self.outputs[*output].0 == name)
             };
-            let in_order = |at: usize| (columns.len() == own.len()).then(|| own[at]);
+            let in_order = |at: usize| (columns.len() == outputs.len()).then(|| outputs[at]);
             let present = (0..columns.len()).filter(|at| columns[*at] != ABSENT);
             let names: Option<Vec<_>> = present.clone().map(|at| Some((at, named(at)?))).collect();
             let order = || present.map(|at| Some((at, in_order(at)?))).collect();
-            let Some(found): Option<Vec<(usize, usize)>> = names.or_else(order) else {
+            let Some(pairs): Option<Vec<(usize, usize)>> = names.or_else(order) else {
                 let known: Vec<&str> =
-                    own.iter().map(|output| self.outputs[*output].0.as_str()).collect();
+                    outputs.iter().map(|output| self.outputs[*output].0.as_str()).collect();
                 let why = format!(
                     "{} of {quantity} for {} of {}: {}",
                     message::count(columns.len(), "column"),
-                    message::count(own.len(), "response"),
+                    message::count(outputs.len(), "response"),
                     self.name,
                     if known.is_empty() { "none".into() } else { known.join(", ") },
                 );
                 return Err(AnalysisError::Setting { setting: "response", why });
             };
-            all.extend(found.into_iter().map(|(column, output)| (quantity, column, output)));
+            let of_quantity = pairs.into_iter();
+            columns_and_outputs
+                .extend(of_quantity.map(|(column, output)| (quantity, column, output)));
         }
-        Ok(all)
+        Ok(columns_and_outputs)
     }
 }
 
@@ -177,9 +179,9 @@ impl FrequencyResponse for ModalSystem {
         forced: &[usize],
         omega: f64,
     ) -> Option<DMatrix<Complex<f64>>> {
-        let all = self.model.response(omega);
-        let is_finite = all.iter().all(|z| z.re.is_finite() && z.im.is_finite());
-        let entry = |i: usize, j: usize| all[(channels[i].dof, forced[j])];
+        let matrix = self.model.response(omega);
+        let is_finite = matrix.iter().all(|z| z.re.is_finite() && z.im.is_finite());
+        let entry = |i: usize, j: usize| matrix[(channels[i].dof, forced[j])];
         is_finite.then(|| DMatrix::from_fn(channels.len(), forced.len(), entry))
     }
 
@@ -190,9 +192,9 @@ impl FrequencyResponse for ModalSystem {
         omega: f64,
         forces: &[Complex<f64>],
     ) -> Option<DMatrix<Complex<f64>>> {
-        let mut all = vec![Complex::default(); self.inputs.len()];
-        forced.iter().zip(forces).for_each(|(input, force)| all[*input] = *force);
-        let covariance = self.model.response_covariance(omega, &all);
+        let mut of_inputs = vec![Complex::default(); self.inputs.len()];
+        forced.iter().zip(forces).for_each(|(input, force)| of_inputs[*input] = *force);
+        let covariance = self.model.response_covariance(omega, &of_inputs);
         let entry = |i: usize, j: usize| covariance[(channels[i].dof, channels[j].dof)];
         Some(DMatrix::from_fn(channels.len(), channels.len(), entry))
     }

@@ -59,6 +59,13 @@ pub fn reconstruct_with_modes(
     let mut remarks =
         vec![format!("forces are counted as in {}: {}", system.name, system.inputs.join(", "))];
     remarks.extend(periods::remark(&recorded, &window));
+    if run.window_settings().period.is_none() && how.at_rest {
+        remarks.push(
+            "the record is taken to begin and end at rest: motion at its ends is taken for that of \
+             the forces, and the standard errors do not have it"
+                .into(),
+        );
+    }
     let used = force.spectrum().lines().row_iter().filter(|row| row.camax() > 0.0).count();
     let how_found = How {
         method: "frequency responses of the modes, line by line",

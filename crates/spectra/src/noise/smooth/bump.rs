@@ -143,43 +143,9 @@ pub(super) fn most_conspicuous(
 ) -> Option<Bump> {
     let (lines, channels) = variances.shape();
     let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
-    // Cumulative sums of the levels give the mean of any band.
-    let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
-    for channel in 0..channels {
-        for line in 0..lines {
-            below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
-        }
-    }
-    // Returns the gain of a flat bump, or `None` if it is less than `least`.
-    let gain_of_flat = |start: usize, width: usize, least: f64| {
-        let (count, others) = (width as f64, (lines - width) as f64);
-        let ratios = (0..channels).map(|channel| {
-            let inside = below[(start + width, channel)] - below[(start, channel)];
-            let total = below[(lines, channel)];
-            let [mean, inside, other] =
-                [total / (count + others), inside / count, (total - inside) / others]
-                    .map(|level: f64| level.max(SMOOTH_FLOOR));
-            let counts = inside > other || count * nu >= QUIET_DEVIATIONS;
-            if counts { [mean / inside, mean / other] } else { [1.0, 1.0] }
-        });
-        // Most bands are excluded without a logarithm, because ln x ≤ x − 1.
-        let bound = |[inside, other]: [f64; 2]| count * (inside - 1.0) + others * (other - 1.0);
-        let gain = |[inside, other]: [f64; 2]| count * inside.ln() + others * other.ln();
-        let possible = ratios.clone().map(bound).sum::<f64>() >= least;
-        possible.then(|| ratios.map(gain).sum::<f64>())
-    };
-    let of_width = |width: usize| {
-        let mut best: Option<(f64, usize)> = None;
-        for start in 0..=lines - width {
-            let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
-            best = gain_of_flat(start, width, least)
-                .filter(|gain| *gain >= least)
-                .map(|gain| (gain, start))
-                .or(best);
-        }
-        best.map(|(gain, at)| (gain, at..at + width))
-    };
-    let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
+    let gains = FlatGains::new(&levels, nu);
+    let mut flat: Vec<(f64, Range<usize>)> =
+        widths(lines).filter_map(|width| gains.best_of_width(width)).collect();
     flat.sort_by(|a, b| b.0.total_cmp(&a.0));
     flat.truncate(BEST_WIDTHS);
     let best = |of: &mut dyn Iterator<Item = Gained>| of.max_by(|a, b| a.gain.total_cmp(&b.gain));
@@ -202,6 +168,58 @@ pub(super) fn most_conspicuous(
         (fitted.gain, fitted.bump)
     };
     Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
+}
+
+/// Gains of flat bumps, as reductions of Σ log p + v/p.
+struct FlatGains {
+    /// Cumulative sums of the levels v/p, lines + 1 × channels: they give the mean of any band.
+    below: DMatrix<f64>,
+    nu: f64,
+}
+
+impl FlatGains {
+    fn new(levels: &DMatrix<f64>, nu: f64) -> Self {
+        let (lines, channels) = levels.shape();
+        let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
+        for channel in 0..channels {
+            for line in 0..lines {
+                below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
+            }
+        }
+        Self { below, nu }
+    }
+
+    /// Returns the largest gain of the bands of a width, and its band.
+    fn best_of_width(&self, width: usize) -> Option<(f64, Range<usize>)> {
+        let lines = self.below.nrows() - 1;
+        let mut best: Option<(f64, usize)> = None;
+        for start in 0..=lines - width {
+            let least = best.map_or(f64::NEG_INFINITY, |(gain, _)| gain);
+            let gain = self.gain_above(least, start, width).filter(|gain| *gain >= least);
+            best = gain.map(|gain| (gain, start)).or(best);
+        }
+        best.map(|(gain, start)| (gain, start..start + width))
+    }
+
+    /// Returns the gain of a band, or `None` if it is less than `least`.
+    fn gain_above(&self, least: f64, start: usize, width: usize) -> Option<f64> {
+        let lines = self.below.nrows() - 1;
+        let (count, others) = (width as f64, (lines - width) as f64);
+        let ratios = self.below.column_iter().map(|below| {
+            let inside = below[start + width] - below[start];
+            let total = below[lines];
+            let [mean, inside, other] =
+                [total / (count + others), inside / count, (total - inside) / others]
+                    .map(|level: f64| level.max(SMOOTH_FLOOR));
+            let counts = inside > other || count * self.nu >= QUIET_DEVIATIONS;
+            if counts { [mean / inside, mean / other] } else { [1.0, 1.0] }
+        });
+        // Most bands are excluded without a logarithm, because ln x ≤ x − 1.
+        let bound = |[inside, other]: [f64; 2]| count * (inside - 1.0) + others * (other - 1.0);
+        let gain = |[inside, other]: [f64; 2]| count * inside.ln() + others * other.ln();
+        let possible = ratios.clone().map(bound).sum::<f64>() >= least;
+        possible.then(|| ratios.map(gain).sum::<f64>())
+    }
 }
 
 /// Bump with its most likely heights.
