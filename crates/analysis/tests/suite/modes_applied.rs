@@ -72,8 +72,10 @@ fn predictions_and_forces_err_as_they_state() {
             assert!(channel.nrmse < 0.01, "{prediction}");
             predicted.push((channel.rmse, channel.standard_error.unwrap()));
         }
+        assert!(prediction.to_string().contains("begins at rest"), "{prediction}");
         let how = Reconstruct { at_rest: true, ..Reconstruct::default() };
         let force = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
+        assert!(force.to_string().contains("taken to begin and end at rest"), "{force}");
         let difference = force.force().record().data() - forces.data();
         for (at, row) in force.summary().forces.iter().enumerate() {
             let error = measures::rms(difference.column(at).as_slice());

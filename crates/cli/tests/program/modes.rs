@@ -206,3 +206,25 @@ fn two_results_are_compared() {
     let again = modes(path, "frf.unv");
     assert_eq!(again["modes"].as_array().unwrap().len(), 2, "{again}");
 }
+
+/// The example is a part of a longer test and begins in motion: the prediction from rest says what it leaves out. The
+/// force on the record explains both responses.
+#[test]
+fn a_result_predicts_responses_and_finds_the_force() {
+    let folder = examples();
+    let folder = folder.path();
+    let report =
+        modes(folder, "hammer-1.csv --force force --acceleration a1,a2 --hits --band-hz 2:100");
+    std::fs::write(folder.join("modes.json"), report.to_string()).unwrap();
+    let predicted =
+        mechid(folder, "predict modes.json hammer-1.csv --force force --acceleration a1,a2");
+    assert!(predicted.contains("the prediction begins at rest"), "{predicted}");
+    let force = "force hammer-1.csv --system modes.json --acceleration a1,a2";
+    let message = refused(folder, force);
+    assert!(message.contains("--at-rest"), "{message}");
+    let text = mechid(folder, &format!("{force} --at-rest --json"));
+    let found: Value = serde_json::from_str(&text).unwrap();
+    for channel in found["channels"].as_array().unwrap() {
+        assert!(channel["unexplained"].as_f64().unwrap() < 0.01, "{text}");
+    }
+}
