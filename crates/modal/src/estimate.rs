@@ -61,10 +61,7 @@ impl ModalEstimate {
             (0..model.modes()).partition(|mode| stated[*mode]);
         let parameters = |mode: usize| covariance.mode_parameters(fit, mode, &shapes[mode]);
         let constrained = |(index, &mode): (usize, &usize)| {
-            let free = parameters(mode);
-            let tests = constraint::test(constraints, &free, index);
-            let imposed = constraint::impose(constraints, &free).map(|(_, _, mode)| mode);
-            let parameters = imposed.unwrap_or(free);
+            let (parameters, tests) = imposed(constraints, parameters(mode), index);
             let identified = identified_mode(fit, noise, &parameters, mode, gains[mode]);
             (identified, (parameters, tests))
         };
@@ -82,20 +79,9 @@ impl ModalEstimate {
             .collect();
         let groups = if constraints.is_empty() {
             let neighbours = neighbours(&parameters_of_modes).into_iter();
-            let group = |range: Range<usize>| {
-                let modes: Vec<_> = requested[range.clone()]
-                    .iter()
-                    .map(|mode| (*mode, &shapes[*mode][..]))
-                    .collect();
-                ModalGroup::new(range.collect(), &covariance.joint(fit, &modes).1)
-            };
-            neighbours.map(group).collect()
+            neighbours.map(|range| group(fit, covariance, &requested, &shapes, range)).collect()
         } else {
-            // A constrained estimate has a covariance for each mode alone.
-            let alone = |(index, one): (usize, &ModeParameters)| {
-                ModalGroup::new(vec![index], &one.covariance)
-            };
-            parameters_of_modes.iter().enumerate().map(alone).collect()
+            groups_of_one(&parameters_of_modes)
         };
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
@@ -225,6 +211,37 @@ impl ModalEstimate {
         add_transients(&lines, &modes, &self.powers.transients, &mut predicted);
         Ok(predicted)
     }
+}
+
+/// Returns the parameters of a mode with the constraints, and the tests of these.
+fn imposed(
+    constraints: &[ModalConstraint],
+    free: ModeParameters,
+    index: usize,
+) -> (ModeParameters, Vec<ConstraintTest>) {
+    let tests = constraint::test(constraints, &free, index);
+    let imposed = constraint::impose(constraints, &free).map(|(_, _, mode)| mode);
+    (imposed.unwrap_or(free), tests)
+}
+
+/// Returns each mode alone with its covariance, which is all that a constrained estimate has.
+fn groups_of_one(modes: &[ModeParameters]) -> Vec<ModalGroup> {
+    let alone =
+        |(index, mode): (usize, &ModeParameters)| ModalGroup::new(vec![index], &mode.covariance);
+    modes.iter().enumerate().map(alone).collect()
+}
+
+/// Returns the joint covariance of neighbouring modes.
+fn group(
+    fit: &Fit<'_>,
+    covariance: &Covariance,
+    requested: &[usize],
+    shapes: &[Vec<C>],
+    range: Range<usize>,
+) -> ModalGroup {
+    let modes: Vec<_> =
+        requested[range.clone()].iter().map(|mode| (*mode, &shapes[*mode][..])).collect();
+    ModalGroup::new(range.collect(), &covariance.joint(fit, &modes).1)
 }
 
 /// Returns the coefficients of the residual terms: `[output][input][power]`.

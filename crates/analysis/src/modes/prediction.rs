@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use mechid_force::within_band;
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Extent, Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -44,21 +45,7 @@ pub fn predict_with_modes(
     let columns = system.outputs_of(channels)?;
     let (block, steady) = (measured.whole_block()?, measured.window_settings().period.is_some());
     let response = Response::new(system, &block, &inputs, steady)?;
-    let extent = if steady { Extent::WholePeriod } else { Extent::Open };
-    let mut errors = Vec::new();
-    for (quantity, column, output) in &columns {
-        let kinds = block.responses();
-        let Some((_, record)) = kinds.iter().find(|(kind, _)| kind == quantity) else { continue };
-        let one = Record::from_channel(record.sampling(), record.channel(*column).to_vec())?;
-        let measured_in_band = within_band(&one, system.band_hz, extent)?;
-        let values = response.record.channel(*output).to_vec();
-        let predicted = Record::from_channel(record.sampling(), values)?;
-        let predicted = within_band(&predicted, system.band_hz, extent)?;
-        let name = (system.outputs[*output].0.clone(), *quantity, *output);
-        let error =
-            PredictionError::new(name, measured_in_band.channel(0), predicted.channel(0), steady);
-        errors.push(error.with_standard_error(response.standard_error[*output]));
-    }
+    let errors = response.errors(system, &block, &columns, steady)?;
     let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
     let mut remarks = block.unit_notes();
     remarks.push(format!(
@@ -153,6 +140,37 @@ impl Response {
         let share = if steady { 1.0 } else { sampling.len() as f64 / len as f64 };
         let standard_error = power.into_iter().map(|power| (power * share).sqrt()).collect();
         Ok(Self { record, standard_error })
+    }
+
+    /// Returns the errors of the measured channels, given by quantity, column and output, in the
+    /// band of the modes.
+    fn errors(
+        &self,
+        system: &ModalSystem,
+        block: &Block,
+        columns: &[(ResponseQuantity, usize, usize)],
+        steady: bool,
+    ) -> Result<Vec<PredictionError>, AnalysisError> {
+        let extent = if steady { Extent::WholePeriod } else { Extent::Open };
+        let in_band = |record: &Record, column: usize| {
+            let values = record.channel(column).to_vec();
+            let one = Record::from_channel(record.sampling(), values)?;
+            Ok::<_, AnalysisError>(within_band(&one, system.band_hz, extent)?)
+        };
+        let mut errors = Vec::new();
+        for (quantity, column, output) in columns {
+            let kinds = block.responses();
+            let Some((_, record)) = kinds.iter().find(|(kind, _)| kind == quantity) else {
+                continue;
+            };
+            let measured = in_band(record, *column)?;
+            let predicted = in_band(&self.record, *output)?;
+            let name = (system.outputs[*output].0.clone(), *quantity, *output);
+            let error =
+                PredictionError::new(name, measured.channel(0), predicted.channel(0), steady);
+            errors.push(error.with_standard_error(self.standard_error[*output]));
+        }
+        Ok(errors)
     }
 }
 
