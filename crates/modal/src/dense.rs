@@ -6,6 +6,7 @@ use faer::linalg::matmul::triangular::BlockStructure;
 use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Conj, MatMut, MatRef, Par};
+use nalgebra::{Complex, DMatrix};
 
 use crate::limits::DEPENDENT_COLUMN;
 
@@ -55,6 +56,24 @@ pub(crate) fn transposed_product(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> 
             Par::Seq,
         );
     }
+    product
+}
+
+/// Returns AB of complex matrices.
+pub(crate) fn product(
+    a: &DMatrix<Complex<f64>>,
+    b: &DMatrix<Complex<f64>>,
+) -> DMatrix<Complex<f64>> {
+    let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
+    let mut product = DMatrix::zeros(rows, columns);
+    faer::linalg::matmul::matmul(
+        MatMut::from_column_major_slice_mut(product.as_mut_slice(), rows, columns),
+        Accum::Replace,
+        MatRef::from_column_major_slice(a.as_slice(), rows, inner),
+        MatRef::from_column_major_slice(b.as_slice(), inner, columns),
+        Complex::new(1.0, 0.0),
+        Par::Seq,
+    );
     product
 }
 

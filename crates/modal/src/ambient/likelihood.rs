@@ -1,14 +1,14 @@
-//! Whittle's likelihood of the lines of a band: cost, gradient and Fisher information.
+//! Whittle's likelihood of the lines of a band: cost and gradient.
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::lines::PooledLines;
 use super::parameters::{Kernel, Parameters, Span};
-use super::spectrum::{Coefficients, Direction, Kernels, directions};
+use super::spectrum::{Coefficients, Kernels};
 
 /// Number of pooled lines per task: fixed, so that results do not depend on the number of cores.
-const TASK: usize = 64;
+pub(super) const TASK: usize = 64;
 
 /// Returns the factor of a Hermitian matrix if it is positive definite.
 ///
@@ -230,163 +230,6 @@ fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &m
         let along = by_factor.row(r).dot(&factor.row(r));
         let slope = (by_factor[(r, s)] - along * factor[(r, s)]) / raw.row(r).norm();
         gradient[parameters.layout.correlation(index)] = slope;
-    }
-}
-
-/// Returns the Fisher information of the parameters; `None` where S is not positive definite.
-///
-/// # Source
-/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines; Zeira & Nehorai (1990), IEEE Transactions
-/// on Acoustics, Speech, and Signal Processing 38, 1031–1036.
-pub(super) fn information(
-    parameters: &Parameters,
-    lines: &[PooledLines],
-    span: Span,
-) -> Option<DMatrix<f64>> {
-    let coefficients = Coefficients::new(parameters);
-    let directions = directions(parameters);
-    let len = parameters.layout.len();
-    let chunk = |chunk: &[PooledLines]| {
-        let mut sum = DMatrix::zeros(len, len);
-        for line in chunk {
-            let kernels = coefficients.kernels(line.omega, span);
-            let variances = noise(parameters, &line.terms);
-            let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
-            let task = LineInformation {
-                parameters,
-                coefficients: &coefficients,
-                kernels: &kernels,
-                inverse: &inverse,
-                variances: &variances,
-                line,
-            };
-            task.add(&directions, &mut sum);
-        }
-        Some(sum)
-    };
-    let parts: Option<Vec<DMatrix<f64>>> = lines.par_chunks(TASK).map(chunk).collect();
-    let mut total = DMatrix::zeros(len, len);
-    for part in parts? {
-        total += part;
-    }
-    total.fill_lower_triangle_with_upper_triangle();
-    Some(total)
-}
-
-/// Information of one pooled line.
-struct LineInformation<'a> {
-    parameters: &'a Parameters,
-    coefficients: &'a Coefficients,
-    kernels: &'a Kernels,
-    inverse: &'a DMatrix<Complex<f64>>,
-    variances: &'a [f64],
-    line: &'a PooledLines,
-}
-
-impl LineInformation<'_> {
-    /// Adds the information of this line to the upper triangle.
-    fn add(&self, directions: &[Direction], sum: &mut DMatrix<f64>) {
-        let x = self.coefficients.shape_directions(self.kernels);
-        let whitened = self.inverse * &x;
-        self.add_shapes(&x, &whitened, sum);
-        let derivatives: Vec<_> =
-            directions.iter().map(|d| self.coefficients.derivative(self.kernels, d)).collect();
-        let sandwiched: Vec<_> =
-            derivatives.iter().map(|s| self.inverse * s * self.inverse).collect();
-        for (a, direction) in directions.iter().enumerate() {
-            for (b, other) in directions.iter().enumerate().skip(a) {
-                let product: f64 = derivatives[a]
-                    .iter()
-                    .zip(sandwiched[b].iter())
-                    .map(|(p, q)| p.re * q.re + p.im * q.im)
-                    .sum();
-                self.put(sum, direction.index, other.index, product);
-            }
-            self.add_dense_and_shapes(direction.index, &(&sandwiched[a] * &x), sum);
-            self.add_noise(direction.index, sum, |i| sandwiched[a][(i, i)].re);
-        }
-        self.add_noise_and_shapes(&whitened, sum);
-        for i in 0..self.variances.len() {
-            for (d, term) in self.line.terms.iter().enumerate() {
-                let index = self.parameters.layout.noise(d, i);
-                let scale = term * self.variances[i];
-                self.add_noise(index, sum, |j| scale * self.inverse[(i, j)].norm_sqr());
-            }
-        }
-    }
-
-    fn put(&self, sum: &mut DMatrix<f64>, a: usize, b: usize, value: f64) {
-        sum[(a.min(b), a.max(b))] += self.line.count * value;
-    }
-
-    fn shape_index(&self, column: usize, output: usize) -> usize {
-        let layout = &self.parameters.layout;
-        layout.shape(column / 2) + (column % 2) * layout.outputs + output
-    }
-
-    /// Adds tr (P S_a P S_b) = 2 Re [(P x)_j (P y)_i + P_ji xᴴ P y] for S_a = e_i xᴴ + x e_iᵀ and
-    /// S_b = e_j yᴴ + y e_jᵀ.
-    fn add_shapes(
-        &self,
-        x: &DMatrix<Complex<f64>>,
-        whitened: &DMatrix<Complex<f64>>,
-        sum: &mut DMatrix<f64>,
-    ) {
-        let gram = x.ad_mul(whitened);
-        let (p, columns) = x.shape();
-        for b in 0..columns {
-            for a in 0..=b {
-                for j in 0..p {
-                    let first = self.shape_index(a, 0);
-                    for i in 0..p {
-                        let (row, column) = (first + i, self.shape_index(b, j));
-                        if row > column {
-                            continue;
-                        }
-                        let product = whitened[(j, a)] * whitened[(i, b)]
-                            + self.inverse[(j, i)] * gram[(a, b)];
-                        sum[(row, column)] += self.line.count * 2.0 * product.re;
-                    }
-                }
-            }
-        }
-    }
-
-    fn add_dense_and_shapes(
-        &self,
-        index: usize,
-        products: &DMatrix<Complex<f64>>,
-        sum: &mut DMatrix<f64>,
-    ) {
-        for (column, values) in products.column_iter().enumerate() {
-            for (i, value) in values.iter().enumerate() {
-                self.put(sum, index, self.shape_index(column, i), 2.0 * value.re);
-            }
-        }
-    }
-
-    /// Adds the information between parameter `index` and the noise parameters; `value` returns the
-    /// information with the noise variance of an output. A pair of noise parameters is added once.
-    fn add_noise(&self, index: usize, sum: &mut DMatrix<f64>, value: impl Fn(usize) -> f64) {
-        for (j, variance) in self.variances.iter().enumerate() {
-            let value = value(j) * variance;
-            for (d, term) in self.line.terms.iter().enumerate() {
-                let noise_index = self.parameters.layout.noise(d, j);
-                if noise_index >= index {
-                    self.put(sum, index, noise_index, value * term);
-                }
-            }
-        }
-    }
-
-    fn add_noise_and_shapes(&self, whitened: &DMatrix<Complex<f64>>, sum: &mut DMatrix<f64>) {
-        for (column, values) in whitened.column_iter().enumerate() {
-            for i in 0..values.len() {
-                let index = self.shape_index(column, i);
-                let at = |j: usize| 2.0 * (self.inverse[(i, j)] * values[j]).re;
-                self.add_noise(index, sum, at);
-            }
-        }
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod error;
 pub mod harmonics;
+mod information;
 mod initial;
 mod likelihood;
 mod limits;

@@ -2,7 +2,8 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::likelihood::{cost, gradient, information};
+use super::information::information;
+use super::likelihood::{cost, gradient};
 use super::limits::{ENOUGH, LARGEST_STEP, POOLING};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Parameters, Span};
@@ -15,6 +16,16 @@ const EASIER: f64 = 0.125;
 
 /// Maximum number of trials of one step.
 const TRIALS: usize = 12;
+
+/// Number of updates of the information from which a refused step is blamed on them.
+const TRUSTED_UPDATES: usize = 4;
+
+/// Minimum curvature along a step that an update takes from the gradients, as a share of the
+/// curvature before it.
+///
+/// # Source
+/// Powell (1978), Lecture Notes in Mathematics 630, 144–157.
+const LEAST_CURVATURE: f64 = 0.2;
 
 /// Number of successive slow steps that ends a search.
 const SLOW_STEPS: usize = 2;
@@ -57,6 +68,9 @@ pub(super) struct Fit {
 }
 
 /// Searches from `start` over pooled lines; `None` if the likelihood is not defined at `start`.
+///
+/// The information costs as much as a hundred gradients. The steps therefore update it from the
+/// gradients that they meet, and it is computed anew where they become slow or are refused.
 pub(super) fn search(
     start: Parameters,
     lines: &[PooledLines],
@@ -68,15 +82,23 @@ pub(super) fn search(
         return None;
     }
     let information = information(&start, lines, span)?;
+    let slope = gradient(&start, lines, span)?;
     let mut fit = Fit { parameters: start, cost, information };
-    let (mut damping, mut slow) = (FIRST_DAMPING, 0);
+    let mut path = Path { lines, span, slope, damping: FIRST_DAMPING, updates: 0 };
+    let mut slow = 0;
     for _ in 0..effort.iterations {
-        let gain = step(&mut fit, lines, span, &mut damping)?;
-        slow = if gain < effort.slow { slow + 1 } else { 0 };
-        if gain < ENOUGH || slow >= SLOW_STEPS {
+        let gain = path.step(&mut fit)?;
+        if gain >= effort.slow {
+            slow = 0;
+            continue;
+        }
+        slow += 1;
+        if slow >= SLOW_STEPS || (gain < ENOUGH && path.updates == 0) {
             break;
         }
+        path.renew(&mut fit)?;
     }
+    path.renew(&mut fit)?;
     log::debug!(
         "{} lines, {} unknowns: cost {:.4}",
         lines.len(),
@@ -86,27 +108,77 @@ pub(super) fn search(
     Some(fit)
 }
 
-/// Makes one step and returns its gain in log-likelihood, 0 if no step succeeds.
-fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> Option<f64> {
-    let slope = gradient(&fit.parameters, lines, span)?;
-    for _ in 0..TRIALS {
-        if let Some(step) = damped_step(&fit.information, &slope, *damping) {
-            let candidate = moved(&fit.parameters, &step);
-            let next = cost(&candidate, lines, span);
-            if next < fit.cost {
-                let gain = fit.cost - next;
-                fit.information = information(&candidate, lines, span)?;
-                (fit.parameters, fit.cost) = (candidate, next);
-                *damping *= EASIER;
-                return Some(gain);
+/// State of a search between two steps.
+struct Path<'a> {
+    lines: &'a [PooledLines],
+    span: Span,
+    /// Gradient at the parameters of the fit.
+    slope: DVector<f64>,
+    damping: f64,
+    /// Number of updates of the information since it was computed.
+    updates: usize,
+}
+
+impl Path<'_> {
+    /// Makes one step and returns its gain in log-likelihood, 0 if no step succeeds.
+    fn step(&mut self, fit: &mut Fit) -> Option<f64> {
+        for _ in 0..TRIALS {
+            if let Some(step) = damped_step(&fit.information, &self.slope, self.damping) {
+                let candidate = moved(&fit.parameters, &step);
+                let next = cost(&candidate, self.lines, self.span);
+                if next < fit.cost {
+                    let gain = fit.cost - next;
+                    let slope = gradient(&candidate, self.lines, self.span)?;
+                    let distance = &candidate.values - &fit.parameters.values;
+                    update(&mut fit.information, &distance, &(&slope - &self.slope));
+                    (fit.parameters, fit.cost, self.slope) = (candidate, next, slope);
+                    self.damping *= EASIER;
+                    self.updates += 1;
+                    return Some(gain);
+                }
+                if -0.5 * step.dot(&self.slope) < ENOUGH {
+                    break;
+                }
             }
-            if -0.5 * step.dot(&slope) < ENOUGH {
-                break;
+            if self.updates >= TRUSTED_UPDATES {
+                self.renew(fit)?;
+            } else {
+                self.damping *= HARDER;
             }
         }
-        *damping *= HARDER;
+        Some(0.0)
     }
-    Some(0.0)
+
+    /// Computes the information at the parameters of the fit, unless it was computed there.
+    fn renew(&mut self, fit: &mut Fit) -> Option<()> {
+        if self.updates > 0 {
+            fit.information = information(&fit.parameters, self.lines, self.span)?;
+            self.updates = 0;
+        }
+        Some(())
+    }
+}
+
+/// Updates the information by the change of the gradient over a step so that it stays positive
+/// definite.
+///
+/// # Source
+/// Nocedal & Wright (2006), *Numerical Optimization*, 2nd ed., procedure 18.2 (damped BFGS).
+fn update(information: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<f64>) {
+    let predicted = &*information * step;
+    let curvature = step.dot(&predicted);
+    if !(curvature > 0.0 && curvature.is_finite()) {
+        return;
+    }
+    let along = step.dot(change);
+    let share = if along >= LEAST_CURVATURE * curvature {
+        1.0
+    } else {
+        (1.0 - LEAST_CURVATURE) * curvature / (curvature - along)
+    };
+    let change = change * share + &predicted * (1.0 - share);
+    information.ger(1.0 / step.dot(&change), &change, &change, 1.0);
+    information.ger(-1.0 / curvature, &predicted, &predicted, 1.0);
 }
 
 /// Searches from `start` with lines pooled around its poles, and again with lines pooled around the

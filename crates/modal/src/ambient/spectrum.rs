@@ -15,7 +15,7 @@
 //! place of 1/(jω − λ), with half the time between two samples Δ: sums over all frequencies that
 //! fold onto ω.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::parameters::{Kernel, Parameters, Span};
 
@@ -46,7 +46,8 @@ pub(super) struct Direction {
     pub index: usize,
     /// Mode whose pole depends on the parameter, and ∂λ.
     pub pole: Option<(usize, Complex<f64>)>,
-    pub covariances: DMatrix<Complex<f64>>,
+    /// Modes whose γ changes, and ∂γ.
+    pub covariances: Vec<(usize, DVector<Complex<f64>>)>,
     pub direct_power: DMatrix<f64>,
 }
 
@@ -150,9 +151,9 @@ impl Coefficients {
     pub fn derivative(&self, kernels: &Kernels, direction: &Direction) -> DMatrix<Complex<f64>> {
         let outputs = self.shapes.nrows();
         let mut half = DMatrix::zeros(outputs, outputs);
-        for (r, [value, mirrored]) in kernels.value.iter().enumerate() {
-            let change = direction.covariances.column(r);
-            add_pair(&mut half, self.shapes.column(r), change, *value, *mirrored);
+        for (r, change) in &direction.covariances {
+            let [value, mirrored] = kernels.value[*r];
+            add_pair(&mut half, self.shapes.column(*r), change.as_view(), value, mirrored);
         }
         if let Some((r, step)) = direction.pole {
             let [value, mirrored] = kernels.derivative[r];
@@ -198,7 +199,7 @@ impl Coefficients {
 
 /// Returns the derivatives of the coefficients with respect to poles and correlations.
 pub(super) fn directions(parameters: &Parameters) -> Vec<Direction> {
-    let layout = &parameters.layout;
+    let (layout, zero) = (&parameters.layout, Complex::default());
     let at = |index: usize, step: f64| {
         let mut moved = parameters.clone();
         moved.values[index] += step;
@@ -210,10 +211,13 @@ pub(super) fn directions(parameters: &Parameters) -> Vec<Direction> {
         let mode = index % layout.modes;
         let moves = index < 2 * layout.modes;
         let pole = || (mode, parameters.pole_derivatives(mode)[index / layout.modes]);
+        let change = (above.covariances - below.covariances) * Complex::from(half);
+        let columns = change.column_iter().map(DVector::from).enumerate();
         Direction {
             index,
             pole: moves.then(pole),
-            covariances: (above.covariances - below.covariances) * Complex::from(half),
+            // A mode whose γ does not depend on the parameter has two equal values.
+            covariances: columns.filter(|(_, change)| change.iter().any(|z| *z != zero)).collect(),
             direct_power: (above.direct_power - below.direct_power) * half,
         }
     };

@@ -4,7 +4,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::likelihood::{cost, gradient, information, noise};
+use super::information::information;
+use super::likelihood::{cost, gradient, noise};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::spectrum::Coefficients;
