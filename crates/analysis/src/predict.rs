@@ -183,9 +183,9 @@ fn settle(
     steady: bool,
 ) -> Result<usize, AnalysisError> {
     let wrong = |why: String| Err(AnalysisError::Setting { setting: "settle", why });
-    let Some(samples) = how.settle else { return Ok(0) };
-    if steady {
-        return wrong("whole periods are predicted as a steady state, which needs no start".into());
+    let samples = settled_samples(how, block, steady)?;
+    if samples == 0 {
+        return Ok(0);
     }
     let measured_at_all = |kind: &ResponseQuantity| !measured.channels().response(*kind).is_empty();
     let kinds: Vec<_> = ResponseQuantity::ALL.into_iter().filter(measured_at_all).collect();
@@ -196,7 +196,21 @@ fn settle(
     if kinds.is_empty() || kinds.iter().any(missing) {
         return wrong("the start is fitted to the response of every degree of freedom".into());
     }
-    let len = block.force.len();
+    Ok(samples)
+}
+
+/// Returns the number of samples to which the motion at the beginning of a record is fitted; 0 for
+/// a start at rest.
+pub(crate) fn settled_samples(
+    how: &Predict,
+    block: &Block,
+    steady: bool,
+) -> Result<usize, AnalysisError> {
+    let wrong = |why: String| Err(AnalysisError::Setting { setting: "settle", why });
+    let (Some(samples), len) = (how.settle, block.force.len()) else { return Ok(0) };
+    if steady {
+        return wrong("whole periods are predicted as a steady state, which needs no start".into());
+    }
     if (2..len).contains(&samples) {
         Ok(samples)
     } else {

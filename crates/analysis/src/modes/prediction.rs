@@ -3,28 +3,31 @@
 use std::f64::consts::TAU;
 
 use mechid_force::within_band;
-use mechid_model::ResponseQuantity;
 use mechid_signal::{Extent, Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use super::system::ModalSystem;
+use super::initial_motion::FreeMotion;
+use super::system::{MeasuredChannel, ModalSystem};
 use crate::AnalysisError;
 use crate::limits::{REST_DECAY, REST_RECORDS};
 use crate::measurement::{Block, Measurement};
-use crate::predict::{Predict, Predicted, PredictedMotion, PredictionError, PredictionSummary};
+use crate::predict::{
+    Predict, Predicted, PredictedMotion, PredictionError, PredictionSummary, settled_samples,
+};
 use crate::text::significant;
 
 /// Predicts the response of the modes of a test to the forces of a record, in the band of the test.
 ///
-/// With a period, it is the steady state under the mean period; otherwise the response from rest
-/// over the whole window. Outside the band nothing is predicted, and measured responses are
-/// compared in it. The standard error of a channel is the RMS of what the errors of the modes
-/// cause; the errors of the residual terms are not in it.
+/// With a period, it is the steady state under the mean period; otherwise the response over the
+/// whole window, from rest or with the free motion that explains the first samples (`settle`) best.
+/// Outside the band nothing is predicted, and measured responses are compared in it. The standard
+/// error of a channel is the RMS of what the errors of the modes and of this free motion cause; the
+/// errors of the residual terms are not in it.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns are not those of the modes,
-/// if no line of the record is in the band, or for `settle`, and an error if the record cannot be
-/// read.
+/// if no line of the record is in the band, or if `settle` cannot be used, and an error if the
+/// record cannot be read.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 5.2 and 6.2 (response of the modal sum).
@@ -37,24 +40,24 @@ pub fn predict_with_modes(
     if channels.force.is_empty() {
         return Err(AnalysisError::NoForce);
     }
-    if how.settle.is_some() {
-        let why = "modes are predicted from rest, or in a steady state with `period`".into();
-        return Err(AnalysisError::Setting { setting: "settle", why });
-    }
     let inputs = system.inputs_of(&channels.force)?;
     let columns = system.outputs_of(channels)?;
     let (block, steady) = (measured.whole_block()?, measured.window_settings().period.is_some());
-    let response = Response::new(system, &block, &inputs, steady)?;
-    let errors = response.errors(system, &block, &columns, steady)?;
+    let settle = settled_samples(how, &block, steady)?;
+    let mut response = Response::new(system, &block, &inputs, steady)?;
+    if settle > 0 {
+        response.begin_in_motion(system, &block, &columns, settle)?;
+    }
+    let errors = response.errors(system, &block, &columns, steady, settle)?;
     let [low, high] = system.band_hz.map(|hz| significant(hz, 4));
     let mut remarks = block.unit_notes();
     remarks.push(format!(
         "the modes predict the response from {low} to {high} Hz, and are judged there"
     ));
-    if !steady {
+    if !steady && settle == 0 {
         remarks.push(
             "the prediction begins at rest: motion that the record begins with is not in it, nor in \
-             the standard errors"
+             the standard errors; `settle` fits it to the first samples"
                 .into(),
         );
     }
@@ -73,7 +76,7 @@ pub fn predict_with_modes(
         machine: system.name.clone(),
         first_sample: block.first_sample,
         last_sample: block.last_sample(),
-        first_judged: block.first_sample,
+        first_judged: block.first_sample + settle,
         steady,
         channels: errors,
         remarks,
@@ -142,14 +145,35 @@ impl Response {
         Ok(Self { record, standard_error })
     }
 
-    /// Returns the errors of the measured channels, given by quantity, column and output, in the
-    /// band of the modes.
+    /// Adds the free motion that explains the first samples of the measured channels best.
+    fn begin_in_motion(
+        &mut self,
+        system: &ModalSystem,
+        block: &Block,
+        columns: &[MeasuredChannel],
+        settle: usize,
+    ) -> Result<(), AnalysisError> {
+        if columns.is_empty() {
+            let why = "the start is fitted to measured responses, and there are none".into();
+            return Err(AnalysisError::Setting { setting: "settle", why });
+        }
+        let free = FreeMotion::fit(system, block, columns, &self.record, settle)?;
+        self.record = Record::new(self.record.sampling(), self.record.data() + free.motion)?;
+        for (error, more) in self.standard_error.iter_mut().zip(free.standard_error) {
+            *error = error.hypot(more);
+        }
+        Ok(())
+    }
+
+    /// Returns the errors of the measured channels after the first `settle` samples, in the band of
+    /// the modes.
     fn errors(
         &self,
         system: &ModalSystem,
         block: &Block,
-        columns: &[(ResponseQuantity, usize, usize)],
+        columns: &[MeasuredChannel],
         steady: bool,
+        settle: usize,
     ) -> Result<Vec<PredictionError>, AnalysisError> {
         let extent = if steady { Extent::WholePeriod } else { Extent::Open };
         let in_band = |record: &Record, column: usize| {
@@ -166,8 +190,9 @@ impl Response {
             let measured = in_band(record, *column)?;
             let predicted = in_band(&self.record, *output)?;
             let name = (system.outputs[*output].0.clone(), *quantity, *output);
+            let (measured, predicted) = (measured.channel(0), predicted.channel(0));
             let error =
-                PredictionError::new(name, measured.channel(0), predicted.channel(0), steady);
+                PredictionError::new(name, &measured[settle..], &predicted[settle..], steady);
             errors.push(error.with_standard_error(self.standard_error[*output]));
         }
         Ok(errors)

@@ -31,6 +31,10 @@ pub struct ModalSystem {
     pub model: ModalModel,
 }
 
+/// Quantity of a measured response, its column among those of the quantity, and its output of the
+/// modes.
+pub(crate) type MeasuredChannel = (ResponseQuantity, usize, usize);
+
 /// A saved result of modes, as far as a system needs it.
 #[derive(Debug, Deserialize)]
 struct Saved {
@@ -130,7 +134,7 @@ impl ModalSystem {
     pub(crate) fn outputs_of(
         &self,
         channels: &Channels,
-    ) -> Result<Vec<(ResponseQuantity, usize, usize)>, AnalysisError> {
+    ) -> Result<Vec<MeasuredChannel>, AnalysisError> {
         let mut columns_and_outputs = Vec::new();
         for quantity in ResponseQuantity::ALL {
             let columns = channels.response(quantity);

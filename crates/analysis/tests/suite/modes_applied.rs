@@ -88,6 +88,30 @@ fn predictions_and_forces_err_as_they_state() {
     assert!((0.5..2.0).contains(&ratio(found.iter().copied())), "{found:?}");
 }
 
+/// The same record from the middle of a decay on: the motion at its beginning is fitted to the
+/// first samples.
+#[test]
+fn a_record_that_begins_in_motion_is_predicted_from_its_first_samples() {
+    let forces = pulses();
+    let motion = response(&forces);
+    let from = (2.2 * RATE_HZ) as usize;
+    let [forces, motion] = [forces, motion].map(|r| r.window(from, SAMPLES - from).unwrap());
+    let record = measurement(&forces, &motion);
+    let mut pairs = Vec::new();
+    for seed in 0..6 {
+        let system = ModalSystem::new(&modes(&plain([1.0; 3], seed))).unwrap();
+        let at_rest = predict_with_modes(&record, &system, &Predict::default()).unwrap();
+        assert!(at_rest.to_string().contains("`settle` fits it"), "{at_rest}");
+        let settled = predict_with_modes(&record, &system, &Predict { settle: Some(64) }).unwrap();
+        let channels = at_rest.summary().channels.iter().zip(&settled.summary().channels);
+        for (rest, fitted) in channels {
+            assert!(rest.nrmse > 0.1 && fitted.nrmse < 0.01, "{at_rest}\n{settled}");
+            pairs.push((fitted.rmse, fitted.standard_error.unwrap()));
+        }
+    }
+    assert!((0.5..2.0).contains(&ratio(pairs.iter().copied())), "{pairs:?}");
+}
+
 #[test]
 fn one_of_the_forces_is_found_from_some_of_the_responses() {
     let both = pulses();
@@ -127,7 +151,10 @@ fn what_modes_cannot_do_is_refused() {
     let outside = at_rest.clone().band(Band { low_hz: 100.0, high_hz: 120.0 });
     assert!(refused(outside).contains("the modes are those of"));
     assert!(refused(at_rest.forced([3])).contains('3'));
-    let settle = Predict { settle: Some(100) };
-    let message = predict_with_modes(&record, &system, &settle).unwrap_err().to_string();
-    assert!(message.contains("from rest"), "{message}");
+    let refused = |samples: usize| {
+        let settle = Predict { settle: Some(samples) };
+        predict_with_modes(&record, &system, &settle).unwrap_err().to_string()
+    };
+    assert!(refused(2).contains("do not determine the motion of all modes"), "{}", refused(2));
+    assert!(refused(SAMPLES).contains("settles within 2 to 8191"), "{}", refused(SAMPLES));
 }

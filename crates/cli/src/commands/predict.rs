@@ -14,8 +14,7 @@ use crate::outcome::{Files, Outcome};
 /// Predict the response of an identified machine, linear or not, to a measured force
 ///
 /// The model may also be the result of `mechid modes --json`: the forces and responses are then
-/// those of the modal test, by name or in order, and the prediction holds in its band, from rest
-/// or, with --period, in the steady state.
+/// those of the modal test, by name or in order, and the prediction holds in its band.
 ///
 /// With --period the steady state under the mean of the periods, otherwise the whole window from
 /// its first sample on, at rest before it or from the state that --settle fits. Between the samples

@@ -219,6 +219,14 @@ fn a_result_predicts_responses_and_finds_the_force() {
     let predicted =
         mechid(folder, "predict modes.json hammer-1.csv --force force --acceleration a1,a2");
     assert!(predicted.contains("the prediction begins at rest"), "{predicted}");
+    let settled = mechid(
+        folder,
+        "predict modes.json hammer-1.csv --force force --acceleration a1,a2 --settle 200 --json",
+    );
+    let settled: Value = serde_json::from_str(&settled).unwrap();
+    for channel in settled["channels"].as_array().unwrap() {
+        assert!(channel["nrmse"].as_f64().unwrap() < 0.05, "{settled}");
+    }
     let force = "force hammer-1.csv --system modes.json --acceleration a1,a2";
     let message = refused(folder, force);
     assert!(message.contains("--at-rest"), "{message}");
