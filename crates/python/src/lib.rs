@@ -39,7 +39,7 @@ mod _mechid {
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]
-    use super::machine::{Machine, selected_modes};
+    use super::machine::{Machine, ModalSystem, selected_modes};
     #[pymodule_export]
     use super::measurement::{Measurement, find_column, rate_of, time_column};
     #[pymodule_export]

@@ -19,6 +19,33 @@ use crate::{arrays, failure, work};
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Machine(pub mechid::Machine);
 
+/// Frequency responses of the modes of a test.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct ModalSystem(pub mechid::ModalSystem);
+
+/// What answers forces: a machine, or the modes of a test.
+#[derive(FromPyObject)]
+pub enum Answering<'py> {
+    Machine(PyRef<'py, Machine>),
+    Modes(PyRef<'py, ModalSystem>),
+}
+
+#[pymethods]
+impl ModalSystem {
+    /// Reads a result of modes; `None` for the JSON of a machine.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
+        work::brief(py, || mechid::ModalSystem::read(path)).map(|system| system.map(Self))
+    }
+
+    /// Takes the modes from the JSON of a result.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, name: &str, json: &str) -> PyResult<Self> {
+        let json: serde_json::Value = failure::settings(py, json)?;
+        work::brief(py, || mechid::ModalSystem::from_json(name, json)).map(Self)
+    }
+}
+
 #[pymethods]
 impl Machine {
     /// Creates a machine with exactly known M, C and K.

@@ -1,11 +1,12 @@
-//! Response of a machine to the force of a record.
+//! Response of a machine, or of modes, to the force of a record.
 
 use mechid::Predict;
 use mechid::model::{Response, ResponseQuantity};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Named};
-use crate::machine::Machine;
+use crate::machine::Answering;
 use crate::measurement::Measurement;
 use crate::{failure, work};
 
@@ -13,18 +14,29 @@ use crate::{failure, work};
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Predicted(mechid::Predicted);
 
-/// Predicts the response of a machine to the force of a record; settings are JSON.
+/// Predicts the response of a machine or of modes to the force of a record; settings are JSON.
 #[pyfunction]
 pub fn predict_record(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
-    machine: PyRef<'_, Machine>,
+    system: Answering<'_>,
     settings: &str,
 ) -> PyResult<Predicted> {
     let how: Predict = failure::settings(py, settings)?;
-    let (record, machine) = (record.0.clone(), machine.0.clone());
-    let find = move || mechid::predict(&record, &machine, &how);
-    work::watched(py, None, || Ok(()), find).map(Predicted)
+    let record = record.0.clone();
+    let predicted = match system {
+        Answering::Machine(machine) => {
+            let machine = machine.0.clone();
+            let find = move || mechid::predict(&record, &machine, &how);
+            work::watched(py, None, || Ok(()), find)
+        }
+        Answering::Modes(modes) => {
+            let modes = modes.0.clone();
+            let find = move || mechid::predict_with_modes(&record, &modes, &how);
+            work::watched(py, None, || Ok(()), find)
+        }
+    };
+    predicted.map(Predicted)
 }
 
 #[pymethods]
@@ -39,7 +51,13 @@ impl Predicted {
         self.0.to_string()
     }
 
-    /// Returns every kind of response.
+    /// Returns the columns of a record of the prediction, with their names.
+    fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
+        let columns = self.0.columns().into_iter();
+        columns.map(|(name, values)| (name, arrays::vector(py, values.to_vec()))).collect()
+    }
+
+    /// Returns every kind of response of a machine; nothing of modes.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
         let of = |response: &Response| {
             ResponseQuantity::ALL.map(|kind| (kind, response.quantity(kind).clone())).into()

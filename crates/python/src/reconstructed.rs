@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::answer::{self, ResultOutput as _};
-use crate::machine::Machine;
+use crate::machine::Answering;
 use crate::measurement::Measurement;
 use crate::{arrays, failure, work};
 
@@ -17,20 +17,32 @@ use crate::{arrays, failure, work};
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct Reconstructed(Arc<mechid::Reconstructed>);
 
-/// Reconstructs the force that acted on a machine; settings are JSON.
+/// Reconstructs the force that acted on a machine or on modes; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (record, machine, settings, threads))]
+#[pyo3(signature = (record, system, settings, threads))]
 pub fn reconstruct(
     py: Python<'_>,
     record: PyRef<'_, Measurement>,
-    machine: PyRef<'_, Machine>,
+    system: Answering<'_>,
     settings: &str,
     threads: Option<usize>,
 ) -> PyResult<Reconstructed> {
     let how: Reconstruct = failure::settings(py, settings)?;
-    let (record, machine) = (record.0.clone(), machine.0.clone());
-    let find = move || mechid::reconstruct(&record, &machine, &how);
-    work::watched(py, threads, || Ok(()), find).map(|force| Reconstructed(Arc::new(force)))
+    let record = record.0.clone();
+    let force = match system {
+        Answering::Machine(machine) => {
+            let machine = machine.0.clone();
+            let find = move || mechid::reconstruct(&record, &machine, &how);
+            work::watched(py, threads, || Ok(()), find)
+        }
+        Answering::Modes(modes) => {
+            let modes = modes.0.clone();
+            let find =
+                move || mechid::reconstruct_with_modes(&record, &modes, &how, &mut |_| Ok(()));
+            work::watched(py, threads, || Ok(()), find)
+        }
+    };
+    force.map(|force| Reconstructed(Arc::new(force)))
 }
 
 /// Frequencies, and amplitudes of frequencies × degrees of freedom.

@@ -570,6 +570,33 @@ def test_predictions_are_those_of_the_program(
     np.testing.assert_array_equal(again.velocity, found.velocity)
 
 
+def test_modes_predict_and_find_forces_as_those_of_the_program(
+    program: Callable[..., str], tmp_path: Path
+) -> None:
+    responses: dict[str, Any] = {"acceleration": ["a1", "a2"]}
+    hits: dict[str, Any] = {"force": "force", "hits": True, "band_hz": (2, 100), **responses}
+    modes = mechid.modes("examples/hammer-1.csv", **hits)
+    path = tmp_path / "modes.json"
+    path.write_text(modes.to_json(), encoding="utf-8")
+    columns: dict[str, Any] = {"force": "force", **responses}
+    options = {"settle": 200, **columns}
+    told = program("predict", path, "examples/hammer-1.csv", *words(options), "--json")
+    predicted = modes.predict("examples/hammer-1.csv", **options)
+    assert json.loads(predicted.to_json())["channels"] == json.loads(told)["channels"]
+    rest = modes.predict("examples/hammer-1.csv", **columns)
+    assert any("begins at rest" in remark for remark in rest.remarks)
+    for fitted, unfitted in zip(predicted.channels, rest.channels, strict=True):
+        assert fitted["nrmse"] < 0.5 * unfitted["nrmse"]
+    assert list(predicted.columns) == ["a1", "a2"]
+    with pytest.raises(mechid.MechidError, match="`columns`"):
+        _ = predicted.acceleration
+    force = {**responses, "at_rest": True}
+    told = program("force", "examples/hammer-1.csv", "--system", path, *words(force), "--json")
+    for system in (modes, str(path)):
+        found = mechid.reconstruct(system, "examples/hammer-1.csv", **force)
+        assert json.loads(found.to_json())["forces"] == json.loads(told)["forces"]
+
+
 def test_every_scheme_of_the_program_is_offered() -> None:
     """The message that refuses another name has all of them."""
     with pytest.raises(mechid.MechidError, match="unknown variant") as caught:

@@ -42,6 +42,7 @@ from ._results import (
     description_of,
     listed,
     machine_of,
+    system_of,
     one,
 )
 
@@ -816,7 +817,7 @@ def _mode_set(source: object) -> tuple[str | os.PathLike[str], str | None]:
 
 
 def reconstruct(
-    machine: Machine | Identified | IdentifiedResponses | IdentifiedElements | str | os.PathLike[str],
+    machine: Machine | Identified | IdentifiedResponses | IdentifiedElements | Modes | str | os.PathLike[str],
     *sources: object,
     method: ForceMethod = "auto",
     forced: Sequence[int] = (),
@@ -830,20 +831,20 @@ def reconstruct(
     threads: int | None = None,
     **record: Unpack[RecordOptions],
 ) -> Reconstructed:
-    """Reconstruct the force that drove a known machine, from its measured responses.
+    """Reconstruct the force that drove a known machine, or known modes, from measured responses.
 
     Parameters
     ----------
-    machine : Machine, Identified, or path
-        The machine; the uncertainty of an identified one counts in the standard error of the force. A
-        path is that of the program's JSON.
+    machine : Machine, Identified, Modes, or path
+        The machine, or the modes of a test with forces; the uncertainty of identified ones counts in
+        the standard error of the force. A path is that of the program's JSON.
     *sources, **record
         The record: a file, table or `Measurement` with response columns and no force. Arrays are given
         by keyword: ``displacement=x, fs=…``.
     method : str
         Method, as ``mechid force --method`` has them.
     forced : sequence of int
-        Degrees of freedom on which a force acts, counted from 1; all, without.
+        Degrees of freedom, or forces of the modes, on which a force acts, counted from 1; all, without.
     lines : str, optional
         Spectral lines with force.
     band_hz : (float, float), optional
@@ -886,8 +887,7 @@ def reconstruct(
             "noise": [float(level) for level in noise],
             "rule": rule if parameter is None else {"given": float(parameter)},
         }
-    known = machine_of(machine)
-    inner = _mechid.reconstruct(found._inner, known._inner, json.dumps(settings), threads)
+    inner = _mechid.reconstruct(found._inner, system_of(machine), json.dumps(settings), threads)
     return Reconstructed(inner)
 
 

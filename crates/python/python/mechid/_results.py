@@ -1127,6 +1127,31 @@ class Modes(Drawn):
         told = self._told.get("diagrams")
         return None if told is None else MappingProxyType(told)
 
+    def predict(
+        self, *sources: object, settle: int | None = None, **record: Unpack[RecordOptions]
+    ) -> Predicted:
+        """Predict the response to the forces of a record in the band of the modes, and compare it.
+
+        With a period it is the steady state under the mean period, otherwise the whole window from
+        its first sample on; between the samples the forces are band-limited.
+
+        Parameters
+        ----------
+        *sources, **record
+            The record, as in `modes`; arrays of forces and, if measured, responses.
+        settle : int, optional
+            Number of first samples that the motion at the beginning is fitted to, and that do not count
+            in the errors; at rest, without.
+
+        Raises
+        ------
+        MechidError
+            If the modes are not those of a test with forces, or the record has other columns.
+        """
+        found = one(sources, "predict", record)
+        settings = json.dumps({"settle": settle})
+        return Predicted(_mechid.predict_record(found._inner, system_of(self), settings))
+
     def to_frame(self) -> DataFrame:
         """Return the modes as a pandas data frame, one row each: frequency, damping ratio, their errors.
 
@@ -1370,7 +1395,7 @@ class Reconstructed(Drawn):
 
 @final
 class Predicted(Result):
-    """The response of a machine to the force of a record, and its error."""
+    """The response of a machine, or of modes, to the force of a record, and its error."""
 
     _inner: _mechid.Predicted
 
@@ -1378,23 +1403,34 @@ class Predicted(Result):
         self.__dict__["_inner"] = inner
 
     @cached_property
-    def _responses(self) -> Mapping[str, NDArray[np.float64]]:
-        return MappingProxyType(dict(self._inner.responses()))
+    def columns(self) -> Mapping[str, NDArray[np.float64]]:
+        """Prediction of every measured response, in m, m/s or m/s²; without measured responses all.
+
+        Those of a machine are its displacements then, and have the names ``"displacement 1"`` …, those
+        of modes the names in the record of the test.
+        """
+        return MappingProxyType(dict(self._inner.columns()))
+
+    def _responses(self, quantity: str) -> NDArray[np.float64]:
+        for name, values in self._inner.responses():
+            if name == quantity:
+                return values
+        raise MechidError("modes predict the responses of their test: take them from `columns`", "Settings")
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """Predicted displacement, shape (samples, degrees of freedom), in m."""
-        return self._responses["displacement"].copy()
+        """Displacement of a machine, shape (samples, degrees of freedom), in m."""
+        return self._responses("displacement")
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """Predicted velocity, likewise, in m/s."""
-        return self._responses["velocity"].copy()
+        """Velocity of a machine, likewise, in m/s."""
+        return self._responses("velocity")
 
     @property
     def acceleration(self) -> NDArray[np.float64]:
-        """Predicted acceleration, likewise, in m/s²."""
-        return self._responses["acceleration"].copy()
+        """Acceleration of a machine, likewise, in m/s²."""
+        return self._responses("acceleration")
 
     @property
     def channels(self) -> tuple[Mapping[str, Any], ...]:
@@ -1404,11 +1440,6 @@ class Predicted(Result):
     def to_json(self) -> str:
         """Return the result as the program prints it with ``--json``."""
         return self._inner.to_json()
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Nothing: a prediction has no remarks."""
-        return ()
 
     def __str__(self) -> str:
         return self._inner.text()
@@ -1530,6 +1561,19 @@ def machine_of(
     if isinstance(given, Machine):
         return given
     return Machine.read(given)
+
+
+def system_of(
+    given: Machine | Estimated | IdentifiedElements | Modes | str | os.PathLike[str],
+) -> _mechid.Machine | _mechid.ModalSystem:
+    """Return the machine or the modes that are meant."""
+    if isinstance(given, Modes):
+        return _mechid.ModalSystem.from_json("the modes", given.to_json())
+    if isinstance(given, (str, os.PathLike)):
+        modes = _mechid.ModalSystem.read(given)
+        if modes is not None:
+            return modes
+    return machine_of(given)._inner
 
 
 def description_of(given: object) -> tuple[str, str | None] | None:
