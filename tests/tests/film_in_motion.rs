@@ -101,7 +101,7 @@ fn identified(lines: &[usize], amplitude: f64, part: f64) -> IdentifiedBearing {
         let responses = [(Displacement, &x), (Acceleration, &a)];
         Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
     };
-    let data = BearingData::of_records(&[test(0), test(1)], &settings()).unwrap();
+    let data = BearingData::from_records(&[test(0), test(1)], &settings()).unwrap();
     identify_bearing(&data, None, &settings()).unwrap()
 }
 

@@ -71,7 +71,7 @@ fn data(rig: &BearingRig, periods: &[RigTest], seed: u64) -> BearingData {
         test.period(PERIOD).expect("whole periods")
     };
     let tests: Vec<Measurement> = (0..).zip(periods).map(test).collect();
-    BearingData::of_records(&tests, &settings(rig, Coefficients::Automatic))
+    BearingData::from_records(&tests, &settings(rig, Coefficients::Automatic))
         .expect("tests in x and y")
 }
 

@@ -51,7 +51,7 @@ const LOSS_FACTOR: f64 = 0.04;
 
 /// Returns force (N) and displacement (m) over the last of the periods of a force (N), as the receptance has it.
 fn steady(machine: &FaultyOscillator, force: &Record, loss_factor: Option<f64>) -> [Record; 2] {
-    let mut lines = Spectrum::of(force).lines().clone();
+    let mut lines = Spectrum::from_record(force).lines().clone();
     for (line, mut value) in lines.row_iter_mut().enumerate() {
         let omega = line as f64 * force.sampling().omega0();
         let damping = loss_factor.map_or(machine.damping * omega, |eta| eta * machine.stiffness);

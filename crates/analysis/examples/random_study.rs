@@ -98,7 +98,7 @@ fn heading(second: &str) {
 }
 
 fn fits() -> [(&'static str, Identify); 4] {
-    let segments = |len| Identify::responses(Estimator::H1, Segmentation::of(len));
+    let segments = |len| Identify::responses(Estimator::H1, Segmentation::with_samples(len));
     [
         ("ends of the record fitted", Identify::default()),
         ("H1, segments of 1024", segments(1024)),

@@ -40,7 +40,7 @@
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
 //! | What are the machines behind these records? | [`SavedAnalysis::row`] | [`SavedAnalysis`] | [`ResultRow`] |
-//! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
+//! | How does the machine vibrate? | [`ModalSummary::from_machine`] | [`Machine`] | [`ModalSummary`] |
 //!
 //! Settings are plain structs with defaults, which `serde` saves and reads; every result contains
 //! its settings and implements [`Display`](std::fmt::Display).

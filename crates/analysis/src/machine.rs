@@ -68,7 +68,7 @@ impl Machine {
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data do not determine a parameter.
-    pub fn of_estimate(estimate: &Estimate) -> Result<Self, AnalysisError> {
+    pub fn from_estimate(estimate: &Estimate) -> Result<Self, AnalysisError> {
         Ok(Self {
             name: "the identified system".into(),
             uncertain: estimate.uncertain_system()?,

@@ -76,7 +76,7 @@ impl ModalSummary {
     ///
     /// # Errors
     /// As [`Machine::modes`].
-    pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
+    pub fn from_machine(machine: &Machine) -> Result<Self, AnalysisError> {
         let known = machine.is_exact();
         let modes = machine.modes()?;
         Ok(Self {

@@ -80,7 +80,7 @@ pub struct PredictionError {
     pub rmse: f64,
     /// RMSE over the RMS of the measured response about its mean (pure number).
     pub nrmse: f64,
-    /// RMS of the errors that those of the modes cause, in this unit; `None` for a machine.
+    /// RMS of the errors due to the uncertainty of the modes, in this unit; `None` for a machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
 }
@@ -272,7 +272,7 @@ impl PredictionError {
         Self { quantity, degree_of_freedom, name, unit, rmse, nrmse, standard_error: None }
     }
 
-    /// Returns the same with the RMS of the errors that those of the modes cause.
+    /// Returns the same with the RMS of the errors due to the uncertainty of the modes.
     pub(crate) fn with_standard_error(self, standard_error: f64) -> Self {
         Self { standard_error: Some(standard_error), ..self }
     }

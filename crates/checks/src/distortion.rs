@@ -38,7 +38,7 @@ pub fn distortion_of_periods(
             explained: kind.explained,
             even_db,
             odd_db,
-            p_value: PValue::of(kind.p_value),
+            p_value: PValue::new(kind.p_value),
         })
     }))
 }

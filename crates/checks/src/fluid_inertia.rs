@@ -24,7 +24,7 @@ pub struct FluidInertia {
 /// # Source
 /// Wilks (1938), Annals of Mathematical Statistics 9, 60–62.
 pub fn fluid_inertia(statistic: f64, p_value: f64) -> Finding {
-    Finding::FluidInertia(FluidInertia { statistic, p_value: PValue::of(p_value) })
+    Finding::FluidInertia(FluidInertia { statistic, p_value: PValue::new(p_value) })
 }
 
 impl Check for FluidInertia {

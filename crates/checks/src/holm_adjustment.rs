@@ -46,7 +46,7 @@ mod tests {
     use crate::seam::Seam;
 
     fn misfit(raw: f64) -> Finding {
-        let (p_value, source) = (PValue::of(raw), NoiseSource::Periods);
+        let (p_value, source) = (PValue::new(raw), NoiseSource::Periods);
         Finding::Misfit(Misfit { ratio: 1.0, p_value, source, concentration: None })
     }
 
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn a_bias_is_no_matter_of_the_residual() {
         let bias = Finding::Bias(Bias {
-            p_value: PValue::of(0.02),
+            p_value: PValue::new(0.02),
             parameter: Parameter::new(Matrix::Mass, 0, 0, 1).unwrap(),
             estimate: 1.0,
             unbiased: 1.1,

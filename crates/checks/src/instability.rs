@@ -48,7 +48,7 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
         frequency_hz: mode.damped_frequency_hz.value,
         growth_rate: mode.growth_rate.value,
         standard_error: mode.growth_rate.standard_error,
-        p_value: PValue::of(p_value(mode)),
+        p_value: PValue::new(p_value(mode)),
     }))
 }
 

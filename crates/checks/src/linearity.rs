@@ -171,7 +171,7 @@ impl Tested {
         let mut least = (1.0, Power::ALL[0], 0);
         for dof in 0..n {
             for power in Power::ALL {
-                let forces = Spectrum::of(&without_linear_part(&predicted, dof, power)?);
+                let forces = Spectrum::from_record(&without_linear_part(&predicted, dof, power)?);
                 let response =
                     |at: usize| self.receptances[at].column(dof) * forces.line(lines[at], 0);
                 let responses: Vec<_> = (0..lines.len()).map(response).collect();
@@ -187,7 +187,7 @@ impl Tested {
         }
         // Bonferroni: the smallest of all tests.
         let (p_value, power, dof) = least;
-        let p_value = PValue::of(((n * Power::ALL.len()) as f64 * p_value).min(1.0));
+        let p_value = PValue::new(((n * Power::ALL.len()) as f64 * p_value).min(1.0));
         Ok(Finding::Linearity(Linearity { power, dof, p_value }))
     }
 }

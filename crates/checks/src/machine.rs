@@ -27,7 +27,12 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
     let mut findings = Vec::new();
     let misfit = likelihood.misfit_ratio.zip(likelihood.misfit_p_value).zip(source);
     findings.extend(misfit.map(|((ratio, p_value), source)| {
-        Finding::Misfit(Misfit { ratio, p_value: PValue::of(p_value), source, concentration: None })
+        Finding::Misfit(Misfit {
+            ratio,
+            p_value: PValue::new(p_value),
+            source,
+            concentration: None,
+        })
     }));
     for parameter in &likelihood.parameters {
         let tested = parameter.prior.and_then(|prior| Some((prior, prior.p_value?)));
@@ -37,7 +42,7 @@ pub fn after_machine_fit(estimate: &MachineEstimate, source: Option<NoiseSource>
                 mean: prior.mean,
                 standard_deviation: prior.standard_deviation,
                 estimate: parameter.value,
-                p_value: PValue::of(p_value),
+                p_value: PValue::new(p_value),
             })
         }));
     }

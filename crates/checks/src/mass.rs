@@ -43,7 +43,7 @@ pub fn negative_mass(estimate: &Estimate) -> Option<Finding> {
         ratio if ratio.is_finite() => student.sf(ratio),
         _ => 0.0,
     };
-    let p_value = PValue::of((alone * masses.len() as f64).min(1.0));
+    let p_value = PValue::new((alone * masses.len() as f64).min(1.0));
     Some(Finding::NegativeMass(NegativeMass { row, mass, standard_error, p_value }))
 }
 

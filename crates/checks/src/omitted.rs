@@ -54,12 +54,12 @@ pub fn omitted_term(
     estimate: &Estimate,
 ) -> Option<(Finding, OmittedTerms)> {
     let omitted = fit.omitted(records)?;
-    let p_value = PValue::of(omitted.p_value);
+    let p_value = PValue::new(omitted.p_value);
     if !p_value.is_significant() {
         return None;
     }
-    let all = estimate.parameters().zip(omitted.changes.iter().zip(&omitted.errors));
-    let changes = all.map(|(estimated, (by, error))| ChangeByTerm {
+    let rows = estimate.parameters().zip(omitted.changes.iter().zip(&omitted.errors));
+    let changes = rows.map(|(estimated, (by, error))| ChangeByTerm {
         parameter: estimated.parameter,
         by: *by,
         standard_error: *error,

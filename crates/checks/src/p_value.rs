@@ -21,7 +21,7 @@ pub struct PValue {
 
 impl PValue {
     /// Creates the p-value of a single test.
-    pub fn of(raw: f64) -> Self {
+    pub fn new(raw: f64) -> Self {
         Self { raw, adjusted: raw }
     }
 
@@ -76,7 +76,7 @@ impl CorrelationTest {
             coefficients: correlation.coefficients.len(),
             outside: correlation.outside(),
             bound: correlation.bound,
-            p_value: PValue::of(correlation.p_value),
+            p_value: PValue::new(correlation.p_value),
             rounding,
         }
     }

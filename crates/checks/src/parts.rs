@@ -102,7 +102,7 @@ pub fn agreement_of_parts(fit: &PartsOfFit<'_>, splits: &[(Split, RowParts)]) ->
     let (scatter, degrees_of_freedom) = largest.unwrap_or(scatter(&worst));
     let difference = worst.largest?;
     Some(Finding::PartsAgreement(PartsAgreement {
-        p_value: PValue::of((count * worst.p_value).min(1.0)),
+        p_value: PValue::new((count * worst.p_value).min(1.0)),
         part: DataPart::new(difference.part, rows),
         parameter: difference.parameter,
         by_part: difference.by_part,

@@ -31,7 +31,7 @@ pub(super) fn excitation<'a>(
 ) -> Vec<Finding> {
     let mut orders: Vec<usize> = Vec::new();
     for force in records {
-        let spectrum = Spectrum::of(force);
+        let spectrum = Spectrum::from_record(force);
         orders.resize(orders.len().max(force.channels()), 0);
         for (channel, order) in orders.iter_mut().enumerate() {
             let excited = persistent_excitation_order(&spectrum, channel, EXCITED_LINE);

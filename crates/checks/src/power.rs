@@ -32,7 +32,7 @@ pub fn power(
 ) -> Result<Option<Finding>, EstimateError> {
     force.check_same_sampling(response)?;
     check_size("channels of the response", force.channels(), response.channels())?;
-    let (forces, responses) = (Spectrum::of(force), Spectrum::of(response));
+    let (forces, responses) = (Spectrum::from_record(force), Spectrum::from_record(response));
     let force_spectrum = &forces;
     let carried = |dof: usize| {
         let line = move |n: usize| force_spectrum.line(n, dof).norm();

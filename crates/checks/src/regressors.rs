@@ -63,7 +63,7 @@ pub fn noise_on_response(
     let relevant = significant.filter(|change| change.standard_errors() > 1.0);
     Ok(relevant.map(|change| {
         Finding::Bias(Bias {
-            p_value: PValue::of(p_value(&change)),
+            p_value: PValue::new(p_value(&change)),
             parameter: change.parameter,
             estimate: change.estimate,
             unbiased: change.instrumental,

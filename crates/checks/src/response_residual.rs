@@ -102,7 +102,7 @@ struct Expected {
 
 impl Expected {
     fn misfit(&self, power: f64, source: NoiseSource) -> Finding {
-        let p_value = PValue::of(share_above_of(power, self.mean, 0.5 * self.variance));
+        let p_value = PValue::new(share_above_of(power, self.mean, 0.5 * self.variance));
         Finding::Misfit(Misfit { ratio: power / self.mean, p_value, source, concentration: None })
     }
 }

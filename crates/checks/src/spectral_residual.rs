@@ -116,7 +116,7 @@ impl SpectralResidual {
         }
         findings.extend(self.misfit(NoiseSource::Periods));
         if let Some((ratio, p_value)) = self.force_decides {
-            let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
+            let (p_value, source) = (PValue::new(p_value), NoiseSource::Force);
             findings.push(Finding::Misfit(Misfit { ratio, p_value, source, concentration: None }));
         }
         let dof = self.data.dof();
@@ -232,7 +232,7 @@ impl SpectralResidual {
             Some(_) => power_of(&self.values, &self.explained).2,
             None => above,
         };
-        let p_value = PValue::of(match source {
+        let p_value = PValue::new(match source {
             NoiseSource::Periods => (2.0 * above.min(below)).min(1.0),
             _ => above,
         });

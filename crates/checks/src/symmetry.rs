@@ -66,14 +66,14 @@ pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
                 above: mass[(i, j)],
                 below: mass[(j, i)],
                 standard_error,
-                p_value: PValue::of(alone),
+                p_value: PValue::new(alone),
             });
             worst = Some((alone, finding));
         }
     }
     let (alone, mut finding) = worst?;
     if let Some(p_value) = finding.p_value_mut() {
-        *p_value = PValue::of((alone * f64::from(pairs)).min(1.0));
+        *p_value = PValue::new((alone * f64::from(pairs)).min(1.0));
     }
     Some(finding)
 }

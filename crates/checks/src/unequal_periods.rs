@@ -37,7 +37,7 @@ pub(super) fn unequal_periods(
         return Ok(None);
     }
     let mean = force.period_mean(period)?;
-    let spectrum = Spectrum::of(&mean);
+    let spectrum = Spectrum::from_record(&mean);
     let lines = lines::full(mean.sampling());
     let amplitude = |line: usize, channel: usize| -> f64 { spectrum.line(line, channel).norm() };
     let strongest =

@@ -263,10 +263,10 @@ impl<'a> Weighing<'a> {
         };
         let (record, channels) = (&self.records[at], 0..self.records[at].dof());
         let jumps: Vec<FrequencyData> = match self.extent {
-            Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
+            Extent::Open => channels.map(|channel| record.step_data(channel)).collect(),
             Extent::WholePeriod if has_unmeasured_force(record) => {
                 let loads = |dof| (0..FIT_LOADS as usize).map(move |power| (dof, power));
-                channels.flat_map(loads).map(|(dof, power)| record.of_load(dof, power)).collect()
+                channels.flat_map(loads).map(|(dof, power)| record.load_data(dof, power)).collect()
             }
             Extent::WholePeriod => Vec::new(),
         };
@@ -341,7 +341,7 @@ impl WeightedFit {
         let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
         let parameter = estimate.parameters().nth(largest)?;
         Some(Finding::Bias(Bias {
-            p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
+            p_value: PValue::new((2.0 * together.min(alone)).min(1.0)),
             parameter: parameter.parameter,
             estimate: parameter.value,
             unbiased: parameter.value + change[largest],

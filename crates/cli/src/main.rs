@@ -3,7 +3,8 @@
 use std::io::Write as _;
 
 fn main() -> std::process::ExitCode {
-    // Without a backtrace: for lack of memory in it the program would wait for itself.
+    // No backtrace, because the program would wait for its memory for ever if it fails for lack of
+    // memory.
     std::panic::set_hook(Box::new(|panic| {
         let _ = writeln!(std::io::stderr(), "{panic}");
     }));

@@ -53,7 +53,12 @@ fn identify(c: &mut Criterion) {
         });
         // The yardstick: the transforms alone.
         group.bench_function(format!("{count} lines, four transforms alone"), |b| {
-            b.iter(|| (Spectrum::of(black_box(&force)), Spectrum::of(black_box(&motion))))
+            b.iter(|| {
+                (
+                    Spectrum::from_record(black_box(&force)),
+                    Spectrum::from_record(black_box(&motion)),
+                )
+            })
         });
     }
     group.finish();

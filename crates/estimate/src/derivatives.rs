@@ -26,7 +26,7 @@ use crate::EstimateError;
 /// # Source
 /// Dissertation eqs. (4.6.2)–(4.6.3).
 pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, EstimateError> {
-    let spectrum = Spectrum::of(displacement);
+    let spectrum = Spectrum::from_record(displacement);
     let velocity = times(&spectrum, |i_omega| i_omega)?;
     let acceleration = times(&spectrum, |i_omega| i_omega * i_omega)?;
     Ok(Response::new(displacement.clone(), velocity, acceleration)?)
@@ -41,7 +41,7 @@ pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, Est
 /// [`EstimateError::Signal`] if an integral is too large for a record.
 pub fn spectral_from_acceleration(acceleration: &Record) -> Result<Response, EstimateError> {
     let acceleration = acceleration.without_mean();
-    let spectrum = Spectrum::of(&acceleration);
+    let spectrum = Spectrum::from_record(&acceleration);
     let over = |power: i32| {
         times(&spectrum, |i_omega| match i_omega.im {
             0.0 => Complex::ZERO,

@@ -81,8 +81,10 @@ impl BandFilter {
         if self.extent == Extent::Open {
             mirrored.extend(values.iter().rev());
         }
-        let spectrum =
-            Spectrum::of(&Record::from_channel(self.sampling.with_len(mirrored.len())?, mirrored)?);
+        let spectrum = Spectrum::from_record(&Record::from_channel(
+            self.sampling.with_len(mirrored.len())?,
+            mirrored,
+        )?);
         let spacing = spectrum.sampling().line_spacing_hz();
         let mut lines = spectrum.lines().clone();
         for (n, mut line) in lines.row_iter_mut().enumerate() {

@@ -47,7 +47,7 @@ pub fn frequency_domain(
     if let Some(&dof) = forced.iter().find(|dof| **dof >= places) {
         return Err(ForceError::NoSuchDof { dof, dofs: places });
     }
-    let spectrum = Spectrum::of(measured.record());
+    let spectrum = Spectrum::from_record(measured.record());
     check_lines(&spectrum, lines)?;
     let level = noise.resolve(measured, &spectrum, lines)?;
     let lines = &within(measured, lines)?;
@@ -73,9 +73,8 @@ pub fn frequency_domain(
     let residual = measured
         .exceeds(forced)
         .then(|| Residual::from_lines(system, measured, forced, &force, lines, level));
-    let residual = residual.transpose()?.map(|residual| match variance.is_known {
-        true => residual.with_machine(&variance.residual),
-        false => residual,
+    let residual = residual.transpose()?.map(|residual| {
+        if variance.is_known { residual.with_machine(&variance.residual) } else { residual }
     });
     let standard_error = (level.is_some() || variance.is_known).then(|| {
         let noise = |dof: usize| if level.is_some() { variance.noise[dof] } else { 0.0 };
@@ -93,11 +92,11 @@ pub fn frequency_domain(
 
 /// Mean squares over a period that errors cause.
 struct Variance {
-    /// In each force, from noise of the channels of standard deviation `scale`.
+    /// Part in each force from noise of the channels with standard deviation `scale`.
     noise: Vec<f64>,
-    /// In each force, from the uncertainty of the system.
+    /// Part in each force from the uncertainty of the system.
     system: Vec<f64>,
-    /// In the residual of each channel, from the uncertainty of the system, `1 × channels`.
+    /// Part in the residual of each channel from the uncertainty of the system, `1 × channels`.
     residual: DMatrix<f64>,
     /// `true` if the system states its uncertainty.
     is_known: bool,
@@ -136,8 +135,8 @@ impl Variance {
             row *= Complex::from(*scale);
         }
         let channels = channels.len();
-        let rest = DMatrix::identity(channels, channels) - response * inverse;
-        let of_residual = &rest * covariance * rest.adjoint();
+        let unexplained = DMatrix::identity(channels, channels) - response * inverse;
+        let of_residual = &unexplained * covariance * unexplained.adjoint();
         for (channel, sum) in self.residual.iter_mut().enumerate() {
             *sum += half * of_residual[(channel, channel)].re.max(0.0);
         }

@@ -105,7 +105,7 @@ impl IdentifiedForce {
 
     /// Lines of F̂, lines × degrees of freedom, in N; the record must be one whole period.
     pub fn spectrum(&self) -> &Spectrum {
-        self.spectrum.get_or_init(|| Spectrum::of(&self.record))
+        self.spectrum.get_or_init(|| Spectrum::from_record(&self.record))
     }
 
     /// One standard deviation of F̂(t), in N: samples × degrees of freedom; `None` if the method

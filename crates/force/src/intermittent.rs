@@ -32,7 +32,7 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
         .take(INTERMITTENT_BLOCKS)
         .map(|part| part.iter().sum::<f64>())
         .collect();
-    let all: f64 = sums.iter().sum();
+    let total: f64 = sums.iter().sum();
     let ranges = (0..INTERMITTENT_BLOCKS)
         .flat_map(|from| (from + QUIET_BLOCKS..=INTERMITTENT_BLOCKS).map(move |to| from..to))
         .filter(|range| range.len() < INTERMITTENT_BLOCKS);
@@ -44,7 +44,7 @@ pub(crate) fn quiet(augmented: &Augmented, tuned: &Tuned) -> Option<std::ops::Ra
         let channels = augmented.channels();
         let [of_inside, of_outside] = [range.len(), INTERMITTENT_BLOCKS - range.len()]
             .map(|blocks| (blocks * block * channels) as f64);
-        let ratio = ((all - inside) / of_outside) / (inside / of_inside);
+        let ratio = ((total - inside) / of_outside) / (inside / of_inside);
         let p_value = FisherSnedecor::new(of_outside, of_inside).ok()?.sf(ratio);
         // The longest of ranges that are as certain knows the noise best.
         if best.as_ref().is_none_or(|(least, longest)| {

@@ -124,7 +124,7 @@ pub fn kalman(
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
     let quiet_noise = if *tuning == Tuning::Likelihood {
-        of_quiet_part(&augmented, &tuned, (system, measured, forced), &scale)
+        quiet_part_noise(&augmented, &tuned, (system, measured, forced), &scale)
     } else {
         None
     };
@@ -156,7 +156,7 @@ pub fn kalman(
 
 /// Returns the noise of the part of the record in which no force acts, in the scales of the
 /// channels; `None` of a stationary force, and where one acts everywhere.
-fn of_quiet_part(
+fn quiet_part_noise(
     augmented: &Augmented,
     tuned: &Tuned,
     (system, measured, forced): (&SecondOrderSystem, &Measurement, &[usize]),
@@ -200,7 +200,7 @@ fn in_band(
 
 /// Returns the stated noise levels, if they are possible.
 fn known(measured: &Measurement, noise: &[f64]) -> Result<Vec<f64>, ForceError> {
-    let spectrum = Spectrum::of(measured.record());
+    let spectrum = Spectrum::from_record(measured.record());
     let level = Noise::PerChannel(noise.to_vec()).resolve(measured, &spectrum, &[])?;
     Ok(level.unwrap_or_default())
 }

@@ -37,7 +37,7 @@ impl PeriodOperator {
         lines: &[usize],
         scale: &[f64],
     ) -> Result<Self, ForceError> {
-        let spectrum = Spectrum::of(measured.record());
+        let spectrum = Spectrum::from_record(measured.record());
         check_lines(&spectrum, lines)?;
         let sampling = measured.sampling();
         let transfer = Transfer { system, channels: measured.channels(), forced, scale };

@@ -94,7 +94,7 @@ pub fn regularised(
         ForceUnknowns::Lines(lines) => lines.clone(),
         ForceUnknowns::Samples(_) => Vec::new(),
     };
-    let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
+    let level = noise.resolve(measured, &Spectrum::from_record(measured.record()), &lines)?;
     let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let level = level.as_deref();
     let (solution, whole) = if let ForceUnknowns::Samples(start) = unknowns {
@@ -108,7 +108,14 @@ pub fn regularised(
         ForceUnknowns::Samples(start) => {
             Residual::from_open_record(system, measured, forced, &whole, *start, &scale, level)
         }
-        _ => Residual::from_lines(system, measured, forced, &Spectrum::of(&whole), &lines, level),
+        _ => Residual::from_lines(
+            system,
+            measured,
+            forced,
+            &Spectrum::from_record(&whole),
+            &lines,
+            level,
+        ),
     });
     let force = solution.force.with_residual(residual.transpose()?);
     Ok(RegularisedForce { force, ..solution })

@@ -81,7 +81,7 @@ impl Residual {
         lines: &[usize],
         level: Option<&[f64]>,
     ) -> Result<Self, ForceError> {
-        let spectrum = Spectrum::of(measured.record());
+        let spectrum = Spectrum::from_record(measured.record());
         let channels = measured.channels();
         let scale = vec![1.0; channels.len()];
         let transfer = Transfer { system, channels, forced, scale: &scale };

@@ -20,7 +20,7 @@ pub struct FileStamp {
 
 impl FileStamp {
     /// Reads size and time of a file; `None` if the file does not exist or access is denied.
-    pub fn of(path: impl AsRef<Path>) -> Option<Self> {
+    pub fn read(path: impl AsRef<Path>) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         let since = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         Some(Self {

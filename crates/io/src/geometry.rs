@@ -322,7 +322,8 @@ mod tests {
         assert!(text.lines().all(|line| line.len() <= 80));
         let lines: Vec<&str> = text.lines().collect();
         let at = lines.iter().position(|line| line.trim() == "55").unwrap();
-        // Structural model, complex eigenvalues, three translations, displacement, complex, three values.
+        // Structural model, complex eigenvalues, three translations, displacement, complex, three
+        // values.
         assert_eq!(
             lines[at + 6].split_whitespace().collect::<Vec<_>>(),
             ["1", "3", "2", "8", "5", "3"]

@@ -225,8 +225,8 @@ impl SystemDescription {
 
     /// Returns whether all matrices are lists of rows.
     pub(crate) fn lists_rows(&self) -> bool {
-        let all = [Some(&self.mass), self.damping.as_ref(), self.stiffness.as_ref()];
-        all.iter().all(|entries| matches!(entries, Some(Entries::Rows(_))))
+        let matrices = [Some(&self.mass), self.damping.as_ref(), self.stiffness.as_ref()];
+        matrices.iter().all(|entries| matches!(entries, Some(Entries::Rows(_))))
     }
 
     /// Returns whether full matrices of a large machine have so few entries that are not zero that
@@ -240,8 +240,9 @@ impl SystemDescription {
             }
             _ => false,
         };
-        let others = [&self.damping, &self.stiffness];
-        few(&self.mass) && others.iter().all(|entries| entries.as_ref().is_some_and(few))
+        let damping_and_stiffness = [&self.damping, &self.stiffness];
+        few(&self.mass)
+            && damping_and_stiffness.iter().all(|entries| entries.as_ref().is_some_and(few))
     }
 
     pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {

@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let (before, after) = (schroeder.crest_factor()?, designed.crest_factor()?);
     println!("crest factor {before:.2} with Schroeder's phases, {after:.2} after a search");
     let force = designed.sample(sampling)?;
-    let band = measures::effective_band(&Spectrum::of(&force), 0, 20.0)?;
+    let band = measures::effective_band(&Spectrum::from_record(&force), 0, 20.0)?;
     println!("the force covers {} to {} Hz", band.low_hz, band.high_hz);
 
     // The experiment has eight periods of the steady state, with noise of 5 % on the displacement.

@@ -27,7 +27,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let truth = Multisine::flat([6, 11, 23], 5.0, Phases::Random { seed: 3 })?.sample(period)?;
     let x = measured(&truth, 2)?;
     let columns = [("x", x.channel(0))];
-    let channels = Channels::of_responses(Displacement, "x");
+    let channels = Channels::from_responses(Displacement, "x");
     let run = Measurement::from_columns(period, &columns, &channels)?.period(256)?;
     let how = Reconstruct { lines: Some("6,11,23".parse()?), ..Reconstruct::auto() };
     let force = mechid::reconstruct(&run, &found.machine()?, &how)?;

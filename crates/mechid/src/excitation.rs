@@ -226,7 +226,7 @@ impl ExcitationSummary {
     ///
     /// # Errors
     /// [`SignalError`] if there is no input, or one has no power.
-    pub fn of(inputs: &[DesignedInput]) -> Result<Self, SignalError> {
+    pub fn new(inputs: &[DesignedInput]) -> Result<Self, SignalError> {
         let too_few = SignalError::TooFew { what: "inputs", least: 1, got: 0 };
         let sampling = inputs.first().ok_or(too_few)?.period.sampling();
         Ok(Self {
@@ -242,7 +242,7 @@ impl ExcitationSummary {
 impl InputMeasures {
     fn new(input: &DesignedInput) -> Result<Self, SignalError> {
         let (multisine, period) = (&input.multisine, &input.period);
-        let spectrum = Spectrum::of(period);
+        let spectrum = Spectrum::from_record(period);
         let band = measures::effective_band(&spectrum, 0, DROP_DB)?;
         let lines = multisine.lines().to_vec();
         let correlation = measures::circular_autocorrelation(period.channel(0));

@@ -57,7 +57,7 @@ impl SelectedModes {
     /// // A chain of 1,000 masses.
     /// let stiffness = band(1000, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
     /// let chain = SparseSystem::new(band(1000, &[(0, 1.0)]), band(1000, &[]), stiffness)?;
-    /// let selected = SelectedModes::of("the chain", &chain, ModeSearch::NearOmega(30.0), 4)?;
+    /// let selected = SelectedModes::compute("the chain", &chain, ModeSearch::NearOmega(30.0), 4)?;
     /// assert_eq!(selected.modes.len(), 4);
     /// println!("{selected}");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -65,7 +65,7 @@ impl SelectedModes {
     ///
     /// # Errors
     /// As [`sparse_modes`].
-    pub fn of(
+    pub fn compute(
         file: impl Into<String>,
         machine: &SparseSystem,
         search: ModeSearch,

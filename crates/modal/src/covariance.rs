@@ -182,7 +182,7 @@ impl Covariance {
         let mut values = DVector::zeros(size);
         let mut response = DMatrix::zeros(size, self.scale.len());
         let mut cross = DMatrix::zeros(size, self.scale.len());
-        let mut own = DMatrix::zeros(size, size);
+        let mut scatter = DMatrix::zeros(size, size);
         for (index, &(mode, shape)) in modes.iter().enumerate() {
             let first = index * size_of_mode;
             let part = self.mode_response(fit, mode, shape);
@@ -190,7 +190,7 @@ impl Covariance {
             response.rows_mut(first, size_of_mode).copy_from(&part.response);
             cross.rows_mut(first, size_of_mode).copy_from(&part.cross);
             let by_force = &part.common * &self.process[mode].own * part.common.transpose();
-            own.view_mut((first, first), (size_of_mode, size_of_mode)).copy_from(&by_force);
+            scatter.view_mut((first, first), (size_of_mode, size_of_mode)).copy_from(&by_force);
         }
         for output in 0..outputs {
             let variance = fit.weights.level[output].powi(2);
@@ -199,14 +199,14 @@ impl Covariance {
                     let row = a * size_of_mode + ModeParameters::shape_index(output);
                     let column = b * size_of_mode + ModeParameters::shape_index(output);
                     let noise = self.sensor[output].view((2 * mode, 2 * other), (2, 2)) * variance;
-                    let mut block = own.view_mut((row, column), (2, 2));
+                    let mut block = scatter.view_mut((row, column), (2, 2));
                     block += noise;
                 }
             }
         }
         let cross_covariance = cross * &self.inverse * response.transpose();
         let covariance = &response * &self.parameters * response.transpose()
-            + own
+            + scatter
             + &cross_covariance
             + cross_covariance.transpose();
         (values, covariance)

@@ -40,7 +40,7 @@ pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Resp
     if force.channels() != dof {
         return Err(ModelError::ForceChannels { got: force.channels(), dof });
     }
-    let forces = Spectrum::of(force);
+    let forces = Spectrum::from_record(force);
     let mut motions = [(); 3].map(|()| DMatrix::<Complex<f64>>::zeros(forces.len(), dof));
     for n in 0..forces.len() {
         let driven = forces.lines().row(n).transpose();

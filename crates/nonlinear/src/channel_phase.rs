@@ -65,7 +65,7 @@ impl ChannelPhase {
         if *self == Self::default() {
             return Ok(record.clone());
         }
-        let spectrum = Spectrum::of(record);
+        let spectrum = Spectrum::from_record(record);
         let mut lines = spectrum.lines().clone();
         let half = record.sampling().nyquist_hz();
         for (n, mut row) in lines.row_iter_mut().enumerate() {

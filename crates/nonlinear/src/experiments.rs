@@ -97,8 +97,8 @@ impl SteadyExperiments {
         check_sampling(self.period, force.sampling())?;
         let lines = self.period.len().div_ceil(2);
         Ok(Steady {
-            force: Spectrum::of(force).lines().rows(0, lines).into_owned(),
-            displacement: displacement_lines(&Spectrum::of(response), self.measured),
+            force: Spectrum::from_record(force).lines().rows(0, lines).into_owned(),
+            displacement: displacement_lines(&Spectrum::from_record(response), self.measured),
         })
     }
 

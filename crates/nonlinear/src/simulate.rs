@@ -285,7 +285,7 @@ impl<'a> Tangent<'a> {
         let (terms, coefficients) = (self.system.terms(), self.system.coefficients());
         for ((term, coefficient), slopes) in terms.iter().zip(coefficients).zip(&mut self.slopes) {
             let at = term.coordinate();
-            *slopes = term.law().slopes(at.of(x), at.of(v)).map(|slope| coefficient * slope);
+            *slopes = term.law().slopes(at.value(x), at.value(v)).map(|slope| coefficient * slope);
         }
         let (damping, stiffness) =
             (self.system.linear().damping(), self.system.linear().stiffness());
@@ -302,7 +302,7 @@ impl<'a> Tangent<'a> {
             }
             for (term, slopes) in terms.iter().zip(&self.slopes) {
                 let at = term.coordinate();
-                let value = slopes[0] * at.of(dx) + slopes[1] * at.of(dv);
+                let value = slopes[0] * at.value(dx) + slopes[1] * at.value(dv);
                 spread(term, value, &mut self.force);
             }
             match *direction {

@@ -265,7 +265,8 @@ mod tests {
         fn curvature(&self, linearisation: &L, change: &DVector<f64>) -> Option<DVector<f64>> {
             let second = -20.0 * change[0] * change[0];
             let in_parameters = dvector![-20.0 * self.at[0] * second, 10.0 * second];
-            // Coordinates are multiples of the parameters: Jᵀ in coordinates is Jᵀ over the same multiples.
+            // Coordinates are multiples of the parameters, so Jᵀ in coordinates is Jᵀ divided by
+            // them.
             let scale = linearisation.coordinates(&dvector![1.0, 1.0]);
             self.is_curved.then(|| in_parameters.component_div(&scale))
         }

@@ -90,7 +90,7 @@ pub fn exact_harmonic_periodic(
     if got != system.dof() {
         return Err(ModelError::ForceChannels { got, dof: system.dof() }.into());
     }
-    let forces = Spectrum::of(force);
+    let forces = Spectrum::from_record(force);
     let mut lines = [(); 3].map(|()| DMatrix::zeros(forces.len(), got));
     for n in 0..forces.len() {
         let omega = forces.omega(n);

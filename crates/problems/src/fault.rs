@@ -32,7 +32,7 @@ pub enum Fault {
     },
     /// Gaussian noise.
     Noise {
-        /// RMS value of the noise over that of the channel (pure number).
+        /// Ratio of the RMS of the noise to the RMS of the channel (pure number).
         level: f64,
         /// Colour of the noise.
         colour: Colour,
@@ -168,7 +168,7 @@ fn add_run_out(
 
 /// Returns the record delayed by a possibly fractional number of samples.
 fn delayed(record: &Record, samples: f64) -> Result<Record, ProblemError> {
-    let mut lines = Spectrum::of(record).lines().clone();
+    let mut lines = Spectrum::from_record(record).lines().clone();
     for (n, mut line) in lines.row_iter_mut().enumerate() {
         line *= Complex::from_polar(1.0, -TAU * n as f64 * samples / record.len() as f64);
     }
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn faults_are_what_they_say() {
         let clean = two_sines();
-        let line = |record: &Record, n: usize, c: usize| Spectrum::of(record).line(n, c);
+        let line = |record: &Record, n: usize, c: usize| Spectrum::from_record(record).line(n, c);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
 
         let crossed = Fault::Crosstalk { part: 0.1 }.apply(&clean, 1).unwrap();

@@ -1,4 +1,4 @@
-//! An oscillator that is not quite linear, constant or alone, integrated by a rule of its own.
+//! An oscillator with a nonlinear, changing or hidden part, integrated by a separate rule.
 
 use std::f64::consts::TAU;
 
@@ -19,11 +19,11 @@ pub struct FaultyOscillator {
     pub stiffness: f64,
     /// Relative change of the stiffness from the first sample to the last (pure number).
     pub drift: f64,
-    /// Cubic stiffness of the spring beside the linear one, in N per cubed displacement in m.
+    /// Cubic stiffness of the spring, in N per cubed displacement in m.
     pub cubic: f64,
     /// Coulomb friction, in N.
     pub friction: f64,
-    /// Mass that is not measured, in kg, on a spring of its own.
+    /// Unmeasured mass, in kg, on a separate spring.
     pub hidden_mass: f64,
     /// Natural frequency of that mass on its spring, in Hz.
     pub hidden_hz: f64,
@@ -73,7 +73,7 @@ impl FaultyOscillator {
     ) -> Result<[Record; 2], ProblemError> {
         let dt = window.dt() / Self::FINER as f64;
         let fine = Sampling::new(dt, period * Self::FINER)?;
-        let mut lines = Spectrum::of(&noise::white(fine, 1, 300.0, seed)?).lines().clone();
+        let mut lines = Spectrum::from_record(&noise::white(fine, 1, 300.0, seed)?).lines().clone();
         let last = (band * period as f64) as usize;
         lines.row_mut(0).fill(Complex::ZERO);
         lines.rows_mut(last, lines.nrows() - last).fill(Complex::ZERO);
@@ -117,7 +117,7 @@ impl FaultyOscillator {
         let of_hidden = spring * (x - y) + damper * (v - w);
         let spring = self.stiffness * (1.0 + self.drift * elapsed) * x + self.cubic * x.powi(3);
         let friction = self.friction * (v / Self::SLIP).tanh();
-        let others = self.damping * v + spring + friction + self.hidden_mass * of_hidden;
-        [v, (force - others) / self.mass, w, of_hidden]
+        let internal_force = self.damping * v + spring + friction + self.hidden_mass * of_hidden;
+        [v, (force - internal_force) / self.mass, w, of_hidden]
     }
 }

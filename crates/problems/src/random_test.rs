@@ -27,7 +27,7 @@ pub struct RandomTest {
 impl RandomTest {
     /// Highest frequency of the force, as a fraction of the sampling rate.
     pub const BAND: f64 = 0.35;
-    /// Length of the period over that of the window.
+    /// Ratio of the period to the length of the window.
     const LONGER: usize = 4;
 
     /// Returns the forces (N) and the responses in one window, samples × degrees of freedom; each
@@ -56,7 +56,7 @@ impl RandomTest {
     pub fn period(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
         let period = self.sampling.with_len(Self::LONGER * self.sampling.len())?;
         let white = noise::white(period, self.system.dof(), self.force, seed)?;
-        let mut lines = Spectrum::of(&white).lines().clone();
+        let mut lines = Spectrum::from_record(&white).lines().clone();
         let last = (Self::BAND * period.len() as f64) as usize;
         lines.row_mut(0).fill(Complex::from(0.0));
         lines.rows_mut(last, lines.nrows() - last).fill(Complex::from(0.0));

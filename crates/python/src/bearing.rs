@@ -24,8 +24,8 @@ pub fn bearing(
         records.iter().map(|record| record.0.clone()).collect::<Vec<mechid::Measurement>>()
     });
     let find = move || {
-        let dry = (!baseline.is_empty()).then(|| BearingData::of_records(&baseline, &how));
-        identify_bearing(&BearingData::of_records(&tests, &how)?, dry.transpose()?.as_ref(), &how)
+        let dry = (!baseline.is_empty()).then(|| BearingData::from_records(&baseline, &how));
+        identify_bearing(&BearingData::from_records(&tests, &how)?, dry.transpose()?.as_ref(), &how)
     };
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
@@ -46,8 +46,12 @@ pub fn bearing_of_responses(
         tables.iter().map(|table| table.0.clone()).collect::<Vec<FrequencyResponses>>()
     });
     let find = move || {
-        let dry = (!baseline.is_empty()).then(|| BearingData::of_responses(&baseline, &how));
-        identify_bearing(&BearingData::of_responses(&tests, &how)?, dry.transpose()?.as_ref(), &how)
+        let dry = (!baseline.is_empty()).then(|| BearingData::from_responses(&baseline, &how));
+        identify_bearing(
+            &BearingData::from_responses(&tests, &how)?,
+            dry.transpose()?.as_ref(),
+            &how,
+        )
     };
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }

@@ -137,7 +137,7 @@ impl Identified {
         let compare = move || -> Result<_, AnalysisError> {
             let data = match identified.drawn_spectra() {
                 Some(data) => data.clone(),
-                None => match Review::of(&identified, false)?.receptance {
+                None => match Review::new(&identified, false)?.receptance {
                     Ok(shown) => shown.data,
                     Err(_) => return Err(AnalysisError::NoReceptance),
                 },

@@ -139,7 +139,7 @@ impl Machine {
     /// Returns the modes as the program prints them: JSON and text.
     fn modal(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let machine = self.0.clone();
-        let find = move || -> Result<_, AnalysisError> { ModalSummary::of(&machine) };
+        let find = move || -> Result<_, AnalysisError> { ModalSummary::from_machine(&machine) };
         let modes = work::watched(py, None, || Ok(()), find)?;
         Ok((failure::json(py, &modes)?, modes.to_string()))
     }
@@ -156,7 +156,7 @@ pub fn selected_modes(
 ) -> PyResult<(String, String)> {
     let system = work::brief(py, || parse_sparse_system(NAME, description))?;
     let search = near_hz.map_or(ModeSearch::Lowest, |hz| ModeSearch::NearOmega(TAU * hz));
-    let find = move || SelectedModes::of(NAME, &system, search, count);
+    let find = move || SelectedModes::compute(NAME, &system, search, count);
     let modes = work::watched(py, None, || Ok(()), find)?;
     Ok((failure::json(py, &modes)?, modes.to_string()))
 }

@@ -57,10 +57,10 @@ pub fn whiteness_beyond(
     lags: usize,
 ) -> Result<Correlation, SignalError> {
     let e = centred(residual, lags, span)?;
-    let all = autocorrelation(&e, span + lags);
+    let correlation = autocorrelation(&e, span + lags);
     let count = e.len() as f64;
-    let coefficients = all[span + 1..].to_vec();
-    let covariance = correlated(&all[..=span], &all[..=span], lags);
+    let coefficients = correlation[span + 1..].to_vec();
+    let covariance = correlated(&correlation[..=span], &correlation[..=span], lags);
     let weight = |lag: usize| count * (count + 2.0) / (count - lag as f64);
     let squares = (span + 1..).zip(&coefficients).map(|(lag, c)| c * c * weight(lag));
     // Squares at two lags share parallelograms of samples, even in white noise.

@@ -32,7 +32,7 @@ use crate::spectrum::Spectrum;
 pub fn driven_lines(record: &Record, period: usize) -> Result<Vec<usize>, SignalError> {
     let mean = record.period_mean(period)?;
     let lines_of_period = lines::full(mean.sampling());
-    let spectrum = Spectrum::of(&mean);
+    let spectrum = Spectrum::from_record(&mean);
     let (mut above_floor, mut above_noise) =
         (vec![false; lines_of_period.len()], vec![false; lines_of_period.len()]);
     let mut periodic = false;
@@ -72,7 +72,7 @@ fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, S
     let mut periods =
         DMatrix::from_column_slice(period, count, &record.channel(channel)[..period * count]);
     periods.column_iter_mut().for_each(|mut one| one -= mean.column(channel));
-    let spectrum = Spectrum::of(&Record::new(mean.sampling(), periods)?);
+    let spectrum = Spectrum::from_record(&Record::new(mean.sampling(), periods)?);
     let variance = |n: &usize| spectrum.lines().row(*n).norm_squared() / (count - 1) as f64;
     Ok(lines::full(mean.sampling()).iter().map(variance).collect())
 }

@@ -50,7 +50,7 @@ pub fn noise_above_band(record: &Record) -> Result<Vec<Option<f64>>, SignalError
         }
     }
     let sampling = Sampling::new(record.sampling().dt(), samples)?;
-    let spectrum = Spectrum::of(&Record::new(sampling, windowed)?);
+    let spectrum = Spectrum::from_record(&Record::new(sampling, windowed)?);
     let of_channel = |channel: usize| {
         if record.channel(channel).iter().all(|x| *x == 0.0) {
             return Some(0.0);
@@ -110,7 +110,8 @@ mod tests {
     /// with noise.
     fn force(samples: usize, level: f64, seed: u64) -> Record {
         let period = Sampling::new(0.002, 4 * samples).unwrap();
-        let mut lines = Spectrum::of(&noise::white(period, 1, 1.0, seed).unwrap()).lines().clone();
+        let mut lines =
+            Spectrum::from_record(&noise::white(period, 1, 1.0, seed).unwrap()).lines().clone();
         let last = (0.35 * period.len() as f64) as usize;
         lines.rows_mut(last, lines.nrows() - last).fill(Default::default());
         let force = Spectrum::from_lines(period, lines).unwrap().to_record().unwrap();
@@ -150,7 +151,7 @@ mod tests {
         // The spectrum behind a second-order filter falls gradually, without a step.
         for seed in 0..10 {
             let white = noise::white(sampling, 1, 1.0, seed).unwrap();
-            let mut lines = Spectrum::of(&white).lines().clone();
+            let mut lines = Spectrum::from_record(&white).lines().clone();
             for (n, mut line) in lines.row_iter_mut().enumerate() {
                 line /= nalgebra::Complex::from(1.0 + (n as f64 / 300.0).powi(2));
             }

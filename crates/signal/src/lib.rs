@@ -12,7 +12,7 @@
 //!
 //! // What is sampled is what was asked for, line by line.
 //! let force = searched.sample(sampling)?;
-//! let spectrum = Spectrum::of(&force);
+//! let spectrum = Spectrum::from_record(&force);
 //! assert!((spectrum.line(199, 0).norm() - searched.amplitudes()[99]).abs() < 1e-12);
 //! assert_eq!(measures::persistent_excitation_order(&spectrum, 0, 1e-9)?, 200);
 //!

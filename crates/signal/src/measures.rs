@@ -5,7 +5,7 @@
 //!
 //! let sampling = Sampling::new(0.01, 256)?; // lines every 0.39 Hz
 //! let force = Multisine::flat(1..=127, 50.0, Phases::Schroeder)?.sample(sampling)?;
-//! let spectrum = Spectrum::of(&force);
+//! let spectrum = Spectrum::from_record(&force);
 //! assert!(measures::crest_factor(&force, 0)? < 1.8);
 //! assert!(measures::spectral_flatness(&spectrum, 0, 1..128)? > 1.0 - 1e-12);
 //! // 127 lines and their mirror images: enough for 254 parameters.

@@ -100,7 +100,7 @@ mod tests {
             let experiments = orthogonal(&inputs(n), mixing).unwrap();
             assert_eq!(experiments.len(), n as usize);
             let amplitude = |e: usize, k: usize, line: usize| {
-                Spectrum::of(&experiments[e][k].sample(s).unwrap()).line(line, 0)
+                Spectrum::from_record(&experiments[e][k].sample(s).unwrap()).line(line, 0)
             };
             for line in 1..=9 {
                 for (j, k) in (0..n as usize).flat_map(|j| (0..n as usize).map(move |k| (j, k))) {

@@ -150,7 +150,7 @@ fn power_law(
     within("exponent of the power law", exponent, -limits::NOISE_EXPONENT, limits::NOISE_EXPONENT)?;
     let twice = sampling.with_len(sampling.len().saturating_mul(2))?;
     let white = Record::from_channel(twice, white_channel(twice, 1.0, rng))?;
-    let spectrum = Spectrum::of(&white);
+    let spectrum = Spectrum::from_record(&white);
     let gain = |n: usize| if n == 0 { 0.0 } else { (n as f64).powf(-0.5 * exponent) };
     // The period is even: all lines but DC and Nyquist count twice.
     let nyquist = twice.len() / 2;
@@ -281,7 +281,7 @@ mod tests {
     fn power_laws_fall_as_stated() {
         for exponent in [0.0, 1.0, 2.0] {
             let r = coloured(axis(4096), 40, 1.0, Colour::PowerLaw { exponent }, 2).unwrap();
-            let spectrum = Spectrum::of(&r.without_mean());
+            let spectrum = Spectrum::from_record(&r.without_mean());
             // Power of two octave bands three octaves apart, far from both ends.
             let power = |from: usize| {
                 let lines = spectrum.lines().rows(from, from);

@@ -33,7 +33,7 @@ pub struct Spectrum {
 
 impl Spectrum {
     /// Computes the spectrum of a record that is one whole period of any length.
-    pub fn of(record: &Record) -> Self {
+    pub fn from_record(record: &Record) -> Self {
         let sampling = record.sampling();
         let plan = forward(sampling.len());
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
@@ -76,7 +76,7 @@ impl Spectrum {
         Ok(Self { sampling, lines })
     }
 
-    /// Returns the period that has this spectrum; the exact inverse of [`Spectrum::of`].
+    /// Returns the period that has this spectrum; the exact inverse of [`Spectrum::from_record`].
     ///
     /// # Errors
     /// [`SignalError::NotFinite`] if the sum of the lines overflows.
@@ -174,7 +174,7 @@ mod tests {
     fn cosine_and_sine_have_the_stated_amplitudes() {
         let s = Sampling::new(0.1, 12).unwrap();
         let x = |k: f64| 1.5 + 2.0 * (TAU * k / 4.0).cos() + 0.5 * (TAU * k / 6.0).sin();
-        let spectrum = Spectrum::of(&record((0..s.len()).map(|k| x(k as f64)).collect()));
+        let spectrum = Spectrum::from_record(&record((0..s.len()).map(|k| x(k as f64)).collect()));
         for (n, expected) in [
             (0, Complex::new(1.5, 0.0)),
             (2, Complex::new(0.0, -0.5)),
@@ -189,7 +189,7 @@ mod tests {
         #[test]
         fn agrees_with_the_direct_sum_and_inverts(x in prop::collection::vec(-1e3..1e3f64, 1..200)) {
             let r = record(x.clone());
-            let spectrum = Spectrum::of(&r);
+            let spectrum = Spectrum::from_record(&r);
             for n in 0..spectrum.len() {
                 prop_assert!((spectrum.line(n, 0) - direct_sum(&x, n)).norm() < 1e-9);
             }
@@ -201,7 +201,7 @@ mod tests {
 
         #[test]
         fn parseval(x in prop::collection::vec(-1e3..1e3f64, 1..200)) {
-            let spectrum = Spectrum::of(&record(x.clone()));
+            let spectrum = Spectrum::from_record(&record(x.clone()));
             let power: f64 = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
             let lines: f64 = (0..spectrum.len())
                 .map(|n| spectrum.line(n, 0).norm_sqr() / line_weight(x.len(), n))

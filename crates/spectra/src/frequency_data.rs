@@ -297,7 +297,7 @@ impl FrequencyData {
     /// arbitrary excitations (transient terms of a plant) and on continuous-time models of
     /// band-limited signals.
     #[must_use]
-    pub fn of_open_record(mut self, sampling: Sampling) -> Self {
+    pub fn as_open_record(mut self, sampling: Sampling) -> Self {
         self.open = vec![sampling];
         self.transient = DMatrix::from_fn(self.len(), 2, |row, column| {
             let omega = self.omega[row];

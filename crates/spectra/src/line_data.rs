@@ -103,7 +103,8 @@ impl LineData {
         // The spectrum has amplitudes, 2/N times the transform; a unitary transform has the factor
         // 1/√N.
         let scale = Complex::from((expected as f64).sqrt() / 2.0);
-        let read = |record: &Record| Spectrum::of(record).lines().rows(first, lines) * scale;
+        let read =
+            |record: &Record| Spectrum::from_record(record).lines().rows(first, lines) * scale;
         let omega = (first..=last).map(|line| TAU * line as f64 * spacing_hz).collect();
         let inputs = inputs.map_or_else(|| DMatrix::zeros(lines, 0), read);
         let transient = Transient::Open { sample_interval: sampling.dt() };

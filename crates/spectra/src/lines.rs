@@ -205,7 +205,7 @@ mod tests {
         for len in [15, 16] {
             let r = record(len);
             let lines = Lines::new(r.sampling(), [3, 1, 7]).unwrap();
-            let (read, all) = (lines.read(&r).unwrap(), Spectrum::of(&r));
+            let (read, all) = (lines.read(&r).unwrap(), Spectrum::from_record(&r));
             for (row, &n) in lines.as_slice().iter().enumerate() {
                 assert!((read[(row, 0)] - all.line(n, 0)).norm() < 1e-14);
             }

@@ -317,7 +317,7 @@ impl RepeatedPeriods {
             }
             covariance
         };
-        let noise = NoiseSpectrum::of_measured(
+        let noise = NoiseSpectrum::from_measured(
             &self.lines.omega(),
             self.scatter.iter().map(of_mean).collect(),
             self.measured,

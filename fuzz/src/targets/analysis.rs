@@ -209,7 +209,7 @@ fn machine(d: &mut Draw, first: Measurement) -> Result<(), String> {
     }
     let Some(mut identified) = passed(identify(&records, &how))? else { return Ok(()) };
     passed(identified.compared())?;
-    passed(Review::of(&identified, d.one_in(2)))?;
+    passed(Review::new(&identified, d.one_in(2)))?;
     if let Some(other) = measurement(d)? {
         let samples = ValidationWindow { start: None, samples: d.one_in(3).then(|| d.size()) };
         if let Some(other) = passed(identified.validation_window(other, &samples))? {
@@ -223,7 +223,7 @@ fn machine(d: &mut Draw, first: Measurement) -> Result<(), String> {
 /// What is asked of an identified machine.
 fn used(d: &mut Draw, identified: &Identified, record: &Measurement) -> Result<(), String> {
     let Some(machine) = passed(identified.machine())? else { return Ok(()) };
-    if let Some(modes) = passed(ModalSummary::of(&machine))? {
+    if let Some(modes) = passed(ModalSummary::from_machine(&machine))? {
         printed(&modes)?;
     }
     let how = Predict { settle: d.one_in(3).then(|| d.size()) };
@@ -301,7 +301,7 @@ fn bearing(d: &mut Draw, record: &Measurement) -> Result<(), String> {
     };
     let mut tests = vec![record.clone()];
     tests.extend(measurement(d)?);
-    let Some(data) = passed(mechid_analysis::BearingData::of_records(&tests, &how))? else {
+    let Some(data) = passed(mechid_analysis::BearingData::from_records(&tests, &how))? else {
         return Ok(());
     };
     let Some(film) = passed(identify_bearing(&data, None, &how))? else { return Ok(()) };

@@ -156,7 +156,7 @@ impl Record {
         let kind = ResponseQuantity::ALL[self.choice % 3];
         let channels = match forced {
             true => Channels::new(force, kind, response),
-            false => Channels::of_responses(kind, response),
+            false => Channels::from_responses(kind, response),
         };
         let Some(opened) = passed(Measurement::open_with(&self.path, &channels, &self.reading))?
         else {
@@ -216,7 +216,9 @@ fn bearings(bytes: &[u8]) -> Result<(), String> {
     let Some(measurement) = passed(opened.window(window))? else { return Ok(()) };
     reached(Depth::Reached);
     let how = IdentifyBearing { stator_mass: 1.0, ..IdentifyBearing::default() };
-    let Some(data) = passed(BearingData::of_records(&[measurement], &how))? else { return Ok(()) };
+    let Some(data) = passed(BearingData::from_records(&[measurement], &how))? else {
+        return Ok(());
+    };
     match passed(identify_bearing(&data, None, &how))? {
         Some(found) => printed(&found),
         None => Ok(()),
@@ -243,7 +245,7 @@ fn modes_of_matrices(bytes: &[u8]) -> Result<(), String> {
     let Some(measurement) = record.measurement(true)? else { return Ok(()) };
     let Some(found) = passed(identify(&[measurement], &record.settings()))? else { return Ok(()) };
     let Some(machine) = passed(found.machine())? else { return Ok(()) };
-    match passed(ModalSummary::of(&machine))? {
+    match passed(ModalSummary::from_machine(&machine))? {
         Some(found) => printed(&found),
         None => Ok(()),
     }

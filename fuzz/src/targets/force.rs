@@ -126,7 +126,7 @@ fn errors(d: &mut Draw) -> Result<(), String> {
     };
     passed(channel_errors(&a, &b))?;
     passed(relative_error(&a, &b))?;
-    let (a, b) = (Spectrum::of(&a), Spectrum::of(&b));
+    let (a, b) = (Spectrum::from_record(&a), Spectrum::from_record(&b));
     let lines = d.lines(sampling.len());
     let (channel, from) = (d.below(3), d.size());
     passed(line_errors(&a, &b, channel, &lines))?;

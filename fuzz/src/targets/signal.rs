@@ -164,7 +164,7 @@ fn spectra(d: &mut Draw, sampling: Sampling) -> Result<(), String> {
     let lines = d.matrix(rows, 2);
     passed(Spectrum::from_lines(sampling, lines.map(|v| nalgebra::Complex::new(v, -v))))?;
     let Some(record) = d.record(sampling, 2)? else { return Ok(()) };
-    let spectrum = Spectrum::of(&record);
+    let spectrum = Spectrum::from_record(&record);
     finite(spectrum.to_record())?;
     let (channel, level) = (d.size(), d.number());
     passed(measures::effective_band(&spectrum, channel, level))?;

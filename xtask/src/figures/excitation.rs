@@ -23,7 +23,7 @@ fn in_time(case: Case) -> Panel {
 
 fn in_frequency(case: Case) -> Panel {
     let force = case.force();
-    let spectrum = Spectrum::of(&force);
+    let spectrum = Spectrum::from_record(&force);
     let lines = 0..=case.nt / 2;
     let omega: Vec<f64> = lines.clone().map(|n| spectrum.omega(n)).collect();
     let amplitude: Vec<f64> =

@@ -25,8 +25,10 @@ fn simulated(
     dof: usize,
 ) -> Result<Receptance, String> {
     let sequences = reading.sequences(case, method)?;
-    let (motion, force) =
-        (Spectrum::of(sequences.response.displacement()), Spectrum::of(&sequences.force));
+    let (motion, force) = (
+        Spectrum::from_record(sequences.response.displacement()),
+        Spectrum::from_record(&sequences.force),
+    );
     let driven = force.channels() - 1;
     let lines = 1..case.nt.div_ceil(2);
     Ok(Receptance {

@@ -108,7 +108,7 @@ pub(crate) fn force_lines(
             discretised(&machine, &sequences.response, Discretisation::Euler, Extent::WholePeriod)
         }
     };
-    let spectrum = Spectrum::of(force.map_err(|error| error.to_string())?.record());
+    let spectrum = Spectrum::from_record(force.map_err(|error| error.to_string())?.record());
     let lines = 1..case.nt.div_ceil(2);
     let column = |dof| lines.clone().map(|n| spectrum.line(n, dof).norm()).collect();
     Ok(ForceLines {

@@ -68,7 +68,10 @@ type Amplitudes = (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>);
 
 /// Harmonic n at (n + offset)·ω0; the mean is among the harmonics where its frequency is not zero.
 fn amplitudes(sequences: &Sequences, offset: usize) -> Amplitudes {
-    let (x, f) = (Spectrum::of(sequences.response.displacement()), Spectrum::of(&sequences.force));
+    let (x, f) = (
+        Spectrum::from_record(sequences.response.displacement()),
+        Spectrum::from_record(&sequences.force),
+    );
     let first = 1 - offset;
     let harmonics = x.sampling().len() / 2 - first;
     let omega0 = x.sampling().omega0();

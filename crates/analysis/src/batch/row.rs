@@ -120,7 +120,7 @@ impl SavedAnalysis {
     /// Identifies a record whose columns are in memory, as [`SavedAnalysis::row`] does.
     pub fn row_of_table(&self, record: &str, table: Table) -> ResultRow {
         let open = || {
-            let file = RecordFile::of_table(table);
+            let file = RecordFile::from_table(table);
             Measurement::from_file(file, None, &self.record_channels()?, &self.reading)?
                 .window(self.window.clone())
         };

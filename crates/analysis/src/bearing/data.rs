@@ -14,7 +14,7 @@ use super::IdentifyBearing;
 use crate::AnalysisError;
 use crate::identify::Disturbance;
 use crate::identify::IdentifyResponses;
-use crate::identify::checks::of_sensors;
+use crate::identify::checks::sensor_findings;
 use crate::identify::left_out::LineRule;
 use crate::identify::tabulated::response_data;
 use crate::measurement::{Block, CHUNK_SAMPLES, Channels, Hold, Measurement, Windowed};
@@ -65,7 +65,10 @@ impl BearingData {
     /// acceleration in two directions, or if all lines are excluded, the errors of
     /// [`choose_lines`](crate::identify::lines::choose_lines), and an error if a file cannot be
     /// read again.
-    pub fn of_records(tests: &[Measurement], how: &IdentifyBearing) -> Result<Self, AnalysisError> {
+    pub fn from_records(
+        tests: &[Measurement],
+        how: &IdentifyBearing,
+    ) -> Result<Self, AnalysisError> {
         how.check()?;
         let data = tests.iter().map(|test| Self::from_record(test, how));
         let data = data.collect::<Result<Vec<_>, _>>()?.into_iter();
@@ -86,7 +89,7 @@ impl BearingData {
     ///
     /// # Source
     /// Rouvas and Childs (1993).
-    pub fn of_responses(
+    pub fn from_responses(
         tables: &[FrequencyResponses],
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
@@ -107,22 +110,7 @@ impl BearingData {
         acceleration: &FrequencyResponses,
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
-        let settings = how.response_settings()?;
-        let read = |table: &FrequencyResponses, quantity| {
-            let how = IdentifyResponses { quantity: Some(quantity), ..settings.clone() };
-            response_data(table, &how)
-        };
-        let (d, noise) = read(displacement, ResponseQuantity::Displacement)?;
-        let (a, noise_of_a) = read(acceleration, ResponseQuantity::Acceleration)?;
-        if (d.dof(), a.dof()) != (2, 2) {
-            return Err(apart("a bearing has two directions: choose two `points`"));
-        }
-        if d.omega() != a.omega() || d.force() != a.force() {
-            return Err(apart(&format!(
-                "{} and {} need the same frequencies and forces",
-                displacement.file, acceleration.file
-            )));
-        }
+        let (d, a, noise) = matching_responses(displacement, acceleration, how)?;
         let spacing_hz = spacing(d.omega());
         let is_kept = |omega: f64| {
             let (hz, others) = (omega / TAU, &how.without.frequencies);
@@ -134,7 +122,6 @@ impl BearingData {
         if keep.is_empty() {
             return Err(apart("every frequency is a multiple of the rotation, or left out"));
         }
-        let noise = noise.zip(noise_of_a).map(|(noise, _)| noise);
         let data = film_data(&d, &a, &keep, how.stator_mass, noise.is_some())?;
         let names = vec![displacement.file.clone(), acceleration.file.clone()];
         let mut remarks = [&displacement.remarks[..], &acceleration.remarks[..]].concat();
@@ -182,30 +169,14 @@ impl BearingData {
         }
         let lines = Lines::new(period, kept)?;
         let periods = film_periods(&recorded, &lines, how.stator_mass)?;
-        let count = periods.count();
-        let (data, noise) = match count {
-            0 | 1 => (periods.mean()?, None),
-            // The covariance is pooled over as many neighbouring lines as it needs for a weight.
-            _ => {
-                let half_width = WELL_KNOWN.div_ceil(count - 1) / 2;
-                let pooling = match half_width {
-                    0 => Pooling::PerLine,
-                    wide => Pooling::Neighbours(wide),
-                };
-                let noisy = periods.mean_with_noise(pooling)?;
-                if shows_noise(&noisy) {
-                    (noisy, Some("estimated from the periods"))
-                } else {
-                    (periods.mean()?, None)
-                }
-            }
-        };
+        let (data, noise) = mean_with_noise(&periods)?;
         let mut remarks = block.unit_notes();
         if noise.is_none() {
             remarks.push(format!(
-                "{}: the periods show no noise ({count} of them); it was taken from the residual, on the \
+                "{}: the periods show no noise ({} of them); it was taken from the residual, on the \
                  displacement alone",
-                block.file
+                block.file,
+                periods.count()
             ));
         }
         let record = TestRecord {
@@ -241,6 +212,54 @@ impl BearingData {
         self.left_out_hz = distinct(self.left_out_hz);
         Ok(self)
     }
+}
+
+/// Returns the mean of the periods of a test with its noise, and the source of the noise in words;
+/// without noise if there is one period, or if the periods differ by rounding alone.
+fn mean_with_noise(
+    periods: &RepeatedPeriods,
+) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
+    let count = periods.count();
+    if count < 2 {
+        return Ok((periods.mean()?, None));
+    }
+    // The covariance is pooled over as many neighbouring lines as it needs for a weight.
+    let pooling = match WELL_KNOWN.div_ceil(count - 1) / 2 {
+        0 => Pooling::PerLine,
+        half_width => Pooling::Neighbours(half_width),
+    };
+    let noisy = periods.mean_with_noise(pooling)?;
+    if shows_noise(&noisy) {
+        Ok((noisy, Some("estimated from the periods")))
+    } else {
+        Ok((periods.mean()?, None))
+    }
+}
+
+/// Returns the responses of the displacement and the acceleration from two tables, and the source
+/// of the noise in words; `None` unless both tables state it.
+fn matching_responses(
+    displacement: &FrequencyResponses,
+    acceleration: &FrequencyResponses,
+    how: &IdentifyBearing,
+) -> Result<(FrequencyData, FrequencyData, Option<&'static str>), AnalysisError> {
+    let settings = how.response_settings()?;
+    let read = |table: &FrequencyResponses, quantity| {
+        let how = IdentifyResponses { quantity: Some(quantity), ..settings.clone() };
+        response_data(table, &how)
+    };
+    let (d, noise) = read(displacement, ResponseQuantity::Displacement)?;
+    let (a, noise_of_a) = read(acceleration, ResponseQuantity::Acceleration)?;
+    if (d.dof(), a.dof()) != (2, 2) {
+        return Err(apart("a bearing has two directions: choose two `points`"));
+    }
+    if d.omega() != a.omega() || d.force() != a.force() {
+        return Err(apart(&format!(
+            "{} and {} need the same frequencies and forces",
+            displacement.file, acceleration.file
+        )));
+    }
+    Ok((d, a, noise.zip(noise_of_a).map(|(noise, _)| noise)))
 }
 
 /// Returns the film force f − M a and the displacement at the `keep` rows of two tables of
@@ -341,7 +360,7 @@ fn record_findings(
 ) -> Result<Vec<Finding>, AnalysisError> {
     let kind = ResponseQuantity::Displacement;
     let mut findings = block.unit_findings.clone();
-    findings.extend(of_sensors(block));
+    findings.extend(sensor_findings(block));
     findings.extend(steady_periods(&block.force, d, block.period)?);
     if let Some(a) = &block.acceleration {
         findings.extend(power(&block.force, a, ResponseQuantity::Acceleration)?);

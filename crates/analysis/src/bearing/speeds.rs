@@ -58,7 +58,7 @@ impl BearingPlan {
     ///
     /// # Errors
     /// [`AnalysisError::NoRecord`] for a point without tests, and the errors of
-    /// [`BearingData::of_records`] and [`identify_bearing`](super::identify_bearing()).
+    /// [`BearingData::from_records`] and [`identify_bearing`](super::identify_bearing()).
     pub fn run(&self) -> Result<BearingTable, AnalysisError> {
         let bearings = self.points.iter().map(|point| self.at(point));
         Ok(BearingTable::new(bearings.collect::<Result<Vec<_>, _>>()?))
@@ -73,7 +73,7 @@ impl BearingPlan {
         let data = |paths: &[PathBuf]| {
             if self.frf_table {
                 let tables = paths.iter().map(FrequencyResponses::read);
-                return BearingData::of_responses(&tables.collect::<Result<Vec<_>, _>>()?, &how);
+                return BearingData::from_responses(&tables.collect::<Result<Vec<_>, _>>()?, &how);
             }
             let open = |path: &PathBuf| {
                 let (path, channels) = (path.clone(), self.channels.clone());
@@ -81,7 +81,7 @@ impl BearingPlan {
                 RecordPlan { path, channels, reading, window }.open()
             };
             let tests: Vec<Measurement> = paths.iter().map(open).collect::<Result<_, _>>()?;
-            BearingData::of_records(&tests, &how)
+            BearingData::from_records(&tests, &how)
         };
         let tests = data(&point.tests)?;
         let recorded = if point.baseline.is_empty() { &self.baseline } else { &point.baseline };

@@ -133,6 +133,27 @@ impl Amplitude {
     }
 }
 
+/// Returns the coefficients of the film; `uncertain` makes an estimate of a value and its variance.
+fn coefficients(
+    film: &Film,
+    uncertain: &dyn Fn(f64, f64) -> Result<Uncertain, AnalysisError>,
+) -> Result<Vec<CoefficientRow>, AnalysisError> {
+    let row = |at: usize| {
+        let mut estimate = uncertain(film.values()[at], film.covariance()[(at, at)])?;
+        if let Some(interval) = film.interval_after_choice(at, CONFIDENCE) {
+            estimate.interval = estimate.interval.map(|_| interval);
+        }
+        Ok(CoefficientRow { name: NAMED[at], unit: UNITS[at / 4], estimate })
+    };
+    (0..film.values().len()).map(row).collect()
+}
+
+/// Returns the covariance of the coefficients of the film.
+fn covariance(film: &Film) -> ParameterCovariance {
+    let names = NAMED[..film.values().len()].iter().map(|name| (*name).to_owned()).collect();
+    ParameterCovariance::new(names, film.covariance(), film.degrees_of_freedom)
+}
+
 impl BearingSummary {
     pub(super) fn new(
         tests: &BearingData,
@@ -151,17 +172,6 @@ impl BearingSummary {
                 degrees_of_freedom: film.degrees_of_freedom,
             }),
         };
-        let count = film.values().len();
-        let rows = (0..count).map(|at| {
-            let mut estimate = uncertain(film.values()[at], film.covariance()[(at, at)])?;
-            if let Some(interval) = film.interval_after_choice(at, CONFIDENCE) {
-                estimate.interval = estimate.interval.map(|_| interval);
-            }
-            Ok(CoefficientRow { name: NAMED[at], unit: UNITS[at / 4], estimate })
-        });
-        let names = NAMED[..count].iter().map(|name| (*name).to_owned()).collect();
-        let covariance =
-            ParameterCovariance::new(names, film.covariance(), film.degrees_of_freedom);
         let amplitude = tests.largest_displacement.map(|largest_displacement| Amplitude {
             largest_displacement,
             over_clearance: how.size.clearance.map(|c| largest_displacement / c),
@@ -172,8 +182,8 @@ impl BearingSummary {
             rotation_hz: how.rotation_hz,
             load: how.load,
             confidence: CONFIDENCE,
-            coefficients: rows.collect::<Result<_, AnalysisError>>()?,
-            covariance,
+            coefficients: coefficients(film, &uncertain)?,
+            covariance: covariance(film),
             inertia_test: film.inertia,
             dimensionless: None,
             stability: None,

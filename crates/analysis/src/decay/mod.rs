@@ -71,7 +71,7 @@ pub struct Decayed {
 /// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
 ///
 /// let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/decay.csv");
-/// let channels = Channels::of_responses(ResponseQuantity::Acceleration, "a1,a2,a3");
+/// let channels = Channels::from_responses(ResponseQuantity::Acceleration, "a1,a2,a3");
 /// let decayed = decay(&Measurement::open(rig, &channels)?, &DecaySettings::default())?;
 /// assert_eq!(decayed.estimate().modes().len(), 3);
 /// println!("{decayed}");

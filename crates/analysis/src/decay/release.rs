@@ -49,7 +49,7 @@ pub(super) fn release(record: &Record) -> usize {
 /// too few periods.
 fn energies(record: &Record, sums: &[f64], first: usize) -> Vec<f64> {
     let Ok(part) = record.window(first, record.len() - first) else { return Vec::new() };
-    let spectrum = Spectrum::of(&part.without_mean());
+    let spectrum = Spectrum::from_record(&part.without_mean());
     let crests: Vec<f64> = (0..record.channels()).map(|c| part.column(c).amax()).collect();
     let power = |line: usize| -> f64 {
         let powers = crests.iter().enumerate().map(|(channel, largest)| {

@@ -76,7 +76,7 @@ impl ElementData {
     }
 
     /// Takes the lines of one test.
-    pub(super) fn of_test(lines: LineData, test: TestRow, channels: Channels) -> Self {
+    pub(super) fn from_test(lines: LineData, test: TestRow, channels: Channels) -> Self {
         Self {
             lines,
             tests: vec![test],
@@ -125,13 +125,13 @@ impl ElementData {
 pub(super) fn joined(
     tests: impl IntoIterator<Item = Result<ElementData, AnalysisError>>,
 ) -> Result<ElementData, AnalysisError> {
-    let mut all: Option<ElementData> = None;
+    let mut combined: Option<ElementData> = None;
     for test in tests {
         let test = test?;
-        all = Some(match all {
+        combined = Some(match combined {
             None => test,
             Some(before) => before.followed_by(test)?,
         });
     }
-    all.ok_or(AnalysisError::NoRecord)
+    combined.ok_or(AnalysisError::NoRecord)
 }

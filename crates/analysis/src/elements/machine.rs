@@ -18,7 +18,7 @@ pub(super) struct StatedMachine {
     pub notes: Vec<ElementNote>,
 }
 
-/// M, C and K of an estimate from so many equations.
+/// M, C and K of an estimate from this number of equations.
 pub(super) fn stated(
     estimate: &MachineEstimate,
     equations: usize,

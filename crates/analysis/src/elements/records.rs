@@ -87,7 +87,8 @@ fn from_record(
         signals.open(&block, TestKind::Open, how)?
     };
     data.remarks = block.unit_notes();
-    data.findings = checks::of_sensors(&block).into_iter().map(|finding| (0, finding)).collect();
+    data.findings =
+        checks::sensor_findings(&block).into_iter().map(|finding| (0, finding)).collect();
     Ok(data)
 }
 
@@ -136,7 +137,7 @@ impl Signals {
     }
 
     fn test(&self, block: &Block, kind: TestKind) -> TestRow {
-        TestRow { file: block.file.clone(), kind, window: Some(WindowRow::of(block)) }
+        TestRow { file: block.file.clone(), kind, window: Some(WindowRow::from_block(block)) }
     }
 
     /// The mean of the periods with the noise that their scatter shows.
@@ -168,8 +169,8 @@ impl Signals {
         let (data, source, noise) = match (mean.noise(), noise) {
             (Some(spectrum), Some(words)) => {
                 let covariance = (0..mean.len()).map(|row| {
-                    let all = spectrum.covariance(row);
-                    all.select_rows(&of_channels).select_columns(&of_channels)
+                    let matrix = spectrum.covariance(row);
+                    matrix.select_rows(&of_channels).select_columns(&of_channels)
                 });
                 let noise = LineNoise::new(covariance.collect())?
                     .with_degrees_of_freedom(spectrum.degrees_of_freedom(), spectrum.deviations());
@@ -178,7 +179,7 @@ impl Signals {
             _ => (data, None, "taken from the residual".to_owned()),
         };
         let test = self.test(block, TestKind::Periods);
-        let of_test = ElementData::of_test(data, test, block.names.as_ref().clone());
+        let of_test = ElementData::from_test(data, test, block.names.as_ref().clone());
         Ok(ElementData { source, noise, ..of_test })
     }
 
@@ -205,7 +206,7 @@ impl Signals {
         let spacing_hz = self.inputs.sampling().line_spacing_hz();
         let data = ElementData::kept(data, spacing_hz, how)?;
         let test = self.test(block, kind);
-        let of_test = ElementData::of_test(data, test, block.names.as_ref().clone());
+        let of_test = ElementData::from_test(data, test, block.names.as_ref().clone());
         Ok(ElementData { noise: "taken from the residual".to_owned(), ..of_test })
     }
 }

@@ -32,7 +32,7 @@ impl ElementData {
         joined(tables.iter().map(|table| from_table(table, how)))
     }
 
-    /// Returns the same for a machine of which a part is known by its measured receptance, in
+    /// Returns the same for a machine with parts that are known by their measured receptances, in
     /// tables whose points have the names of the degrees of freedom `measured` of the machine. Each
     /// table is one part, free of all others.
     ///
@@ -67,7 +67,7 @@ fn from_table(
     let of_inputs = inputs.iter().enumerate().filter(|(_, input)| {
         table.functions.iter().any(|function| function.reference == input.name())
     });
-    let mut all = Vec::new();
+    let mut tests = Vec::new();
     for (at, input) in of_inputs {
         let responses = sensors.iter().map(|sensor| response(table, sensor, input.name()));
         let responses = responses.collect::<Result<Vec<_>, _>>()?;
@@ -88,15 +88,15 @@ fn from_table(
             Some(_) => "that of the standard errors of the table",
             None => "taken from the residual",
         };
-        let data = ElementData::of_test(lines, test, Channels::default());
-        all.push(Ok(ElementData { source, noise: noise.into(), ..data }));
+        let data = ElementData::from_test(lines, test, Channels::default());
+        tests.push(Ok(ElementData { source, noise: noise.into(), ..data }));
     }
-    if all.is_empty() {
+    if tests.is_empty() {
         let names: Vec<&str> = inputs.iter().map(|input| input.name()).collect();
         let why = format!("{} has no response to {}", table.file, names.join(", "));
         return Err(refused("machine", why));
     }
-    let mut data = joined(all)?;
+    let mut data = joined(tests)?;
     data.remarks = table.remarks.clone();
     Ok(data)
 }

@@ -27,14 +27,14 @@ pub struct IdentifyElements {
     /// Frequencies of excluded lines.
     #[serde(default)]
     pub without_hz: Vec<Disturbance>,
-    /// Rule by which records of a hammer test are cut into their hits.
+    /// Rule for the division of records of a hammer test into hits.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "crate::words::written::optional"
     )]
     pub hits: Option<HitRule>,
-    /// Noise spectrum by which the lines are weighted.
+    /// Noise spectrum that weights the lines.
     #[serde(default)]
     pub noise: Pooling,
     /// Maximum number of searches: one from the given initial values, the others from random ones.

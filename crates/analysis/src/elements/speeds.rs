@@ -97,23 +97,24 @@ fn from_table(table: &Table, how: &IdentifyElements) -> Result<ElementData, Anal
         Some(_) => "that of the standard errors of the table",
         None => "taken from the residual",
     };
-    let data = ElementData::of_test(lines, test, Channels::default());
+    let data = ElementData::from_test(lines, test, Channels::default());
     Ok(ElementData { source, noise: noise.into(), ..data })
 }
 
 /// Returns the speeds, in Hz.
 fn speeds_hz(table: &Table) -> Result<Vec<f64>, AnalysisError> {
-    let found = SPEEDS.iter().find_map(|(name, hz)| Some((table.find(name).ok()?, *hz)));
+    let named_column = SPEEDS.iter().find_map(|(name, hz)| Some((table.find(name).ok()?, *hz)));
     let missing = "it needs a column speed_rpm, speed_hz or speed_rad_s";
-    let (column, hz) = found.ok_or_else(|| refused(table, missing))?;
+    let (column, hz) = named_column.ok_or_else(|| refused(table, missing))?;
     let stated = table.unit(column).filter(|unit| unit.quantity == Quantity::Frequency);
     let factor = hz.or(stated.map(|unit| unit.in_si)).ok_or_else(|| {
         refused(table, "the column speed needs a unit, as in speed_rpm or speed_hz")
     })?;
     let speeds: Vec<f64> = table.values(column)?.iter().map(|value| value * factor).collect();
-    match speeds.iter().all(|hz| *hz > 0.0) {
-        true => Ok(speeds),
-        false => Err(refused(table, "a speed must be positive")),
+    if speeds.iter().all(|hz| *hz > 0.0) {
+        Ok(speeds)
+    } else {
+        Err(refused(table, "a speed must be positive"))
     }
 }
 

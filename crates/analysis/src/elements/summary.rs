@@ -243,14 +243,14 @@ fn candidates(
     how: &IdentifyElements,
 ) -> Result<Vec<CandidateRow>, AnalysisError> {
     let Candidates { sensors, forces } = &how.machine.candidates;
-    let all: Vec<Candidate> = (sensors.iter().cloned().map(Candidate::Sensor))
+    let listed: Vec<Candidate> = (sensors.iter().cloned().map(Candidate::Sensor))
         .chain(forces.iter().cloned().map(Candidate::Force))
         .collect();
-    if all.is_empty() {
+    if listed.is_empty() {
         return Ok(Vec::new());
     }
     let (machine, instruments) = (&how.machine.machine, &how.machine.instruments);
-    let gains = estimate.rank_candidates(&data.lines, machine, instruments, &all)?;
+    let gains = estimate.rank_candidates(&data.lines, machine, instruments, &listed)?;
     Ok(gains.into_iter().map(CandidateRow::from).collect())
 }
 
@@ -269,20 +269,20 @@ fn modes(estimate: &MachineEstimate, equations: usize) -> Result<Vec<ModeRow>, A
 fn checks(data: &ElementData, estimate: &MachineEstimate) -> Vec<CheckRow> {
     let before =
         data.findings.iter().map(|(at, finding)| (When::Before, Some(*at), finding.clone()));
-    let mut all: Vec<(When, Option<usize>, Finding)> = before.collect();
+    let mut findings: Vec<(When, Option<usize>, Finding)> = before.collect();
     let after = after_machine_fit(estimate, data.source);
-    all.extend(after.into_iter().map(|finding| (When::After, None, finding)));
+    findings.extend(after.into_iter().map(|finding| (When::After, None, finding)));
     for (at, (rows, _)) in data.lines.records().iter().enumerate() {
         let white = whiteness_of_lines(estimate, &data.lines, rows);
-        all.extend(white.into_iter().map(|finding| (When::After, Some(at), finding)));
+        findings.extend(white.into_iter().map(|finding| (When::After, Some(at), finding)));
     }
-    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
     let several = data.tests.len() > 1;
     let name = |at: usize| data.tests.get(at).filter(|_| several).map(|test| test.file.clone());
     let row = |(when, at, finding): &(When, Option<usize>, Finding)| {
         CheckRow::new(*when, at.and_then(name), finding, &data.channels)
     };
-    all.iter().map(row).collect()
+    findings.iter().map(row).collect()
 }
 
 fn notes_of(estimate: &MachineEstimate) -> impl Iterator<Item = ElementNote> {

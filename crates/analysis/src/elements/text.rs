@@ -134,23 +134,24 @@ impl ElementSummary {
             self.searches,
             significant(self.log_likelihood, 6)
         );
-        let other = |end: &mechid_estimate::likelihood::FoundMinimum| {
+        let describe = |end: &mechid_estimate::likelihood::FoundMinimum| {
             let below = 0.5 * (end.sum_of_squares - best.sum_of_squares);
             format!("{} at ln L lower by {}", end.searches, significant(below, 3))
         };
-        let others: Vec<String> = others.iter().map(other).collect();
-        match others.is_empty() {
-            true => text + "\n",
-            false => format!("{text}; {}\n", others.join(", ")),
+        let descriptions: Vec<String> = others.iter().map(describe).collect();
+        if descriptions.is_empty() {
+            text + "\n"
+        } else {
+            format!("{text}; {}\n", descriptions.join(", "))
         }
     }
 
     fn check_lines(&self) -> String {
-        let told: Vec<&CheckRow> = self.checks.iter().filter(|c| c.is_conspicuous()).collect();
-        let passed = self.checks.len() - told.len();
+        let warnings: Vec<&CheckRow> = self.checks.iter().filter(|c| c.is_conspicuous()).collect();
+        let passed = self.checks.len() - warnings.len();
         let mut text =
             format!("{passed} of {} passed\n", message::count(self.checks.len(), "check"));
-        for check in told {
+        for check in warnings {
             text += &format!("  warning: {}\n", check.sentence());
         }
         text
@@ -180,7 +181,7 @@ impl TestRow {
 }
 
 impl ElementRow {
-    /// Returns value, standard error and interval; the error tells how many digits they deserve.
+    /// Returns value, standard error and interval; the error decides the number of digits.
     pub fn cells(&self) -> [String; 3] {
         cells(&self.estimate)
     }

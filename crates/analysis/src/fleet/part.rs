@@ -73,7 +73,7 @@ impl Part {
         let mut state = format!("{}\n{}\n", env!("CARGO_PKG_VERSION"), analysis.hash());
         for file in records.chunk_by(|a, b| a.path == b.path) {
             let path = &file[0].path;
-            let stamp = FileStamp::of(path).map(|s| (s.bytes, s.modified_ns));
+            let stamp = FileStamp::read(path).map(|s| (s.bytes, s.modified_ns));
             for FleetRecord { rows, .. } in file {
                 // Quotes make the text of different paths different.
                 state += &format!("{path:?} {stamp:?} {rows:?}\n");

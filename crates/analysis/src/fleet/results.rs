@@ -34,7 +34,7 @@ pub fn read_results(folder: impl AsRef<Path>) -> Result<Results, AnalysisError> 
             .and_then(|name| name.to_str())
             .is_some_and(|name| name.starts_with("part-") && name.ends_with(".parquet"));
         if is_part {
-            let written = FileStamp::of(&path).map_or(0, |stamp| stamp.modified_ns);
+            let written = FileStamp::read(&path).map_or(0, |stamp| stamp.modified_ns);
             parts.push((written, path));
         }
     }

@@ -95,7 +95,7 @@ struct Running {
     child: Child,
     orders: Option<ChildStdin>,
     rows: Receiver<Vec<u8>>,
-    /// What the process says on its error stream.
+    /// Text of the process on its error stream.
     said: JoinHandle<String>,
 }
 
@@ -153,7 +153,7 @@ impl Worker {
         };
         let patience = Duration::try_from_secs_f64(self.isolation.record_seconds);
         let patience = patience.unwrap_or(Duration::MAX);
-        // Where the process has ended, the answer says so.
+        // If the process has ended, the answer is an error.
         if let Some(orders) = &mut running.orders {
             let _ = frames::write(orders, &order);
         }
@@ -189,7 +189,8 @@ impl Worker {
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         // Every arena of the allocator would reserve addresses, which count as memory.
         command.env("MALLOC_ARENA_MAX", "2");
-        // A backtrace needs memory, which a process that fails for lack of it waits for without end.
+        // A backtrace needs memory; a process that fails for lack of memory would wait for it for
+        // ever.
         command.env("RUST_BACKTRACE", "0");
         #[cfg(unix)]
         {
@@ -251,9 +252,9 @@ impl Running {
         (status, self.said.join().unwrap_or_default())
     }
 
-    /// Returns why a process, which may take `memory_gb` GB of memory, has ended by itself.
+    /// Returns the reason for the end of a process that may use `memory_gb` GB of memory.
     fn cause_of_end(mut self, memory_gb: f64) -> AnalysisError {
-        // Its output has ended, and it with it or soon after.
+        // The end of its output shows that the process ends, too.
         self.orders = None;
         let begun = Instant::now();
         while matches!(self.child.try_wait(), Ok(None)) && begun.elapsed() < FAREWELL {

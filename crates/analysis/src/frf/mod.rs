@@ -11,7 +11,9 @@ use std::str::FromStr;
 use mechid_signal::Window;
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use mechid_spectra::Lines;
-use mechid_spectra::frf::{Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, Segments};
+use mechid_spectra::frf::{
+    Crosstalk, Frf, FrfAverage, FrfEstimator, InterleavedResponses, Segments,
+};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use self::of_hits::average_of_hits;
@@ -163,7 +165,7 @@ fn interleaved(
         return Ok(None);
     }
     let chosen = rule.lines(&buffered.force, period)?;
-    let spectrum = Spectrum::of(&buffered.force.period_mean(period)?);
+    let spectrum = Spectrum::from_record(&buffered.force.period_mean(period)?);
     let driver = |line: &usize| -> Option<usize> {
         let amplitude = |dof: &usize| spectrum.line(*line, *dof).norm();
         let by_size = |a: &&usize, b: &&usize| amplitude(a).total_cmp(&amplitude(b));
@@ -184,7 +186,8 @@ fn interleaved(
         average(recorded, &lines, segments)
     });
     let averages: Vec<FrfAverage> = averages.collect::<Result<_, AnalysisError>>()?;
-    let OwnLines { responses, crosstalk } = OwnLines::of(&averages, how.estimator.estimator())?;
+    let InterleavedResponses { responses, crosstalk } =
+        InterleavedResponses::from_averages(&averages, how.estimator.estimator())?;
     let parts = responses.into_iter().zip(&averages).zip(&buffered.driven);
     let parts = parts.map(|((frf, average), dof)| {
         let (lines, counts) = (average.lines().clone(), vec![average.pieces()]);
@@ -304,7 +307,7 @@ impl Weight {
 
 impl Segmentation {
     /// Returns segments of this many samples, half overlapped under a Hann window.
-    pub fn of(samples: usize) -> Self {
+    pub fn with_samples(samples: usize) -> Self {
         Self { segment: Some(samples), ..Self::default() }
     }
 
@@ -390,11 +393,11 @@ impl Responses {
         }
         let noise = average.idle_inputs();
         let acting: Vec<usize> = (0..driven.len()).filter(|at| !noise.contains(at)).collect();
-        let average = average.of_inputs(&acting);
+        let average = average.with_inputs(&acting);
         let following = average.following_inputs();
         let apart: Vec<usize> =
             (0..acting.len()).filter(|at| following.iter().all(|one| one.force != *at)).collect();
-        let mut average = average.of_inputs(&apart);
+        let mut average = average.with_inputs(&apart);
         // Lines of periods were selected by the scatter of the periods, requested lines by the
         // user.
         if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
@@ -426,7 +429,7 @@ impl Responses {
 
     /// Returns the remarks on force channels that contain only noise, or only a response to another
     /// force; `record` names the record.
-    pub fn of_channels(&self, record: Option<&str>) -> Vec<String> {
+    pub fn channel_remarks(&self, record: Option<&str>) -> Vec<String> {
         let listed: Vec<String> = self.idle.iter().map(|dof| (dof + 1).to_string()).collect();
         let of_record = record.map(|record| format!("{record}: ")).unwrap_or_default();
         let forces = if listed.len() == 1 { "force" } else { "forces" };

@@ -239,7 +239,7 @@ impl FrfTable {
             frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence,
-            remarks: remarks.chain(averaged.of_channels(None)).collect(),
+            remarks: remarks.chain(averaged.channel_remarks(None)).collect(),
             analysis: how.clone(),
         }
     }

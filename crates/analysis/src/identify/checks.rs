@@ -72,7 +72,7 @@ pub(crate) fn rows(
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
         add(When::Before, Some(at), checks);
         add(When::Before, Some(at), &record.unit_findings);
-        let mut channels = of_channels(record)?;
+        let mut channels = channel_findings(record)?;
         channels.retain(|finding| !(hits && finding.subject() == Subject::Power));
         add(When::Before, Some(at), &channels);
     }
@@ -124,7 +124,7 @@ fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding
 }
 
 /// Returns the faults of the sensors, each channel checked separately.
-pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
+pub(crate) fn sensor_findings(measured: &Block) -> Vec<Finding> {
     let mut findings = clipped_channels(Quantity::Force, &measured.force);
     for (kind, motion) in measured.responses() {
         findings.extend(clipped_channels(Quantity::Response(kind), motion));
@@ -137,8 +137,8 @@ pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
 }
 
 /// Returns the faults of the channels, which do not depend on the model.
-pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
-    let mut findings = of_sensors(measured);
+pub(crate) fn channel_findings(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
+    let mut findings = sensor_findings(measured);
     findings.extend(kinematics(&measured.responses())?);
     // A measured velocity gives the power without differentiation.
     let (motion, kind) = match &measured.velocity {

@@ -1,4 +1,4 @@
-//! A fit: the estimate, how it came about, and what it leaves unexplained.
+//! A fit: the estimate, its data and settings, and its residual.
 
 use std::fmt;
 
@@ -23,31 +23,32 @@ use crate::limits::UNCERTAIN_ERROR;
 use crate::machine::NonlinearPart;
 use crate::text::{scaled_errors, significant};
 
-/// An estimate and how it came about.
+/// An estimate with its data and findings.
 #[derive(Debug)]
 pub struct Fitted {
     /// Domain of the fit.
     pub domain: Domain,
     /// Name of the estimator.
     pub estimator: &'static str,
-    /// The checks after the fit see the bias of least squares, which another method does not have.
+    /// `true` for least squares: the checks after the fit may then show its bias instead of a
+    /// fault.
     pub least_squares: bool,
-    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. It is that of one of the
-    /// systems with the same modes where equations have no scale ([`Unscaled`](super::Unscaled)).
+    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. Without a scale of
+    /// the equations it is one of the systems with the same modes ([`Unscaled`](super::Unscaled)).
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,
-    /// Factor by which the standard errors of `estimate` are larger than those of the noise.
+    /// Ratio of the standard errors of `estimate` to those that follow from the noise.
     pub error_scale: f64,
     /// Mean square error that omitted terms add to the covariance of the parameters, in the product
     /// of the units of two parameters (parameters × parameters).
     pub omitted: Option<DMatrix<f64>>,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
-    /// The spectra, if it was done in the frequency domain, and the lines of the first record.
+    /// The spectra of a fit in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
-    /// The same spectra with the noise that the scatter of their periods shows, of every record; `None` where one
-    /// has a single period, and of other fits.
+    /// The same spectra with the noise from the scatter of the periods of every record; `None` if a
+    /// record has one period, and for other fits.
     pub scattered: Option<FrequencyData>,
     /// Coherence of the frequency responses of the first record, if such were fitted.
     pub coherence: Option<ResponseCoherence>,
@@ -55,26 +56,26 @@ pub struct Fitted {
     pub before_all: Vec<Finding>,
     /// Findings before the fit, record by record.
     pub before: Vec<Vec<Finding>>,
-    /// Findings after the fit beside those on the residuals, record by record.
+    /// Findings after the fit other than those on the residuals, record by record.
     pub after: Vec<Vec<Finding>>,
     /// Findings after the fit on all records together.
     pub after_all: Vec<Finding>,
-    /// Residual of each record; empty where it is not tested by itself.
+    /// Residual of each record; empty if the residuals of single records are not tested.
     pub residuals: Vec<Residual>,
     /// Kind of prediction of the response to a measured force.
     pub prediction: Prediction,
-    /// Residual power against that of the noise, where the noise is known.
+    /// Ratio of residual power to noise power, if the noise is known.
     pub misfit: Option<Misfit>,
-    /// Noise spectra that were estimated: one of each record, or one from the residual.
+    /// Estimated noise spectra: one of each record, or one from the residual.
     pub noise: Vec<NoiseModel>,
-    /// Noise of the forces of each record, where it is not in those spectra and was allowed for.
+    /// Noise of the forces of each record, if it is not part of those spectra.
     pub force_noise: Vec<ForceNoise>,
-    /// Sinusoids of open records that were taken off.
+    /// Sinusoids that were subtracted from open records.
     pub sinusoids: Vec<SinusoidRow>,
-    /// Measured responses to draw, where others were fitted: of windows that are no periods those to the forces
-    /// alone, of segments those from which nothing is taken off.
+    /// Measured responses to draw, if others were fitted: for open records the responses to the
+    /// forces alone, for segments the averages without a correction.
     pub drawn: Option<FrequencyData>,
-    /// Remarks on how the fit was done.
+    /// Remarks on the fit.
     pub remarks: Vec<String>,
 }
 
@@ -83,11 +84,12 @@ pub struct Fitted {
 pub struct WithTerms {
     /// The estimate.
     pub estimate: NonlinearEstimate,
-    /// Evidence against a linear system in the first record, before any model; `None` of open records.
+    /// Evidence against a linear system in the first record, before any model; `None` for open
+    /// records.
     pub distortion: Option<Distortion>,
-    /// Points of the restoring-force surface of the first record; `None` of open records.
+    /// Points of the restoring-force surface of the first record; `None` for open records.
     pub restoring: Option<RestoringForce>,
-    /// Selection of terms; `None` where there were no candidates.
+    /// Selection of terms; `None` without candidates.
     pub selection: Option<SelectionSummary>,
 }
 
@@ -107,7 +109,7 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// Residual of a fit, as it is tested.
+/// Residual of a fit in the form that its tests use.
 #[derive(Debug)]
 pub enum Residual {
     /// Samples.
@@ -121,23 +123,23 @@ pub enum Residual {
 pub struct SampleResidual {
     /// Residual, samples × degrees of freedom.
     pub samples: Record,
-    /// The fitted signal, used to tell rounding from noise.
+    /// The fitted signal, used to distinguish rounding from noise.
     pub fitted: Record,
     /// Force, samples × degrees of freedom, in N.
     pub force: Record,
-    /// Lags over which noise on the motion correlates it.
+    /// Lags over which noise on the response correlates the residual.
     pub noise_span: usize,
 }
 
 impl SampleResidual {
-    /// Returns the number of lags at which it is correlated; 0 if it has too few samples.
+    /// Returns the number of lags for the tests; 0 if there are too few samples.
     pub(crate) fn lags(&self) -> usize {
         LAGS.min(self.samples.len().saturating_sub(self.noise_span) / SAMPLES_PER_LAG)
     }
 }
 
 impl Fitted {
-    /// Creates what every fit has; what some have in addition is empty.
+    /// Creates a fit with the parts that every fit has; the others are empty.
     pub(super) fn new(
         domain: Domain,
         estimator: &'static str,
@@ -171,12 +173,13 @@ impl Fitted {
         }
     }
 
-    /// Returns a remark where so few equations are to spare that the standard errors are hardly known.
+    /// Returns a remark if the fit has so few degrees of freedom that the standard errors are
+    /// uncertain.
     pub(crate) fn few_equations(&self) -> Option<String> {
         let unknowns = self.estimate.unknowns();
         let of_one = unknowns.independent().div_ceil(unknowns.dof().max(1));
         let spare = self.equations.saturating_sub(of_one);
-        // Relative standard deviation of the root of a mean of squares of as many values.
+        // Relative standard deviation of the root mean square of `spare` values.
         let error = 1.0 / (2.0 * spare as f64).sqrt();
         (error > UNCERTAIN_ERROR).then(|| {
             format!(
@@ -189,13 +192,13 @@ impl Fitted {
         })
     }
 
-    /// Makes the standard errors larger where the checks show that the data disagree beyond their noise: by the scatter
-    /// of their parts, or the size of the residual. With nonlinear terms they stay as they are.
+    /// Scales the standard errors if the checks show more disagreement of the data than noise: by
+    /// the scatter of the parts, or the size of the residual. A significant omitted term adds its
+    /// effect. With nonlinear terms the errors remain.
     ///
     /// # Source
-    /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle Physics*, introduction.
-    ///
-    /// What a term left out would change comes to that.
+    /// Birge (1932), Physical Review 40, 207–227; Particle Data Group, *Review of Particle
+    /// Physics*, introduction.
     pub(super) fn scale_errors(&mut self, checks: &[CheckRow]) -> Result<(), AnalysisError> {
         self.scale_by_parts(checks);
         let is_left_out = |check: &CheckRow| {
@@ -216,15 +219,15 @@ impl Fitted {
             Finding::Misfit(misfit) => Some((misfit.ratio.sqrt(), spare)),
             _ => None,
         };
-        let told = checks.iter().filter(|check| check.is_conspicuous()).filter_map(of_check);
-        let Some((scale, degrees)) = told.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let scalings = checks.iter().filter(|check| check.is_conspicuous()).filter_map(of_check);
+        let Some((scale, degrees)) = scalings.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         if scale > 1.0 && self.nonlinear.is_none() {
             self.estimate = self.estimate.clone().with_error_scale(scale, degrees);
             self.error_scale = scale;
         }
     }
 
-    /// Returns a remark on standard errors that are larger than those of the noise.
+    /// Returns a remark on scaled standard errors.
     pub(super) fn scaled_errors(&self, checks: &[CheckRow]) -> Option<String> {
         let scales = |check: &&CheckRow| {
             matches!(check.finding, Finding::Misfit(_) | Finding::PartsAgreement(_))
@@ -235,7 +238,7 @@ impl Fitted {
         (self.error_scale > 1.0).then(|| scaled_errors(self.error_scale, &names.join(", ")))
     }
 
-    /// Returns a remark on standard errors that count a term left out.
+    /// Returns a remark on standard errors that include the effect of an omitted term.
     pub(super) fn counted_term(&self) -> Option<String> {
         self.omitted.as_ref().map(|_| {
             "standard errors and intervals count what the term that the model leaves out would change (see alternative)"
@@ -243,7 +246,7 @@ impl Fitted {
         })
     }
 
-    /// Returns the system that was fitted, which has the responses to the forces that acted.
+    /// Returns the fitted system.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
@@ -267,30 +270,32 @@ impl Fitted {
         Ok(Some(NonlinearPart { uncertain, channels, largest_displacement }))
     }
 
-    /// Residual of the equations over their right-hand sides, all degrees of freedom together.
+    /// Returns the RMS of the residual of the equations over that of their right-hand sides, all
+    /// degrees of freedom together.
     pub(crate) fn nrmse(&self) -> f64 {
-        let each = self.estimate.residual_nrmse();
-        (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
+        let residuals = self.estimate.residual_nrmse();
+        (residuals.iter().map(|e| e * e).sum::<f64>() / residuals.len() as f64).sqrt()
     }
 
-    /// Returns whether the response was fitted, weighted by its noise, and not the force.
+    /// Returns whether the fit is of the response, weighted by its noise, and not of the force.
     pub(crate) fn fits_response(&self) -> bool {
         let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
         !self.noise.is_empty() || (noise_stated && !self.least_squares)
     }
 
-    /// RMS of measured minus modelled response over RMS of the measured response, on the lines used:
-    /// in the quantity measured or, where the fit was weighted by the noise, in units of the noise.
+    /// Returns the RMS of measured minus modelled response over the RMS of the measured response,
+    /// on the lines used: in the measured quantity or, if the fit was weighted, in units of the
+    /// noise.
     ///
     /// # Errors
-    /// If the model has no receptance at a line.
+    /// [`AnalysisError::Model`] if the model has no receptance at a line.
     pub(crate) fn unexplained_motion(
         &self,
         system: &SecondOrderSystem,
     ) -> Result<Option<f64>, AnalysisError> {
         if let Some(WithTerms { estimate, .. }) = &self.nonlinear {
-            let each = estimate.unexplained();
-            let mean = each.iter().map(|part| part * part).sum::<f64>() / each.len() as f64;
+            let parts = estimate.unexplained();
+            let mean = parts.iter().map(|part| part * part).sum::<f64>() / parts.len() as f64;
             return Ok(Some(mean.sqrt()));
         }
         match &self.frequency {
@@ -300,8 +305,8 @@ impl Fitted {
     }
 }
 
-/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data,
-/// weighted by the noise where it is known; `None` if nothing moves.
+/// Returns the RMS of measured minus modelled response over the RMS of the measured response, at
+/// the frequencies of the data, weighted by the noise if it is known; `None` without a response.
 pub(super) fn unexplained_motion(
     data: &FrequencyData,
     system: &SecondOrderSystem,
@@ -310,7 +315,7 @@ pub(super) fn unexplained_motion(
     for (row, omega) in data.omega().iter().enumerate() {
         let measured = data.displacement().row(row).transpose();
         let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
-        // A displacement weighs low lines most, whatever their noise.
+        // Low lines would have too much weight as displacements.
         let quantity = data.measured().per_displacement(*omega).norm_sqr();
         for channel in 0..data.dof() {
             let weight = match data.noise() {

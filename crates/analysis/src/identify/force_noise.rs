@@ -46,7 +46,7 @@ impl ForceNoise {
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] unless one level is stated for all forces, or one for each.
-    pub(super) fn of(
+    pub(super) fn from_record(
         held: &Block,
         stated: Option<&[f64]>,
         hit: Option<&HitNoise>,

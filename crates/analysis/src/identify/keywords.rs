@@ -488,11 +488,11 @@ mod tests {
             ),
             (
                 r#"{"from_frf": "h1", "segment": 256}"#,
-                Identify::responses(Estimator::H1, Segmentation::of(256)),
+                Identify::responses(Estimator::H1, Segmentation::with_samples(256)),
             ),
             (
                 r#"{"from_frf": "h1", "segment": "256:50:hann"}"#,
-                Identify::responses(Estimator::H1, Segmentation::of(256)),
+                Identify::responses(Estimator::H1, Segmentation::with_samples(256)),
             ),
             (
                 r#"{"band_hz": [40, 120.5], "mass": 3}"#,

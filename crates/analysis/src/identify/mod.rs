@@ -110,9 +110,9 @@ pub const CONSPICUOUS: f64 = 0.05;
 /// Several records are fitted together; they need the same columns, but not the same length.
 ///
 /// # Errors
-/// [`AnalysisError::NoRecord`]; [`AnalysisError::Unfit`] if the fit fails and the checks of its data
-/// say why, otherwise that failure as it is; what the settings of `how` cannot be done with, such as
-/// [`AnalysisError::TimeDomainMotions`]; and if a file cannot be read again.
+/// [`AnalysisError::NoRecord`]; [`AnalysisError::Unfit`] if the fit fails and the checks of its
+/// data explain why, otherwise that failure; errors of the settings, such as
+/// [`AnalysisError::TimeDomainMotions`]; and [`AnalysisError::Io`] if a file cannot be read again.
 pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
     let hold = how.hold();
     let records = measurements.iter().map(|measured| measured.hold(hold));
@@ -137,9 +137,10 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     counts::check(how, &records, &unknowns, period_given)?;
     let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given, &hit_noise);
     let driven: Vec<usize> = records.iter().flat_map(|r| r.held.driven.iter().copied()).collect();
-    let fitted = match how.finds_modes_alone() {
-        true => Unscaled::or_fitted(&unknowns, &driven, fit),
-        false => fit(&unknowns).map(|fitted| (fitted, None)),
+    let fitted = if how.finds_modes_alone() {
+        Unscaled::or_fitted(&unknowns, &driven, fit)
+    } else {
+        fit(&unknowns).map(|fitted| (fitted, None))
     };
     let is_linear = !matches!(how.source, Source::Terms(_));
     let (mut fitted, unscaled) = fitted.map_err(|error| {
@@ -151,7 +152,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let causes = [Subject::Delay, Subject::Linearity];
     let is_named = |check: &CheckRow| check.is_conspicuous() && causes.contains(&check.subject);
     let is_unexplained = summary.fit.unexplained_motion > Some(CONSPICUOUS);
-    // A cause that is named needs no other, and the search for modes takes seconds.
+    // The search for modes takes seconds and is omitted if a check has named the cause.
     if is_linear && is_unexplained && !summary.checks.iter().any(is_named) {
         summary.remarks.extend(resonances::surplus(measurements));
     }
@@ -181,7 +182,8 @@ fn with_surplus(failure: AnalysisError, surplus: Option<String>) -> AnalysisErro
     }
 }
 
-/// Returns the failure of a fit that lacks equations with the number of lines that the force drives as a reason.
+/// Returns the failure of a fit with too few equations, with the number of excited lines as a
+/// reason.
 fn with_few_lines(failure: AnalysisError, records: &[Windowed], how: &Identify) -> AnalysisError {
     let (error, reasons) = match failure {
         AnalysisError::Estimate(error) => (error, None),
@@ -203,7 +205,7 @@ fn with_few_lines(failure: AnalysisError, records: &[Windowed], how: &Identify) 
     }
 }
 
-/// An identified machine, and what it was identified from.
+/// An identified machine with its records.
 ///
 /// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
 #[derive(Debug)]
@@ -216,7 +218,7 @@ pub struct Identified {
 }
 
 impl Identify {
-    /// Returns how much of a record must be held in memory to fit it.
+    /// Returns the part of a record that must be in memory for the fit.
     pub(crate) fn hold(&self) -> Hold {
         match &self.source {
             Source::Spectra(_) | Source::Periods(_) => Hold::Periods,
@@ -226,13 +228,14 @@ impl Identify {
         }
     }
 
-    /// Returns whether modes are found where M, C and K have no scale: those of linear systems, from spectra
-    /// and frequency responses.
+    /// Returns whether modes can be identified without the scale of M, C and K: for linear systems,
+    /// from spectra and frequency responses.
     fn finds_modes_alone(&self) -> bool {
         !matches!(self.source, Source::Terms(_) | Source::Samples(_))
     }
 
-    /// Refuses the period of a record that is fitted as an open one, and noise that it has not.
+    /// Returns an error for a period of an open record, and for noise that an open record does not
+    /// show.
     fn check_open(&self, period_given: bool) -> Result<(), AnalysisError> {
         let (noise, setting, of_period) = match &self.source {
             Source::Hits(how) => {
@@ -309,8 +312,8 @@ impl Identified {
         &self.summary
     }
 
-    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part.
-    /// They are those of one of the systems with the same modes where equations have no scale
+    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear
+    /// part. Without a scale of the equations it is one of the systems with the same modes
     /// ([`IdentificationSummary::unscaled`]).
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate
@@ -333,15 +336,15 @@ impl Identified {
     /// Returns the identified system; with nonlinear terms, its linear part.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined, [`AnalysisError::Unscaled`] if
-    /// they give its modes alone.
+    /// [`AnalysisError::Estimate`] if the data do not determine a parameter,
+    /// [`AnalysisError::Unscaled`] if they determine the modes alone.
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
         self.check_scale()?;
         Ok(self.fitted.estimate.system()?)
     }
 
-    /// Returns the covariance of the parameters that were estimated, whatever their number; with nonlinear
-    /// terms, of theirs, too.
+    /// Returns the covariance of the estimated parameters for any number of them, including those
+    /// of nonlinear terms.
     pub fn covariance(&self) -> ParameterCovariance {
         summary::covariance(&self.fitted, self.summary.unscaled.as_ref())
     }
@@ -350,8 +353,8 @@ impl Identified {
         Unscaled::check(self.summary.unscaled.as_ref())
     }
 
-    /// Returns the identified system with the covariance of its parameters, for the reconstruction of
-    /// a force.
+    /// Returns the identified system with the covariance of its parameters, for the reconstruction
+    /// of a force.
     ///
     /// # Errors
     /// As [`Identified::system`].
@@ -360,7 +363,7 @@ impl Identified {
         Ok(Machine {
             nonlinear: self.fitted.nonlinear_part()?,
             names: self.names().clone(),
-            ..Machine::of_estimate(&self.fitted.estimate)?
+            ..Machine::from_estimate(&self.fitted.estimate)?
         })
     }
 
@@ -369,7 +372,7 @@ impl Identified {
         &self.summary.checks
     }
 
-    /// Returns what in the numbers themselves speaks against them, a sentence each.
+    /// Returns doubts that follow from the numbers themselves, a sentence each.
     pub fn doubts(&self) -> Vec<String> {
         self.summary.doubts()
     }
@@ -381,13 +384,13 @@ impl Identified {
 
     /// Predicts a record that was not fitted, and adds the result to [`Identified::summary`].
     ///
-    /// The window of `other` is predicted; a steady state over whole periods, anything else from the
-    /// start that fits it best.
+    /// Predicts the window of `other`: a steady state over whole periods, any other response from
+    /// the initial state that fits it best.
     ///
     /// # Errors
-    /// [`AnalysisError::DegreesOfFreedom`] if the record has another number of them,
-    /// [`AnalysisError::Diverges`] if the identified system is unstable, [`AnalysisError::Unscaled`] if a
-    /// force acts there to which the response is not known.
+    /// [`AnalysisError::DegreesOfFreedom`] if the record has another number of degrees of
+    /// freedom, [`AnalysisError::Diverges`] if the identified system is unstable,
+    /// [`AnalysisError::Unscaled`] if the response to one of the forces is not known.
     pub fn add_validation(&mut self, other: &Measurement) -> Result<(), AnalysisError> {
         let (validation, held) = self.predict(other)?;
         if held.file != self.summary.file {
@@ -398,11 +401,11 @@ impl Identified {
         Ok(())
     }
 
-    /// Adds every line of the fit to [`Identified::summary`]: force, measured and fitted response with their
-    /// standard errors, and the residual.
+    /// Adds every line of the fit to [`Identified::summary`]: force, measured and fitted response
+    /// with their standard errors, and the residual.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] of a fit in the time domain or with nonlinear terms.
+    /// [`AnalysisError::Setting`] for a fit in the time domain or with nonlinear terms.
     pub fn add_fitted_lines(&mut self) -> Result<(), AnalysisError> {
         let refused =
             |why: &str| Err(AnalysisError::Setting { setting: "fitted_lines", why: why.into() });
@@ -419,8 +422,8 @@ impl Identified {
         Ok(())
     }
 
-    /// Predicts a record that was not fitted: returns how much of each channel is predicted, in per
-    /// cent.
+    /// Predicts a record that was not fitted, and returns the predicted part of each channel, in
+    /// per cent.
     ///
     /// # Errors
     /// As [`Identified::add_validation`].
@@ -439,15 +442,15 @@ impl Identified {
         if let Some(unscaled) = &self.summary.unscaled {
             unscaled.check_forces(&record.held.driven)?;
         }
-        let validation = Validation::of(&record, &self.fitted.model()?, prediction)?;
+        let validation = Validation::new(&record, &self.fitted.model()?, prediction)?;
         Ok((validation, record.into_held()))
     }
 
-    /// Returns the window of a record to predict, in keeping with how the machine was identified:
-    /// whole periods of a steady state as of the record fitted, otherwise any samples.
+    /// Returns the window of a record to predict: whole periods if the fitted record was a steady
+    /// state, otherwise any samples.
     ///
     /// # Errors
-    /// [`AnalysisError::ValidationPeriod`] if the samples are less than a period of a steady state,
+    /// [`AnalysisError::ValidationPeriod`] if a steady state has fewer samples than a period,
     /// [`AnalysisError::Window`] if the record does not have them.
     pub fn validation_window(
         &self,
@@ -466,7 +469,7 @@ impl Identified {
         self.validated.as_ref()
     }
 
-    /// Returns how the fit was done, and what it leaves.
+    /// Returns the fit with its data, findings and residual.
     pub fn fitted(&self) -> &Fitted {
         &self.fitted
     }
@@ -489,7 +492,7 @@ impl Identified {
         self.fitted.prediction.predict(&self.fitted.model()?, &self.records[0].held)
     }
 
-    /// Returns how the response of the identified system to a record is predicted.
+    /// Returns the kind of prediction of the response to a measured force.
     pub fn prediction(&self) -> Prediction {
         self.fitted.prediction
     }
@@ -499,8 +502,9 @@ impl Identified {
         self.fitted.frequency.as_ref().map(|(_, data)| data)
     }
 
-    /// Returns the spectra to draw: of open records the responses to the forces alone, of segments their averages as
-    /// measured, otherwise those fitted; `None` for a fit in the time domain.
+    /// Returns the spectra to draw: for open records the responses to the forces alone, for
+    /// segments their averages as measured, otherwise the fitted spectra; `None` for a fit in the
+    /// time domain.
     pub fn drawn_spectra(&self) -> Option<&mechid_spectra::FrequencyData> {
         self.fitted.drawn.as_ref().or_else(|| self.spectra())
     }
@@ -518,16 +522,17 @@ impl Serialize for Identified {
     }
 }
 
-/// Adds what the checks of the channels say to the failure of a fit.
+/// Adds the findings on the channels to the failure of a fit.
 fn explained(error: AnalysisError, records: &[Windowed]) -> AnalysisError {
     let AnalysisError::Estimate(error) = error else { return error };
-    let seen = records.iter().flat_map(|record| {
-        let findings = checks::of_channels(&record.held).unwrap_or_default();
+    let sentences = records.iter().flat_map(|record| {
+        let findings = checks::channel_findings(&record.held).unwrap_or_default();
         findings.into_iter().map(|finding| checks::sentence(&finding, &record.held.names))
     });
-    let reasons: Vec<String> = seen.collect();
-    match reasons.is_empty() {
-        true => AnalysisError::Estimate(error),
-        false => AnalysisError::Unfit { error, reasons: reasons.join("; ") },
+    let reasons: Vec<String> = sentences.collect();
+    if reasons.is_empty() {
+        AnalysisError::Estimate(error)
+    } else {
+        AnalysisError::Unfit { error, reasons: reasons.join("; ") }
     }
 }

@@ -339,14 +339,14 @@ fn estimated(
 fn finding(misfit: mechid_nonlinear::Misfit) -> Finding {
     Finding::Misfit(mechid_checks::Misfit {
         ratio: misfit.ratio,
-        p_value: PValue::of(misfit.p_value),
+        p_value: PValue::new(misfit.p_value),
         source: NoiseSource::Periods,
         concentration: None,
     })
 }
 
 impl NonlinearSummary {
-    pub(super) fn of(fitted: &WithTerms) -> Result<Self, AnalysisError> {
+    pub(super) fn from_fit(fitted: &WithTerms) -> Result<Self, AnalysisError> {
         let WithTerms { estimate: fit, distortion, selection, .. } = fitted;
         let linear = fit.linear().parameters().len();
         let ranges = fit.ranges().iter().map(|range| Some(*range));

@@ -1,4 +1,4 @@
-//! Fits of the spectral lines of records that are no periods, such as those of random tests.
+//! Fits of the spectral lines of open records, such as those of random tests.
 
 use std::ops::Range;
 
@@ -24,34 +24,37 @@ use super::left_out::LineRule;
 use super::lines::LineChoice;
 use super::options::OpenNoise;
 use super::prediction::Prediction;
-use super::remarks::{of_noise, one_motion_of};
+use super::remarks::{noise_remark, one_motion_of};
 use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
 use crate::hits::HitNoise;
 use crate::measurement::{Block, Windowed};
 
-/// Probability with which the ends of a period look as if they showed.
+/// Significance level of the test for transients; a record of whole periods is called open with
+/// this probability.
 const LEVEL: f64 = 1e-3;
-/// Power of the ends over that of the force below which they are rounding.
+/// Ratio of transient power to force power that counts as rounding; a larger one is a transient.
 const ROUNDING: f64 = 1e-20;
 
-/// Most lines and unknown parameters for which a record is tried as an open one without being asked to, and most lines
-/// times parameters: an eighth of that, of two forces, takes ten seconds of one processor.
+/// Maximum number of lines for which a record without settings is tried as an open one. An eighth
+/// of the product of all three limits, with two forces, takes ten seconds of one processor.
 const LINES: usize = 1 << 19;
+/// Maximum number of unknown parameters for such a trial.
 const PARAMETERS: usize = 100;
+/// Maximum product of lines and unknown parameters for such a trial.
 const SENSITIVITIES: usize = 100 << 17;
 
-/// Sampling rate over the highest frequency that an anti-aliasing filter passes, and up to which the lines of an
-/// open record are used where no others are asked for.
+/// Ratio of sampling rate to the highest frequency that an anti-aliasing filter passes: the upper
+/// end of the band of an open record if no band is given.
 ///
 /// # Source
-/// The custom of analysers; what the ends of a record fold back grows beyond.
+/// The custom of analysers; the aliases of the transient grow above this frequency.
 const RATE_OVER_BAND: f64 = 2.56;
 
 /// Force of open records.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Excitation<'a> {
-    /// Force all the time, of which the test for nonlinearity takes powers of the response.
+    /// Force during the whole record; the test for nonlinearity uses powers of the response.
     Lasting,
     /// A hit in each record, with the noise of its force.
     Hits(&'a [HitNoise]),
@@ -103,9 +106,9 @@ impl OpenSpectra {
                 Excitation::Lasting => None,
                 Excitation::Hits(noise) => noise.get(at),
             };
-            let force_noise = ForceNoise::of(held, force, hit)?;
+            let force_noise = ForceNoise::from_record(held, force, hit)?;
             let data = FrequencyData::read(&lines, &held.force, motion, kind)?
-                .of_open_record(held.force.sampling());
+                .as_open_record(held.force.sampling());
             let data = acquisition.uncoupled(force_noise.known_to(data, held)?, held)?;
             of_force.push(force_noise);
             spectra.push((data, lines));
@@ -114,19 +117,19 @@ impl OpenSpectra {
         Ok(Self { data, lines, force_noise: of_force })
     }
 
-    /// Takes off the sinusoids that were found.
+    /// Subtracts the estimated sinusoids.
     fn without_sinusoids(&mut self, fit: &OutputErrorFit) {
         if fit.sinusoids.is_empty() {
             return;
         }
-        let each = self.data.iter().zip(&fit.sinusoids);
-        self.data = each
+        let pairs = self.data.iter().zip(&fit.sinusoids);
+        self.data = pairs
             .map(|(data, sinusoids)| data.without_sinusoids(std::slice::from_ref(sinusoids)))
             .collect();
     }
 }
 
-/// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
+/// Fits all lines of the excited band by maximum likelihood, together with the transient of every
 /// record.
 pub(super) fn fit(
     records: &[Windowed],
@@ -136,56 +139,46 @@ pub(super) fn fit(
     let How { noise, acquisition, excitation, .. } = how;
     let mut spectra = OpenSpectra::read(records, how)?;
     let dt = records[0].held.force.sampling().dt();
-    let all = joined(&spectra.data)?;
-    let fit = output_error_pooling(&all, unknowns, noise.response)
-        .map_err(|error| with_delay(error, &all, dt, unknowns))?;
+    let joint = joined(&spectra.data)?;
+    let fit = output_error_pooling(&joint, unknowns, noise.response)
+        .map_err(|error| with_delay(error, &joint, dt, unknowns))?;
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
     spectra.without_sinusoids(&fit);
     let OpenSpectra { data, lines, force_noise } = spectra;
-    let (closed, alone) = match &fit.ends {
-        Some(ends) => (
-            ends.without_transients(&data)?,
-            ends.without_transient_responses(&data, &fit.estimate.system()?)?,
-        ),
-        None => (data.clone(), data.clone()),
-    };
+    let (closed, alone) = without_transients(&fit, &data)?;
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
-    let explains = |finding: &Finding| {
-        finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
-    };
-    let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
-    let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
+    let late = delay_of_open_records(&data, dt, unknowns, &fit, follows_force(&residuals));
     let Compared { parts, omitted } = if residuals.iter().any(SpectralResidual::is_rounding) {
         Compared::default()
     } else {
         agreement(&data, &fit, excitation)?
     };
-    let fault = match excitation {
-        Excitation::Lasting => {
-            fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?
-        }
-        // The noise of a pulse makes its lines err together, which the score does not know.
-        Excitation::Hits(_) => None,
+    // The noise of a pulse correlates its lines, which the score test does not allow for.
+    let fault = if matches!(excitation, Excitation::Hits(_)) {
+        None
+    } else {
+        fault_of_acquisition(&closed, &residuals, dt, &fit.estimate, Extent::Open)?
     };
-    let each = records.iter().zip(&fit.sinusoids).enumerate();
-    let sinusoids: Vec<SinusoidRow> =
-        each.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect();
-    let all = joined(&closed)?;
+    let sinusoids = sinusoid_rows(records, &fit);
+    let joint = joined(&closed)?;
     let prediction = Prediction::Sampled {
         discretisation: acquisition.between_samples.unwrap_or(Discretisation::FirstOrderHold),
         extent: Extent::Open,
     };
     let fitted = Fitted {
-        equations: 2 * all.len(),
-        before_all: before_spectral_fit(&all, unknowns)?,
+        equations: 2 * joint.len(),
+        before_all: before_spectral_fit(&joint, unknowns)?,
         before: vec![Vec::new(); records.len()],
         after: after(records, &lines, &closed, &fit.estimate, excitation)?,
-        frequency: lines.into_iter().next().map(|lines| (lines, all)),
+        frequency: lines.into_iter().next().map(|lines| (lines, joint)),
         after_all: bias.into_iter().chain(likelier(late, fault)).chain(parts).collect(),
         omitted,
-        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
+        residuals: residuals
+            .into_iter()
+            .map(|residual| Residual::Lines(Box::new(residual)))
+            .collect(),
         remarks: remarks(records, &fit, &force_noise, &sinusoids, excitation),
         noise: fit.noise,
         force_noise,
@@ -201,15 +194,40 @@ pub(super) fn fit(
     Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
 }
 
-/// Compares the records or, of one alone, its stretches of time, and the bands of lines. Looks for terms that the model
-/// leaves out.
+/// Returns the data without the transients of forces and responses, and those with the responses to
+/// the forces alone.
+fn without_transients(
+    fit: &OutputErrorFit,
+    data: &[FrequencyData],
+) -> Result<(Vec<FrequencyData>, Vec<FrequencyData>), AnalysisError> {
+    let Some(ends) = &fit.ends else { return Ok((data.to_vec(), data.to_vec())) };
+    let alone = ends.without_transient_responses(data, &fit.estimate.system()?)?;
+    Ok((ends.without_transients(data)?, alone))
+}
+
+/// Returns whether a residual is correlated with a force.
+fn follows_force(residuals: &[SpectralResidual]) -> bool {
+    let is_correlated = |finding: &Finding| {
+        finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
+    };
+    residuals.iter().any(|residual| residual.findings().iter().any(is_correlated))
+}
+
+/// Returns the sinusoids of all records.
+fn sinusoid_rows(records: &[Windowed], fit: &OutputErrorFit) -> Vec<SinusoidRow> {
+    let pairs = records.iter().zip(&fit.sinusoids).enumerate();
+    pairs.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect()
+}
+
+/// Compares the records and the bands of lines, and tests terms that the model omits. A single
+/// record is divided into stretches of time.
 fn agreement(
     data: &[FrequencyData],
     fit: &OutputErrorFit,
     excitation: Excitation<'_>,
 ) -> Result<Compared, AnalysisError> {
-    let all = joined(data)?;
-    let parts = PartsOfFit::new(&all, &fit.estimate, fit.ends.as_ref(), Some(&fit.spectrum));
+    let joint = joined(data)?;
+    let parts = PartsOfFit::new(&joint, &fit.estimate, fit.ends.as_ref(), Some(&fit.spectrum));
     let first = match (data, excitation) {
         ([_], Excitation::Lasting) => Some(Split::Time),
         ([_], Excitation::Hits(_)) => None,
@@ -230,7 +248,7 @@ fn agreement(
     }))
 }
 
-/// Rows of each record among those of all.
+/// Returns the rows of each record in the joint data.
 pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
     let mut first = 0;
     let rows = records.iter().map(|data| {
@@ -241,7 +259,7 @@ pub(super) fn rows_of(records: &[FrequencyData]) -> Vec<Vec<Range<usize>>> {
     rows.collect()
 }
 
-/// Returns that of two explanations of a residual which leaves less of its power.
+/// Returns the explanation of a residual that reduces its power most.
 fn likelier(one: Option<Finding>, other: Option<Finding>) -> Option<Finding> {
     let remaining = |finding: &Finding| match finding {
         Finding::Delay(delay) => delay.remaining,
@@ -306,7 +324,7 @@ fn remarks(
         records.iter().map(|record| &record.held).zip(force_noise).collect();
     one_motion_of(&records[0].held)
         .into_iter()
-        .chain([of_ends, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)])
+        .chain([of_ends, noise_remark(1, false, &fit.noise), ForceNoise::remark(&known)])
         .chain(SinusoidRow::remark(sinusoids))
         .collect()
 }
@@ -315,7 +333,8 @@ fn show(ends: &EndLoads) -> bool {
     ends.p_value() < LEVEL && ends.share > ROUNDING
 }
 
-/// All lines between the first and the last that the rule chooses: the ends show in how neighbouring lines differ.
+/// Returns all lines between the first and the last one chosen by the rule, because transients show
+/// in the differences between neighbouring lines.
 fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let chosen = rule.lines(&held.force, held.force.len())?;
     let (Some(&first), Some(&last)) = (chosen.first(), chosen.last()) else { return Ok(chosen) };
@@ -329,11 +348,11 @@ fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     rule.without.keep((first..=last).collect(), held.force.sampling())
 }
 
-/// The rows of all records.
+/// Returns the rows of all records.
 pub(super) fn joined(records: &[FrequencyData]) -> Result<FrequencyData, AnalysisError> {
-    let mut all = records[0].clone();
+    let mut joint = records[0].clone();
     for record in &records[1..] {
-        all = all.and(record)?;
+        joint = joint.and(record)?;
     }
-    Ok(all)
+    Ok(joint)
 }

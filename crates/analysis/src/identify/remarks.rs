@@ -6,7 +6,7 @@ use crate::measurement::Block;
 
 /// Returns the remark on weights from the scatter of `periods` periods; `shows` states whether the
 /// scatter shows the noise.
-pub(super) fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
+pub(super) fn noise_remark(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
     let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
     distinct.dedup();
     let model = distinct.join("; ");

@@ -28,11 +28,12 @@ use crate::frf::Responses;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Standard errors by which the window of segments moves a parameter before the result says so.
+/// Minimum change of a parameter by the correction of the window, in standard errors, for a remark.
 const BLUNTED: f64 = 0.5;
 
 /// Fits the frequency responses of one or several records, weighted by their coherence unless least
-/// squares is asked for. The length of segments that is not given, nor a period, is chosen for the first record.
+/// squares is requested. Without a period and a length of segments, the length is chosen for the
+/// first record.
 ///
 /// # Errors
 /// [`AnalysisError::InstrumentalResponses`] for instrumental variables.
@@ -53,40 +54,23 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // Says what the data leave open, before anything is made of it.
+    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
-    let modes = estimate.modes()?;
-    let (mut before, mut after, mut misfit) = (Vec::new(), Vec::new(), misfit);
-    for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
-        let mut checks = Vec::from_iter(coherence(&r.frf));
-        if periodic {
-            checks.extend(claimed_period(&held.force, held.period));
-        }
-        let mut looked = looked_at(held, r, unknowns, &estimate, data.len(), periodic)?;
-        looked.extend(leakage(&r.frf, &modes, settled));
-        // What differs between windows that are no periods is no noise.
-        if checks.iter().any(no_period) {
-            looked.retain(|finding| finding.subject() != Subject::Misfit);
-            misfit = None;
-        }
-        before.push(checks);
-        after.push(looked);
-    }
+    let scope = Scope { unknowns, estimate: &estimate, rows: data.len(), periodic, settled };
+    let Findings { before, after, repeats } = findings(records, &responses, &scope)?;
     let Compared { parts, omitted } = match *method {
         Some(Method::LeastSquares) => Compared::default(),
         _ => agreement(&responses, &data, &estimate)?,
     };
     let of_motion = one_motion_of(&records[0].held).into_iter();
-    let remarks = of_motion.chain(of_averages(records, &responses)).chain(remark);
+    let remarks = of_motion.chain(average_remarks(records, &responses)).chain(remark);
     let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
-    let prediction = match periodic {
-        true => Prediction::Steady,
-        false => Prediction::Sampled {
-            discretisation: Discretisation::FirstOrderHold,
-            extent: Extent::Open,
-        },
+    let prediction = if periodic {
+        Prediction::Steady
+    } else {
+        Prediction::Sampled { discretisation: Discretisation::FirstOrderHold, extent: Extent::Open }
     };
     Ok(Fitted {
         least_squares: *method == Some(Method::LeastSquares),
@@ -98,14 +82,15 @@ pub fn fit(
         after,
         after_all: parts,
         omitted,
-        misfit,
+        misfit: misfit.filter(|_| repeats),
         drawn: Some(measured),
         remarks,
         ..Fitted::new(Domain::Frequency, name, prediction, estimate)
     })
 }
 
-/// Compares the bands of lines and, of several, the records. Looks for terms that the model leaves out.
+/// Compares the bands of lines and the records, if there are several, and tests terms that the
+/// model omits.
 fn agreement(
     responses: &[Responses],
     data: &FrequencyData,
@@ -115,9 +100,9 @@ fn agreement(
         responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
     let mut splits = vec![(Split::Bands, RowParts::Records)];
     if records.len() > 1 {
-        let each = records.iter().map(|(frf, driven)| frf.data(driven));
-        let each: Vec<FrequencyData> = each.collect::<Result<_, _>>()?;
-        splits.push((Split::Rows(rows_of(&each)), RowParts::Records));
+        let averages = records.iter().map(|(frf, driven)| frf.data(driven));
+        let averages: Vec<FrequencyData> = averages.collect::<Result<_, _>>()?;
+        splits.push((Split::Rows(rows_of(&averages)), RowParts::Records));
     }
     let parts = PartsOfFit::from_responses(data, &records, estimate);
     Ok(parts
@@ -125,10 +110,10 @@ fn agreement(
 }
 
 /// Returns remarks on the averages of several records, and on their channels.
-fn of_averages(records: &[Windowed], responses: &[Responses]) -> Vec<String> {
+fn average_remarks(records: &[Windowed], responses: &[Responses]) -> Vec<String> {
     let of_channels = records.iter().zip(responses).flat_map(|(recorded, r)| {
         let file = (records.len() > 1).then_some(recorded.held.file.as_str());
-        r.of_channels(file)
+        r.channel_remarks(file)
     });
     let segments_of: Vec<String> = responses.iter().map(|r| r.counts[0].to_string()).collect();
     let of_segments = format!(
@@ -142,10 +127,10 @@ fn of_averages(records: &[Windowed], responses: &[Responses]) -> Vec<String> {
 
 /// The responses of all records, one after the other.
 fn joined(responses: &[Responses]) -> Result<FrequencyData, AnalysisError> {
-    let mut all: Vec<FrequencyData> =
+    let mut remaining: Vec<FrequencyData> =
         responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
-    let first = all.remove(0);
-    Ok(all.iter().try_fold(first, |data, next| data.and(next))?)
+    let first = remaining.remove(0);
+    Ok(remaining.iter().try_fold(first, |data, next| data.and(next))?)
 }
 
 /// An estimate from frequency responses.
@@ -156,12 +141,12 @@ struct Outcome {
     /// Residual against the coherence.
     misfit: Option<Misfit>,
     remark: Option<String>,
-    /// Whether what the window blunts was told from the machine.
+    /// `true` if the bias of the window was separated from the system.
     settled: bool,
 }
 
-/// Returns the estimate; of maximum likelihood the `responses` become those that it fitted, less what their window
-/// blunts.
+/// Returns the estimate. Maximum likelihood replaces the `responses` by the fitted ones, which are
+/// corrected for the bias of the window.
 fn estimated(
     responses: &mut [Responses],
     unknowns: &Unknowns,
@@ -178,9 +163,9 @@ fn estimated(
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
             let records: Vec<_> =
                 responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
-            let found = output_error_of_responses(&records, unknowns)?;
-            let remark = blunted(&found);
-            let ResponseEstimate { fit, responses: fitted, settled, .. } = found;
+            let outcome = output_error_of_responses(&records, unknowns)?;
+            let remark = blunted(&outcome);
+            let ResponseEstimate { fit, responses: fitted, settled, .. } = outcome;
             for (response, frf) in responses.iter_mut().zip(fitted) {
                 response.frf = frf;
             }
@@ -191,7 +176,7 @@ fn estimated(
     }
 }
 
-/// Returns a remark on what a window of segments does to the parameters, where it does.
+/// Returns a remark on a correction of the window that changes a parameter.
 pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
     (found.blunted > BLUNTED).then(|| {
         format!(
@@ -202,35 +187,78 @@ pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
     })
 }
 
-/// Returns the findings after the fit of one record; `rows` are those of all records together.
-fn looked_at(
+/// Fit to which findings refer.
+struct Scope<'a> {
+    unknowns: &'a Unknowns,
+    estimate: &'a Estimate,
+    /// Number of rows of all records.
+    rows: usize,
+    /// `true` if the segments are periods.
+    periodic: bool,
+    /// `true` if the bias of the window was separated from the system.
+    settled: bool,
+}
+
+/// Findings before and after the fit, record by record.
+struct Findings {
+    before: Vec<Vec<Finding>>,
+    after: Vec<Vec<Finding>>,
+    /// `false` if the windows of a record are not periods.
+    repeats: bool,
+}
+
+fn findings(
+    records: &[Windowed],
+    responses: &[Responses],
+    scope: &Scope<'_>,
+) -> Result<Findings, AnalysisError> {
+    let modes = scope.estimate.modes()?;
+    let mut findings = Findings { before: Vec::new(), after: Vec::new(), repeats: true };
+    for (Windowed { held, .. }, r) in records.iter().zip(responses) {
+        let mut before = Vec::from_iter(coherence(&r.frf));
+        if scope.periodic {
+            before.extend(claimed_period(&held.force, held.period));
+        }
+        let mut after = after_fit(held, r, scope)?;
+        after.extend(leakage(&r.frf, &modes, scope.settled));
+        // Windows that are not periods differ by more than noise.
+        if before.iter().any(no_period) {
+            after.retain(|finding| finding.subject() != Subject::Misfit);
+            findings.repeats = false;
+        }
+        findings.before.push(before);
+        findings.after.push(after);
+    }
+    Ok(findings)
+}
+
+/// Returns the findings after the fit of one record.
+fn after_fit(
     held: &Block,
     r: &Responses,
-    unknowns: &Unknowns,
-    estimate: &Estimate,
-    rows: usize,
-    periodic: bool,
+    scope: &Scope<'_>,
 ) -> Result<Vec<Finding>, AnalysisError> {
+    let Scope { unknowns, estimate, rows, periodic, .. } = *scope;
     let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
     let share = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
     let fitted = share * estimate.parameters().len() as f64;
     let mut checks = Vec::from_iter(late);
     checks.extend(after_response_fit(&r.frf, &r.driven, estimate, fitted)?);
     if !periodic {
-        checks.extend(of_linearity(held, &r.lines, estimate)?);
+        checks.extend(linearity_finding(held, &r.lines, estimate)?);
     }
     Ok(checks)
 }
 
-/// Judges the lines between the first and the last one fitted; `None` for a free machine, which has no
-/// displacement to take powers of.
-fn of_linearity(
+/// Tests the linearity on the lines between the first and the last one fitted; `None` for a free
+/// system, which has no displacement to take powers of.
+fn linearity_finding(
     measured: &Block,
     lines: &Lines,
     estimate: &Estimate,
 ) -> Result<Option<Finding>, AnalysisError> {
     let (motion, kind) = measured.response();
-    let used = LinesUsed::of(lines);
+    let used = LinesUsed::from_lines(lines);
     match linearity(estimate, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
         Err(EstimateError::Model(_)) => Ok(None),
         looked => Ok(Some(looked?)),

@@ -110,7 +110,7 @@ pub struct ModeRow {
 
 impl WindowRow {
     /// Creates the row of the samples of a measurement.
-    pub(crate) fn of(measured: &Block) -> Self {
+    pub(crate) fn from_block(measured: &Block) -> Self {
         Self {
             first_sample: measured.first_sample,
             last_sample: measured.last_sample(),
@@ -196,7 +196,7 @@ impl ModeRow {
 
 impl LinesUsed {
     /// Creates the row of the lines used: the first, the last and their number.
-    pub(crate) fn of(used: &mechid_spectra::Lines) -> Self {
+    pub(crate) fn from_lines(used: &mechid_spectra::Lines) -> Self {
         let (lines, spacing_hz) = (used.as_slice(), used.sampling().line_spacing_hz());
         let first = lines.iter().copied().min().unwrap_or(0);
         let last = lines.iter().copied().max().unwrap_or(0);
@@ -311,7 +311,7 @@ pub(super) fn carries_covariance(estimate: &Estimate) -> bool {
 }
 
 /// Returns the remark on a covariance that a result omits.
-pub(super) fn of_covariance(estimate: &Estimate) -> Option<String> {
+pub(super) fn omitted_covariance_remark(estimate: &Estimate) -> Option<String> {
     let count = estimate.parameters().len();
     (!carries_covariance(estimate)).then(|| {
         format!(
@@ -346,7 +346,7 @@ pub(crate) fn mode_cells(modes: &[ModeRow], damped: bool) -> impl Iterator<Item 
 
 impl ProportionalDamping {
     /// Returns the factors of an estimate with proportional damping; `None` for another damping.
-    pub(super) fn of(estimate: &Estimate) -> Result<Option<Self>, AnalysisError> {
+    pub(super) fn from_estimate(estimate: &Estimate) -> Result<Option<Self>, AnalysisError> {
         let Some([alpha, beta]) = estimate.proportional_damping() else { return Ok(None) };
         Ok(Some(Self {
             alpha: Uncertain::from_estimate(&alpha)?,

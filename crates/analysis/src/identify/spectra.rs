@@ -23,32 +23,34 @@ use super::left_out::{LineRule, all_lines};
 use super::open_records::{joined, rows_of};
 use super::options::PeriodEstimator;
 use super::prediction::Prediction;
-use super::remarks::{of_noise, one_motion_of};
+use super::remarks::{noise_remark, one_motion_of};
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
-/// degrees of freedom, which take seconds.
+/// Maximum number of unknown parameters for which maximum likelihood is the default: 20 degrees of
+/// freedom, which take seconds. With more, least squares is the default.
 const LIKELIHOOD_PARAMETERS: usize = 1200;
 
-/// Power of a force over that of its noise, of which the mean is 1 where there is nothing else, up to which it is none.
+/// Maximum mean force-to-noise power ratio of a channel that counts as unexcited; noise alone gives
+/// 1.
 const IDLE: f64 = 2.0;
 
-/// Maximum number of unknown parameters beside which nonlinear terms are looked for.
+/// Maximum number of unknown parameters for a search for nonlinear terms; with more there is none.
 const TERM_PARAMETERS: usize = 100;
 
-/// Part of the motion that rounding leaves at most.
+/// Maximum unexplained part of the response that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Power that least squares leaves beyond maximum likelihood, per parameter and in units of the noise, from which it is
-/// biased.
+/// Minimum excess of the residual power of least squares over that of maximum likelihood, per
+/// parameter and in units of the noise, for least squares to count as biased.
 const EXCESS: f64 = 10.0;
 
-/// Ratio of what both leave, from which least squares is biased whatever else is left.
+/// Minimum ratio of the residuals of least squares and maximum likelihood for least squares to
+/// count as biased although the residual is not noise.
 const MUCH: f64 = 2.0;
 
-/// Returns the noise spectrum by which an estimator weighs the lines.
+/// Returns the pooling of the noise for an estimator.
 fn pooling_of(estimator: Option<PeriodEstimator>) -> Pooling {
     match estimator {
         Some(PeriodEstimator::MaximumLikelihood(noise)) => noise,
@@ -70,12 +72,19 @@ pub(super) fn fit(
     let noise = pooling_of(estimator);
     let mut spectra = read(records, lines, noise)?;
     let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, mut misfit, noise: models, spectrum, noise_through, remark } =
-        found(&spectra, &data, unknowns, estimator)?;
-    // Says what the data leave open, before anything is made of it.
+    let SpectralEstimate {
+        estimator,
+        estimate,
+        mut misfit,
+        noise: models,
+        spectrum,
+        noise_through,
+        remark,
+    } = estimated(&spectra, &data, unknowns, estimator)?;
+    // An undetermined parameter ends the fit here with its name, before other steps fail for it.
     estimate.system()?;
-    let Looked { before, after, weighted, repeats } =
-        Looked::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
+    let RecordFindings { before, after, weighted, repeats } =
+        RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
     misfit = misfit.filter(|_| repeats);
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
@@ -85,11 +94,10 @@ pub(super) fn fit(
         agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?
     };
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
-    let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
-    let is_left = residuals.iter().any(|left| left.findings().iter().any(is_told));
-    let nonlinear = match is_left && unknowns.free().len() <= TERM_PARAMETERS {
-        true => nonlinear_term(records, unknowns, lines)?,
-        false => None,
+    let nonlinear = if exceeds_noise(&residuals) && unknowns.free().len() <= TERM_PARAMETERS {
+        nonlinear_term(records, unknowns, lines)?
+    } else {
+        None
     };
     Ok(Fitted {
         equations: 2 * data.len(),
@@ -100,7 +108,10 @@ pub(super) fn fit(
         after,
         after_all: bias.into_iter().chain(nonlinear).chain(parts).collect(),
         omitted,
-        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
+        residuals: residuals
+            .into_iter()
+            .map(|residual| Residual::Lines(Box::new(residual)))
+            .collect(),
         misfit,
         noise: models,
         remarks: one_motion_of(&records[0].held)
@@ -112,17 +123,23 @@ pub(super) fn fit(
     })
 }
 
+/// Returns whether a test of a residual warns.
+fn exceeds_noise(residuals: &[SpectralResidual]) -> bool {
+    let is_warning = |finding: &Finding| finding.verdict() > Verdict::Good;
+    residuals.iter().any(|residual| residual.findings().iter().any(is_warning))
+}
+
 /// Findings on the periods of each record.
-struct Looked {
+struct RecordFindings {
     before: Vec<Vec<Finding>>,
     after: Vec<Vec<Finding>>,
-    /// Means of the periods, with the noise that they show.
+    /// Means of the periods, with their noise.
     weighted: Vec<FrequencyData>,
     /// `true` if all windows are periods.
     repeats: bool,
 }
 
-impl Looked {
+impl RecordFindings {
     fn at(
         records: &[Windowed],
         spectra: &[Spectra],
@@ -132,28 +149,30 @@ impl Looked {
         noise_through: Option<&SecondOrderSystem>,
     ) -> Result<Self, AnalysisError> {
         let (before, after, weighted) = (Vec::new(), Vec::new(), Vec::new());
-        let mut looked = Self { before, after, weighted, repeats: true };
+        let mut findings = Self { before, after, weighted, repeats: true };
         for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(spectra) {
             let checks = steady_periods(&held.force, held.response().0, held.period)?;
-            // What differs between windows that are no periods is no noise.
+            // Windows that are not periods differ by more than noise.
             let repeats = !checks.iter().any(no_period);
-            let data = match repeats {
-                true => with_noise(periods, noise, noise_through)?,
-                false => periods.mean()?,
+            let data = if repeats {
+                with_noise(periods, noise, noise_through)?
+            } else {
+                periods.mean()?
             };
-            looked.repeats &= repeats;
-            looked.before.push(checks);
+            findings.repeats &= repeats;
+            findings.before.push(checks);
             let band = fitted_band(estimate, lines)?;
             let late = delay_of_lines(&data, lines.sampling().dt(), unknowns);
-            looked.after.push(band.into_iter().chain(late).collect());
-            looked.weighted.push(data);
+            findings.after.push(band.into_iter().chain(late).collect());
+            findings.weighted.push(data);
         }
-        Ok(looked)
+        Ok(findings)
     }
 }
 
-/// Compares the records, the halves of their periods and the bands of lines; where a record shows no noise, there are no
-/// halves, and the noise has the form of `spectrum`. Looks for terms that the model leaves out.
+/// Compares the records, the halves of their periods and the bands of lines, and tests terms that
+/// the model omits. Without noise in a record there are no halves, and the noise has the form of
+/// `spectrum`.
 fn agreement(
     spectra: &[Spectra],
     weighted: &[FrequencyData],
@@ -184,7 +203,7 @@ fn agreement(
         }
         records.push(record);
     }
-    let all = joined(&records)?;
+    let joint = joined(&records)?;
     let mut splits = vec![(Split::Bands, RowParts::Records)];
     if records.len() > 1 {
         splits.push((Split::Rows(rows_of(&records)), RowParts::Records));
@@ -192,7 +211,7 @@ fn agreement(
     if is_stated {
         splits.push((Split::Rows(halves), RowParts::Halves));
     }
-    let parts = PartsOfFit::new(&all, estimate, None, spectrum);
+    let parts = PartsOfFit::new(&joint, estimate, None, spectrum);
     // Least squares of several periods ignores their noise: its residual is at no optimum of the
     // likelihood that the score test assumes.
     let is_one = spectra.iter().all(|(periods, _)| periods.count() == 1);
@@ -208,9 +227,9 @@ fn read(
 ) -> Result<Vec<Spectra>, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
-        let held = &recorded.held;
-        let chosen = lines.lines(&held.force, held.period)?;
-        let lines = Lines::new(held.force.sampling().with_len(held.period)?, chosen)?;
+        let block = &recorded.held;
+        let chosen = lines.lines(&block.force, block.period)?;
+        let lines = Lines::new(block.force.sampling().with_len(block.period)?, chosen)?;
         spectra.push((periods(recorded, &lines)?, lines));
     }
     if noise == Pooling::PerLine && spectra.iter().any(|(periods, _)| periods.count() < 2) {
@@ -221,11 +240,11 @@ fn read(
     Ok(spectra)
 }
 
-/// Returns the remark on the forces that show nothing but noise in any record, if there are any.
+/// Returns the remark on unexcited forces: those with only noise in every record.
 fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
     let over_noise = |channel: usize, data: &FrequencyData| {
-        let (noise, place) = (data.noise()?, data.dof() + channel);
-        let of_noise = (0..data.len()).map(|row| noise.covariance(row)[(place, place)].re);
+        let (noise, index) = (data.noise()?, data.dof() + channel);
+        let of_noise = (0..data.len()).map(|row| noise.covariance(row)[(index, index)].re);
         Some(data.force().column(channel).norm_squared() / of_noise.sum::<f64>())
     };
     let is_idle = |channel: &usize| {
@@ -242,8 +261,8 @@ fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
     })
 }
 
-/// Returns the nonlinear term that explains most of what a linear model leaves of all records, if their periods are
-/// alike.
+/// Returns the nonlinear term that explains most of the residual of the linear model in all
+/// records; `None` if their periods differ.
 fn nonlinear_term(
     records: &[Windowed],
     unknowns: &Unknowns,
@@ -260,12 +279,12 @@ fn nonlinear_term(
         experiments.push([&held.force, held.response().0]);
     }
     let band = Lines::new(period, band)?;
-    // What cannot be fitted so is told by the fit itself.
+    // The fit itself reports data that cannot be fitted.
     Ok(distortion_of_periods(&band, &experiments, first.response().1, unknowns).unwrap_or(None))
 }
 
-/// Returns a remark on a window that was taken as one period and holds a whole number of them: their scatter, which
-/// shows the noise, was not used.
+/// Returns a remark on a window that was used as one period and contains several: their scatter,
+/// which shows the noise, was not used.
 pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
     let (held, len) = (&record.held, record.held.force.len());
     let force = held.force.channel(*held.driven.first()?);
@@ -281,39 +300,40 @@ pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
     })
 }
 
-/// Returns whether a finding says that the windows are no periods of the record.
+/// Returns whether a finding says that the windows are not periods of the record.
 pub(super) fn no_period(finding: &Finding) -> bool {
     finding.subject() == Subject::Periodicity && finding.verdict() == Verdict::Bad
 }
 
 /// An estimate from spectra.
-struct Found {
+struct SpectralEstimate {
     estimator: &'static str,
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
-    /// Noise by which the fit was weighted, if it was.
+    /// Noise spectrum that weighted the fit; `None` without weights.
     spectrum: Option<NoiseSpectrum>,
-    /// Machine to whose response to unmeasured forces the noise may be alike.
+    /// System that gives the form of the noise, a response to unmeasured forces.
     noise_through: Option<SecondOrderSystem>,
     remark: Option<String>,
 }
 
-/// Returns the estimate of a method from the spectra, of which `data` are the means; without a method, of
-/// maximum likelihood if the periods show the noise and the search ends well, otherwise of least squares.
-fn found(
+/// Returns the estimate of a method from the spectra with means `data`. Without a method it is
+/// maximum likelihood if the periods show the noise and the search converges, otherwise least
+/// squares.
+fn estimated(
     spectra: &[Spectra],
     data: &FrequencyData,
     unknowns: &Unknowns,
     estimator: Option<PeriodEstimator>,
-) -> Result<Found, AnalysisError> {
+) -> Result<SpectralEstimate, AnalysisError> {
     let noise = pooling_of(estimator);
     match estimator {
         Some(PeriodEstimator::LeastSquares) => least_squares(data, unknowns, None),
         Some(PeriodEstimator::Instrumental) => {
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
-            Ok(Found {
+            Ok(SpectralEstimate {
                 estimator: "instrumental variables, half of the periods against the other",
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
@@ -331,13 +351,13 @@ fn found(
     }
 }
 
-/// Returns the estimate of maximum likelihood if the periods show the noise and the search ends well, otherwise of
-/// least squares.
+/// Returns the estimate by maximum likelihood if the periods show the noise and the search
+/// converges, otherwise by least squares.
 fn suitable(
     spectra: &[Spectra],
     data: &FrequencyData,
     unknowns: &Unknowns,
-) -> Result<Found, AnalysisError> {
+) -> Result<SpectralEstimate, AnalysisError> {
     let noise = Pooling::Automatic;
     let noisy = together(spectra, &|periods| with_noise(periods, noise, None))?;
     let parameters = unknowns.independent();
@@ -347,7 +367,7 @@ fn suitable(
             return Ok(plain);
         }
         return Ok(match likelihood(spectra, &noisy, unknowns, noise) {
-            Ok(likely) => less_left(data, plain, likely)?,
+            Ok(likely) => preferred(data, plain, likely)?,
             Err(_) => plain,
         });
     }
@@ -372,10 +392,10 @@ fn least_squares(
     data: &FrequencyData,
     unknowns: &Unknowns,
     remark: Option<String>,
-) -> Result<Found, AnalysisError> {
+) -> Result<SpectralEstimate, AnalysisError> {
     let estimator = "least squares on the equation of motion, in the frequency domain";
     let estimate = equation_error(data, unknowns)?;
-    Ok(Found {
+    Ok(SpectralEstimate {
         estimator,
         estimate,
         misfit: None,
@@ -386,14 +406,14 @@ fn least_squares(
     })
 }
 
-/// Returns the estimate of maximum likelihood from data with noise; where the noise may be the response to unmeasured
-/// forces, that of a second search, which knows the machine of the first.
+/// Returns the estimate by maximum likelihood from data with noise. If the noise may be the
+/// response to unmeasured forces, a second search uses the system of the first for its form.
 fn likelihood(
     spectra: &[Spectra],
     noisy: &FrequencyData,
     unknowns: &Unknowns,
     noise: Pooling,
-) -> Result<Found, EstimateError> {
+) -> Result<SpectralEstimate, EstimateError> {
     let mut fit = output_error_pooling(noisy, unknowns, noise)?;
     let mut noise_through = None;
     if noisy.noise().is_some() && fit.noise.iter().any(|model| *model != NoiseModel::White) {
@@ -404,7 +424,7 @@ fn likelihood(
         let beside = beside.filter(|data| {
             data.noise().is_some_and(|noise| noise.models().iter().any(is_of_forces))
         });
-        // The machine found first stands where the search from anew fails.
+        // The result of the first search remains if the second one fails.
         let again = beside.and_then(|data| output_error_pooling(&data, unknowns, noise).ok());
         if let Some(again) = again {
             (fit, noise_through) = (again, Some(machine));
@@ -412,42 +432,48 @@ fn likelihood(
     }
     let source = "estimated from the periods";
     let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
-    Ok(Found {
+    Ok(SpectralEstimate {
         estimator: "maximum likelihood, in the frequency domain",
         estimate: fit.estimate,
         misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
-        remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
+        remark: Some(noise_remark(fewest, noisy.noise().is_some(), &fit.noise)),
         noise: fit.noise,
         spectrum: Some(fit.spectrum),
         noise_through,
     })
 }
 
-/// Least squares where it explains the motion as well as maximum likelihood does, or where that leaves more than noise;
-/// otherwise noise has biased it, and maximum likelihood is returned with its reason.
-fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found, AnalysisError> {
-    let left = |found: &Found| match found.estimate.system() {
+/// Returns least squares if it explains the response as well as maximum likelihood, or if the
+/// residual of the latter is more than noise. Otherwise noise has biased least squares, and maximum
+/// likelihood is returned with this reason.
+fn preferred(
+    data: &FrequencyData,
+    plain: SpectralEstimate,
+    likely: SpectralEstimate,
+) -> Result<SpectralEstimate, AnalysisError> {
+    let unexplained = |found: &SpectralEstimate| match found.estimate.system() {
         Ok(system) => unexplained_motion(data, &system),
         Err(_) => Ok(None),
     };
-    let (Some(of_plain), Some(of_likely)) = (left(&plain)?, left(&likely)?) else {
+    let (Some(of_plain), Some(of_likely)) = (unexplained(&plain)?, unexplained(&likely)?) else {
         return Ok(plain);
     };
     let unknown = likely.estimate.unknowns().independent() as f64;
     let equations = 2.0 * (data.dof() * data.len()) as f64;
-    // Per parameter, in units of the noise that maximum likelihood leaves: of all lines alike, or as its weights have it.
-    let alike = ((of_plain / of_likely).powi(2) - 1.0) * equations;
+    // Two measures per parameter, in units of the residual of maximum likelihood: with equal
+    // weights, and with its own.
+    let unweighted = ((of_plain / of_likely).powi(2) - 1.0) * equations;
     let weighted = likely.estimate.squared_distance(&plain.estimate).unwrap_or(0.0);
-    let excess = alike.max(weighted) / unknown;
+    let excess = unweighted.max(weighted) / unknown;
     if of_plain <= ROUNDING || excess.is_nan() || excess <= EXCESS {
         return Ok(plain);
     }
-    // Where the model is wrong, neither of both is right.
-    let left =
+    // A wrong model makes both estimates wrong.
+    let fit_findings =
         after_spectral_fit(std::slice::from_ref(data), &likely.estimate, Extent::WholePeriod)?;
     let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
     if of_plain < MUCH * of_likely
-        && !left.records.iter().flat_map(|left| left.findings()).all(|f| is_noise(&f))
+        && !fit_findings.records.iter().flat_map(SpectralResidual::findings).all(|f| is_noise(&f))
     {
         return Ok(plain);
     }
@@ -458,7 +484,7 @@ fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found,
         significant(100.0 * of_likely, 3)
     );
     let remark = likely.remark.map(|remark| format!("{reason}; {remark}"));
-    Ok(Found { remark, ..likely })
+    Ok(SpectralEstimate { remark, ..likely })
 }
 
 /// The rows of all records.
@@ -466,28 +492,31 @@ fn together(
     spectra: &[Spectra],
     of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, SpectraError>,
 ) -> Result<FrequencyData, AnalysisError> {
-    let mut all = of(&spectra[0].0)?;
+    let mut data = of(&spectra[0].0)?;
     for (periods, _) in &spectra[1..] {
-        all = all.and(&of(periods)?)?;
+        data = data.and(&of(periods)?)?;
     }
-    Ok(all)
+    Ok(data)
 }
 
 /// Returns all periods of a record, read chunk by chunk.
 pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, AnalysisError> {
     let Block { force, period, periods, .. } = &recorded.held;
     let kind = recorded.held.response().1;
-    let mut all = RepeatedPeriods::expecting(lines, force.channels(), kind, *periods);
+    let mut repeated = RepeatedPeriods::expecting(lines, force.channels(), kind, *periods);
     let samples = period * recorded.at_once().div_ceil(*period);
-    recorded
-        .chunks(samples, samples, &mut |chunk| Ok(all.push(&chunk.force, chunk.response().0)?))?;
-    Ok(all.with_quantisation(steps(&recorded.held))?)
+    recorded.chunks(samples, samples, &mut |chunk| {
+        Ok(repeated.push(&chunk.force, chunk.response().0)?)
+    })?;
+    Ok(repeated.with_quantisation(steps(&recorded.held))?)
 }
 
-/// Step over the RMS of a channel, below which its rounding moves no parameter.
+/// Maximum ratio of quantisation step to RMS of a channel that is ignored: its rounding changes no
+/// parameter.
 const FINE: f64 = 3e-5;
 
-/// Steps in which the values of the motions and of the forces come; zero where they do not, or where they are fine.
+/// Returns the quantisation steps of responses and forces, in their units; 0 for a channel without
+/// steps or with fine ones.
 fn steps(held: &Block) -> Vec<f64> {
     let of = |record: &Record| -> Vec<f64> {
         let channels = (0..record.channels()).map(|channel| {
@@ -499,8 +528,8 @@ fn steps(held: &Block) -> Vec<f64> {
     [of(held.response().0), of(&held.force)].concat()
 }
 
-/// The mean of the periods, with their noise if they show more than rounding, which may be the response of a
-/// machine to unmeasured forces.
+/// Returns the mean of the periods, with their noise if it exceeds rounding; with a `machine` the
+/// noise may be its response to unmeasured forces.
 fn with_noise(
     periods: &RepeatedPeriods,
     noise: Pooling,
@@ -509,7 +538,7 @@ fn with_noise(
     if periods.count() < 2 {
         return periods.mean();
     }
-    // Rounding has no spectrum that could be found.
+    // The spectrum of rounding cannot be estimated.
     match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
         Some(_) => match machine {
             Some(machine) => periods.mean()?.with_noise(periods.noise_beside(noise, machine)?),

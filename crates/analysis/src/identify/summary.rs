@@ -52,12 +52,12 @@ pub struct IdentificationSummary {
     pub lines: Option<LinesUsed>,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each, but for those of [`unscaled`](Self::unscaled) equations.
+    /// Parameters, one each, except those of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscaled: Option<Unscaled>,
-    /// Factors of proportional damping, if it was to be such.
+    /// Factors of proportional damping, if `structure` requires it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proportional_damping: Option<ProportionalDamping>,
     /// Nonlinear terms, if there are any.
@@ -83,11 +83,13 @@ pub struct IdentificationSummary {
     pub validation: Option<Validation>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
+    /// M, C and K, as `mechid force --system` and others read them; `None` if equations have no
+    /// scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
-    /// Covariance of the parameters that were estimated, for what is derived from them; `None` for more than
-    /// 2,000 of them, for which [`Identified::covariance`](super::Identified::covariance) has it.
+    /// Covariance of the estimated parameters, for quantities that follow from them; `None` for
+    /// more than 2,000 parameters, for which
+    /// [`Identified::covariance`](super::Identified::covariance) returns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<ParameterCovariance>,
     /// The settings, which repeat the analysis.
@@ -107,25 +109,25 @@ pub struct RecordRow {
 /// Quality of a fit.
 #[derive(Debug, Serialize)]
 pub struct FitRow {
-    /// RMS of the residual over the RMS of the quantity fitted, a ratio: the force, or with maximum likelihood
-    /// the response in the quantity measured, of which it is `unexplained_motion`.
+    /// Ratio of the RMS of the residual to the RMS of the fitted quantity: the force or, with
+    /// maximum likelihood, the response, for which this is `unexplained_motion`.
     pub nrmse: f64,
-    /// RMS of measured minus modelled response over the RMS of the measured response, a ratio: the part that the
-    /// linear model leaves unexplained. `None` where it was not computed.
+    /// Ratio of the RMS of measured minus modelled response to the RMS of the measured response:
+    /// the part that the linear model does not explain. `None` if it was not computed.
     pub unexplained_motion: Option<f64>,
-    /// Power of the residual over the power that the noise explains, a ratio; `None` where the noise is not
-    /// known.
+    /// Ratio of the residual power to the noise power; `None` if the noise is not known.
     pub misfit_ratio: Option<f64>,
-    /// Noise spectra by which maximum likelihood was weighted where they were estimated: one of each record,
-    /// from its periods, or one from the residual.
+    /// Estimated noise spectra that weighted maximum likelihood: one of each record from its
+    /// periods, or one from the residual.
     pub noise: Vec<NoiseModel>,
-    /// Noise of the forces of each record where these spectra are of the response alone, as of open records.
+    /// Noise of the forces of each record if these spectra are of the response alone, as for open
+    /// records.
     pub force_noise: Vec<ForceNoise>,
-    /// Sinusoids of open records beside the response to the forces, which were taken off.
+    /// Sinusoids in open records that are not a response to the forces and were subtracted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sinusoids: Vec<SinusoidRow>,
-    /// Factor by which standard errors are larger than those of the noise, where parts of the data disagree or the
-    /// residual exceeds the noise; otherwise 1.
+    /// Factor on the standard errors from the noise: above 1 if parts of the data disagree or the
+    /// residual exceeds the noise.
     pub error_scale: f64,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
@@ -136,7 +138,7 @@ pub struct FitRow {
 }
 
 impl IdentificationSummary {
-    /// Gathers the numbers, checks and remarks of a fit.
+    /// Creates the summary of a fit.
     pub(super) fn new(
         records: &[Windowed],
         fitted: &mut Fitted,
@@ -147,7 +149,7 @@ impl IdentificationSummary {
         let records: Vec<&Block> = records.iter().map(|r| &r.held).collect();
         let system = fitted.estimate.system()?;
         let unexplained_motion = fitted.unexplained_motion(&system)?;
-        let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
+        let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::from_block(r) };
         let scope = checks::Scope {
             scaled: unscaled.is_none(),
             hits: matches!(how.source, Source::Hits(_)),
@@ -163,15 +165,15 @@ impl IdentificationSummary {
             file: hits.first().map_or(&records[0].file, |hit| &hit.record).clone(),
             domain: fitted.domain,
             estimator: fitted.estimator,
-            window: WindowRow::of(records[0]),
+            window: WindowRow::from_block(records[0]),
             repeats: fitted.prediction == Prediction::Steady,
-            lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
+            lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::from_lines(lines)),
             confidence: CONFIDENCE,
             parameters: parameters(estimate, unscaled.as_ref())?,
-            proportional_damping: ProportionalDamping::of(estimate)?,
-            nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
+            proportional_damping: ProportionalDamping::from_estimate(estimate)?,
+            nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::from_fit).transpose()?,
             modes: ShapedMode::all(&modes, false)?,
-            fit: FitRow::of(fitted, unexplained_motion),
+            fit: FitRow::from_fit(fitted, unexplained_motion),
             channels: Channels::together(&records.iter().map(|r| &*r.names).collect::<Vec<_>>()),
             records: records.iter().map(row).collect(),
             hits,
@@ -188,7 +190,7 @@ impl IdentificationSummary {
         Ok(summary)
     }
 
-    /// Returns the remarks of a fit, of its records and of what the checks leave.
+    /// Returns the remarks on the fit, on its records and on its standard errors.
     fn all_remarks(
         &self,
         fitted: &Fitted,
@@ -214,12 +216,12 @@ impl IdentificationSummary {
             .chain(fitted.counted_term())
             .chain(determined::modes_alone(fitted, modes))
             .chain(self.doubts())
-            .chain(of_least_squares(fitted, &self.checks))
-            .chain(rows::of_covariance(&fitted.estimate))
+            .chain(least_squares_remark(fitted, &self.checks))
+            .chain(rows::omitted_covariance_remark(&fitted.estimate))
             .collect()
     }
 
-    /// Returns what in the numbers themselves speaks against them.
+    /// Returns doubts that follow from the numbers themselves.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit(_));
@@ -227,7 +229,7 @@ impl IdentificationSummary {
         // A growth within its standard errors is no warning of the checks.
         let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);
         doubts.extend(growing.filter(|check| !check.is_conspicuous()).map(CheckRow::sentence));
-        // Of a residual that is noise the checks tell.
+        // The checks report a residual that is noise.
         let is_noise = misfits.next().is_some_and(|check| !check.is_conspicuous())
             && misfits.all(|check| !check.is_conspicuous());
         let unexplained =
@@ -240,7 +242,7 @@ impl IdentificationSummary {
                 100.0 * part
             ));
         }
-        // Of a mass the checks tell.
+        // The checks report a negative mass.
         let is_told = self.checks.iter().any(|check| check.subject == Subject::Mass);
         let negative = |p: &&ParameterRow| p.row == p.column && p.estimate.value < 0.0;
         for p in self.parameters.iter().filter(negative).filter(|p| !is_told || p.matrix != "mass")
@@ -267,7 +269,7 @@ impl IdentificationSummary {
         text += &self.mode_table();
         text.push('\n');
         if self.unscaled.is_some() {
-            // No system is written that they could be computed from.
+            // The result contains no system, so the shapes could not be computed later.
             let measured = self.channels.first_response();
             let kind = measured.unwrap_or(ResponseQuantity::Displacement);
             text += &shape_table(&self.modes, |at| self.channels.response_name(kind, at));
@@ -296,9 +298,10 @@ impl IdentificationSummary {
         let modes: Vec<String> = once
             .map(|(_, mode)| {
                 let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
-                match mode.is_rigid_body {
-                    true => "rigid-body mode".into(),
-                    false => format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3)),
+                if mode.is_rigid_body {
+                    "rigid-body mode".into()
+                } else {
+                    format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
                 }
             })
             .collect();
@@ -355,11 +358,11 @@ impl IdentificationSummary {
 
 /// Returns how many checks passed, and each warning with its sentence.
 pub(crate) fn verdict(checks: &[CheckRow]) -> String {
-    let all = checks.len();
+    let total = checks.len();
     let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
     let mut text = match warnings.len() {
-        0 => format!("{all} of {} passed\n", message::count(all, "check")),
-        some => format!("{some} of {}: warning\n", message::count(all, "check")),
+        0 => format!("{total} of {} passed\n", message::count(total, "check")),
+        some => format!("{some} of {}: warning\n", message::count(total, "check")),
     };
     for check in warnings {
         text += &format!("  {}: {}\n", check.subject, check.sentence());
@@ -368,7 +371,7 @@ pub(crate) fn verdict(checks: &[CheckRow]) -> String {
 }
 
 impl FitRow {
-    fn of(fitted: &Fitted, unexplained_motion: Option<f64>) -> Self {
+    fn from_fit(fitted: &Fitted, unexplained_motion: Option<f64>) -> Self {
         let of_response = unexplained_motion.filter(|_| fitted.fits_response());
         Self {
             nrmse: of_response.unwrap_or_else(|| fitted.nrmse()),
@@ -387,7 +390,7 @@ impl FitRow {
         }
     }
 
-    /// Returns the quality of the fit as a table; `model` says what explains the motion.
+    /// Returns the quality of the fit as a table; `model` is the name of the model in it.
     pub(super) fn lines(&self, model: &str) -> String {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let mut rows = Vec::new();
@@ -403,8 +406,8 @@ impl FitRow {
         text_table(&rows)
     }
 
-    /// Returns what [`nrmse`](Self::nrmse) is the residual of, in words; `None` where it is the part of the response
-    /// that is left unexplained.
+    /// Returns the name of the residual [`nrmse`](Self::nrmse); `None` if it is the unexplained
+    /// part of the response.
     pub fn residual_name(&self) -> Option<&'static str> {
         match self.unexplained_motion {
             None => Some("residual of the fit (NRMSE)"),
@@ -420,8 +423,8 @@ impl fmt::Display for IdentificationSummary {
     }
 }
 
-/// Returns the remark on a residual of least squares that is not noise.
-pub(crate) fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
+/// Returns the remark on a residual of least squares that exceeds noise.
+pub(crate) fn least_squares_remark(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
     (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
@@ -432,7 +435,7 @@ pub(crate) fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<S
     })
 }
 
-/// Returns the covariance of the parameters, with nonlinear terms of theirs, too.
+/// Returns the covariance of the parameters, including those of nonlinear terms.
 pub(super) fn covariance(fitted: &Fitted, unscaled: Option<&Unscaled>) -> ParameterCovariance {
     let estimate = &fitted.estimate;
     if let Some(all) = &fitted.nonlinear {

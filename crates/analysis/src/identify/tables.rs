@@ -22,7 +22,7 @@ use super::response_settings::IdentifyResponses;
 use super::responses::blunted;
 use super::rows::{
     CONFIDENCE, ParameterRow, ProportionalDamping, carries_covariance, covariance, mode_table,
-    of_covariance, parameter_table, parameters,
+    omitted_covariance_remark, parameter_table, parameters,
 };
 use super::summary::{FitRow, verdict};
 use super::tabulated::{Noise, Tabulated};
@@ -94,7 +94,7 @@ pub fn identify_responses(
         frequencies: FrequencyRow::from_table(first),
         confidence: CONFIDENCE,
         parameters: parameters(estimate, unscaled.as_ref())?,
-        proportional_damping: ProportionalDamping::of(estimate)?,
+        proportional_damping: ProportionalDamping::from_estimate(estimate)?,
         modes: ShapedMode::all(&estimate.modes()?, false)?,
         fit: fit.row(estimate, unexplained, how.method, data.len()),
         fitted_lines: None,
@@ -217,7 +217,7 @@ fn remarks(
                 )
             }))
             .chain(fit.averaged.as_ref().and_then(blunted))
-            .chain(of_covariance(of_machine))
+            .chain(omitted_covariance_remark(of_machine))
             .collect()
 }
 
@@ -361,7 +361,7 @@ impl IdentifiedResponses {
     /// As [`IdentifiedResponses::system`].
     pub fn machine(&self) -> Result<Machine, AnalysisError> {
         self.check_scale()?;
-        Machine::of_estimate(&self.estimate)
+        Machine::from_estimate(&self.estimate)
     }
 }
 

@@ -195,27 +195,10 @@ impl Tabulated {
         let errors = standard_errors(&functions, &rows);
         let stated = errors.is_some();
         let averaged = Averaged::from_table(table, &rows)?;
-        let unused = |why: &str| {
-            format!("{}: {why}: what a window blunts stays in the responses", table.file)
-        };
-        let mut remarks = Vec::from_iter(by_reciprocity);
-        if table.segments.is_some() && averaged.is_none() {
-            remarks.push(unused("its frequencies are not those of the segments that it states"));
-        }
-        if averaged.is_some() && how.averages.is_some() {
-            remarks.push(format!(
-                "{}: it states its segments, from which the number of averages follows; `averages` was not used",
-                table.file
-            ));
-        }
         let is_averaged = averaged.is_some();
         let is_certain = !is_averaged && !stated && is_without_noise(table, &rows);
-        if is_certain {
-            remarks.push(format!(
-                "{}: a coherence of 1 states no noise; that of the residual was taken",
-                table.file
-            ));
-        }
+        let mut remarks = Vec::from_iter(by_reciprocity);
+        remarks.extend(noise_remarks(table, how, is_averaged, is_certain));
         if (is_averaged || !stated) && !is_certain {
             let tables = Columns { points: &points, forces: &forces, rows: &rows, measured };
             let coherent = tables.coherent(table, how, &response, averaged, errors.as_deref())?;
@@ -236,7 +219,7 @@ impl Tabulated {
             }
         }
         if is_averaged {
-            remarks.push(unused("segments are stated, but no coherence"));
+            remarks.push(uncorrected(table, "segments are stated, but no coherence"));
         }
         let noise = if stated { Noise::Stated } else { Noise::Unknown };
         let columns = columns(&omega, &response, errors.as_deref(), measured, &driven)?;
@@ -286,6 +269,39 @@ impl Tabulated {
         }
         Ok(findings)
     }
+}
+
+/// Returns the remark that the bias of the window was not corrected, with the reason.
+fn uncorrected(table: &FrequencyResponses, why: &str) -> String {
+    format!("{}: {why}: what a window blunts stays in the responses", table.file)
+}
+
+/// Returns remarks on the noise that a table states; `is_averaged` if its segments are used,
+/// `is_certain` if its coherence is 1 and states no noise.
+fn noise_remarks(
+    table: &FrequencyResponses,
+    how: &IdentifyResponses,
+    is_averaged: bool,
+    is_certain: bool,
+) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if table.segments.is_some() && !is_averaged {
+        let why = "its frequencies are not those of the segments that it states";
+        remarks.push(uncorrected(table, why));
+    }
+    if is_averaged && how.averages.is_some() {
+        remarks.push(format!(
+            "{}: it states its segments, from which the number of averages follows; `averages` was not used",
+            table.file
+        ));
+    }
+    if is_certain {
+        remarks.push(format!(
+            "{}: a coherence of 1 states no noise; that of the residual was taken",
+            table.file
+        ));
+    }
+    remarks
 }
 
 /// Returns the standard errors (points × forces) at some rows of a table; `None` unless every
@@ -495,7 +511,14 @@ impl Columns<'_> {
     ) -> Result<Frf, AnalysisError> {
         if let Some(Averaged { lines, segments, count }) = averaged {
             let over = (*segments, *count);
-            return Ok(Frf::of_segments(lines, response, coherence, errors, over, self.measured)?);
+            return Ok(Frf::from_segments(
+                lines,
+                response,
+                coherence,
+                errors,
+                over,
+                self.measured,
+            )?);
         }
         let omega = self.rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
         let averages = averages.ok_or_else(|| AnalysisError::Setting {

@@ -84,7 +84,7 @@ pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
 
 impl Validation {
     /// Compares the prediction with the record.
-    pub(crate) fn of(
+    pub(crate) fn new(
         recorded: &Windowed,
         model: &Model,
         prediction: Prediction,

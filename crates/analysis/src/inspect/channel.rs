@@ -188,7 +188,7 @@ impl AmplitudeSpectrum {
             *value = weight * (*value - mean);
         }
         let record = Record::from_channel(Sampling::new(1.0, samples)?, values)?;
-        let spectrum = Spectrum::of(&record);
+        let spectrum = Spectrum::from_record(&record);
         let amplitude = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
         Ok(Self { amplitude, samples, period })
     }

@@ -46,7 +46,7 @@ impl Channels {
 
     /// Creates the channels of responses without forces, for the reconstruction of an unknown
     /// force.
-    pub fn of_responses(response: ResponseQuantity, columns: &str) -> Self {
+    pub fn from_responses(response: ResponseQuantity, columns: &str) -> Self {
         Self::default().and(response, columns)
     }
 

@@ -47,7 +47,7 @@ pub(super) fn open_one(
         });
     };
     let table = file.tables(None, from_ref(chosen))?.swap_remove(0);
-    Ok(RecordFile::of_table(table).with_memory(file.memory()))
+    Ok(RecordFile::from_table(table).with_memory(file.memory()))
 }
 
 /// Opens consecutive records of a file in one pass; only the used columns are read.
@@ -67,7 +67,7 @@ pub(crate) fn open_all(
     let tables = file.tables(Some(&wanted), records)?.into_iter().zip(records);
     let opened = tables.map(|(table, record)| {
         let reading = Reading { record_id: Some(record.id.clone()), ..reading.clone() };
-        let mut record = RecordFile::of_table(table).with_memory(file.memory());
+        let mut record = RecordFile::from_table(table).with_memory(file.memory());
         reading.state_units(&mut record)?;
         Measurement::from_file(record, Some(path), channels, &reading)
     });

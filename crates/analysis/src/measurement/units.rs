@@ -172,8 +172,9 @@ const DAY_NUMBERS: f64 = 20_000.0;
 /// Number of seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
-/// Returns a finding if a time column has a doubtful unit. Without a unit this is a sampling rate so
-/// low and a record so long that it may be in milliseconds, or a rate so high that it may be in days.
+/// Returns a finding if a time column has a doubtful unit: without a unit the sampling rate may be
+/// so low and the record so long that it is in milliseconds, or the rate so high that it is in
+/// days.
 pub(crate) fn doubtful_time(
     table: &Table,
     time: &TimeAxis<'_>,

@@ -108,7 +108,7 @@ impl ModeSet {
             Err(mechid_io::IoError::NotJson { .. }) => Self::from_nodal(&NodalModes::read(path)?),
             Err(error) => Err(error.into()),
             Ok(json) if json.get("modes").is_some() => Self::from_json(&name, json),
-            Ok(_) => Self::from_machine(&ModalSummary::of(&Machine::read(path)?)?),
+            Ok(_) => Self::from_machine(&ModalSummary::from_machine(&Machine::read(path)?)?),
         }
     }
 

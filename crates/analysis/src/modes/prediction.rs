@@ -20,13 +20,13 @@ use crate::text::significant;
 ///
 /// With a period, it is the steady state under the mean period; otherwise the response over the
 /// whole window, from rest or with the free motion that explains the first samples (`settle`) best.
-/// Outside the band nothing is predicted, and measured responses are compared in it. The standard
-/// error of a channel is the RMS of what the errors of the modes and of this free motion cause; the
-/// errors of the residual terms are not in it.
+/// There is no prediction outside the band, and measured responses are compared within it. The
+/// standard error of a channel is the RMS of the errors due to the uncertainty of the modes and of
+/// this free motion; the residual terms are assumed exact.
 ///
 /// # Errors
-/// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns are not those of the modes,
-/// if no line of the record is in the band, or if `settle` cannot be used, and an error if the
+/// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns differ from those of the
+/// modes, if no line of the record is in the band, or if `settle` cannot be used, and an error if the
 /// record cannot be read.
 ///
 /// # Source
@@ -106,7 +106,7 @@ impl Response {
         } else {
             followed_by_rest(system, &block.force)?
         };
-        let spectrum = Spectrum::of(&force);
+        let spectrum = Spectrum::from_record(&force);
         let sampling = force.sampling();
         let outputs = system.outputs.len();
         let mut lines = DMatrix::zeros(spectrum.len(), outputs);

@@ -105,7 +105,7 @@ pub(crate) fn driven_band<'a>(inputs: impl IntoIterator<Item = &'a Record>) -> [
     let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
     for forces in inputs {
         let spacing_hz = forces.sampling().line_spacing_hz();
-        let spectrum = Spectrum::of(forces);
+        let spectrum = Spectrum::from_record(forces);
         let lines = forces.len().div_ceil(2).saturating_sub(1);
         for column in spectrum.lines().column_iter() {
             let powers: Vec<f64> = column.rows(1, lines).iter().map(|z| z.norm_sqr()).collect();

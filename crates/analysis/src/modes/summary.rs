@@ -113,7 +113,7 @@ pub struct SegmentsRow {
 impl RecordRow {
     /// Returns the row of a record.
     pub(super) fn from_block(block: &Block) -> Self {
-        Self { file: block.file.clone(), window: Some(WindowRow::of(block)), table: None }
+        Self { file: block.file.clone(), window: Some(WindowRow::from_block(block)), table: None }
     }
 
     /// Returns the row of a table.

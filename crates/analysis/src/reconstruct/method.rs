@@ -353,7 +353,7 @@ const FEW: f64 = 0.5;
 /// the share is small: the lines may refer to a period other than the window's.
 fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;
-    let spectrum = Spectrum::of(motion.record());
+    let spectrum = Spectrum::from_record(motion.record());
     let power = |lines: &mut dyn Iterator<Item = usize>, channel: usize| -> f64 {
         lines.map(|n| spectrum.line(n, channel).norm_sqr()).sum()
     };

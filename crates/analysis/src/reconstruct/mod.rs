@@ -179,7 +179,7 @@ impl Serialize for Reconstructed {
     }
 }
 
-/// What a summary says of the system.
+/// Part of a summary that concerns the system.
 struct System<'a> {
     name: &'a str,
     /// Number of places where forces may act.

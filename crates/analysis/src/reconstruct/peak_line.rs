@@ -72,7 +72,7 @@ impl PeakLine {
             for (mut column, held) in piece.column_iter_mut().zip(&self.held) {
                 column.copy_from_slice(&held[..samples]);
             }
-            self.add(&Spectrum::of(&Record::new(self.piece, piece)?));
+            self.add(&Spectrum::from_record(&Record::new(self.piece, piece)?));
         }
         Ok(())
     }

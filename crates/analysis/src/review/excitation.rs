@@ -36,7 +36,7 @@ pub struct Excitation {
 /// # Source
 /// See [`mechid_signal::measures`].
 pub(crate) fn excitations(force: &Record) -> Result<Vec<Excitation>, AnalysisError> {
-    let spectrum = Spectrum::of(force);
+    let spectrum = Spectrum::from_record(force);
     let floor = 10f64.powf(-DROP_DB / 20.0);
     let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);
     acting

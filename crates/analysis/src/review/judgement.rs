@@ -4,7 +4,7 @@ use mechid_checks::{Subject, Verdict};
 
 use super::Review;
 use crate::identify::checks::CheckRow;
-use crate::identify::summary::of_least_squares;
+use crate::identify::summary::least_squares_remark;
 use crate::text::significant;
 
 /// Minimum ratio of the residual power to its expectation; with less, the standard errors are too
@@ -28,7 +28,7 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
     doubts.extend(sentences_with(&report.checks, Verdict::Doubtful));
-    doubts.extend(of_least_squares(contents.identified.fitted(), &report.checks));
+    doubts.extend(least_squares_remark(contents.identified.fitted(), &report.checks));
     doubts
 }
 

@@ -60,7 +60,7 @@ impl<'a> Review<'a> {
     ///
     /// # Errors
     /// If a file cannot be read again, and if the force cannot be reconstructed.
-    pub fn of(identified: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
+    pub fn new(identified: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
         let records = (0..identified.records().len())
             .map(|at| RecordReview::new(identified, at, reconstruct_force))
             .collect::<Result<Vec<_>, _>>()?;

@@ -84,7 +84,7 @@ fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
 
 /// Returns the part of a period on these lines.
 fn on_lines(period: &Record, lines: &[usize]) -> Result<Record, SignalError> {
-    let spectrum = Spectrum::of(period);
+    let spectrum = Spectrum::from_record(period);
     let mut selected = DMatrix::from_element(spectrum.len(), spectrum.channels(), Complex::ZERO);
     for &n in lines {
         selected.set_row(n, &spectrum.lines().row(n));

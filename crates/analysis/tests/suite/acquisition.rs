@@ -89,7 +89,7 @@ fn heavy() -> Sdof {
 
 /// The steady state through a first-order high-pass at `hz`, exact on the lines of its period.
 fn coupled(record: &Record, hz: f64) -> Record {
-    let spectrum = Spectrum::of(record);
+    let spectrum = Spectrum::from_record(record);
     let spacing = TAU * record.sampling().rate_hz() / record.len() as f64;
     let mut lines = spectrum.lines().clone();
     for (line, mut row) in lines.row_iter_mut().enumerate() {

@@ -73,7 +73,7 @@ pub(super) fn data(rig: &BearingRig, periods: &[RigTest], count: usize, seed: u6
         measurement(&rig.measured(period, count, 10 * seed + at).unwrap())
     };
     let tests: Vec<Measurement> = (0..).zip(periods).map(test).collect();
-    BearingData::of_records(&tests, &settings(rig)).unwrap()
+    BearingData::from_records(&tests, &settings(rig)).unwrap()
 }
 
 fn truth(film: &[Matrix2<f64>; 3], count: usize) -> Vec<f64> {
@@ -103,7 +103,7 @@ fn without_noise_twelve_coefficients_are_exact() {
     let plain = quiet(rig(3.0));
     let of = |rig: &BearingRig, tests: &[RigTest]| {
         let tests: Vec<Measurement> = tests.iter().map(measurement).collect();
-        BearingData::of_records(&tests, &settings(rig)).unwrap()
+        BearingData::from_records(&tests, &settings(rig)).unwrap()
     };
     let in_turn = of(&plain, &periods(&plain, 20.0));
     let both = plain.period(sampling(), &lines(), 20.0, Shakers::Interleaved, 3).unwrap();
@@ -162,14 +162,14 @@ fn tables_of_frequency_responses_give_the_same() {
     let how = settings(&rig);
     let [d, a] = tables(&rig);
     let tables = [d, a];
-    let data = BearingData::of_responses(&tables, &how).unwrap();
+    let data = BearingData::from_responses(&tables, &how).unwrap();
     let found = identify_bearing(&data, None, &how).unwrap();
     assert!(worst(&found, &rig.film) < 1e-9, "{found}");
     let left_out: Vec<f64> = found.summary().left_out_hz.iter().map(|hz| hz.round()).collect();
     assert_eq!(left_out, [48.0, 52.0, 100.0, 148.0, 152.0, 200.0]);
     assert!(found.summary().remarks[0].contains("neither standard errors nor coherence"));
     let refused = |tables: &[FrequencyResponses], how: &IdentifyBearing, words: &str| {
-        let told = BearingData::of_responses(tables, how).unwrap_err().to_string();
+        let told = BearingData::from_responses(tables, how).unwrap_err().to_string();
         assert!(told.contains(words), "{told}");
     };
     let one = IdentifyBearing { points: vec!["1".into()], ..how.clone() };
@@ -211,7 +211,7 @@ fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [Identi
     // Lines beside those of the rotation are not the same in a record and in a table of every second line.
     let twelve = Coefficients::Twelve;
     let how = IdentifyBearing { rotation_hz: None, coefficients: twelve, ..settings(rig) };
-    [BearingData::of_records(&tests, &how), BearingData::of_responses(&tables, &how)]
+    [BearingData::from_records(&tests, &how), BearingData::from_responses(&tables, &how)]
         .map(|data| identify_bearing(&data.unwrap(), None, &how).unwrap())
 }
 

@@ -17,7 +17,7 @@ fn analysed(
         measurement(&rig.measured(period, 8, 10 * seed + at).unwrap())
     };
     let tests: Vec<_> = (0..).zip(tests).map(test).collect();
-    identify_bearing(&BearingData::of_records(&tests, how).unwrap(), None, how).unwrap()
+    identify_bearing(&BearingData::from_records(&tests, how).unwrap(), None, how).unwrap()
 }
 
 fn warnings(found: &IdentifiedBearing) -> Vec<&str> {
@@ -76,7 +76,7 @@ fn a_speed_above_half_the_sampling_rate_is_asked_about() {
     let rig = rig(0.0);
     let how = IdentifyBearing { rotation_hz: Some(3000.0), ..settings(&rig) };
     let test = measurement(&rig.measured(&periods(&rig, 20.0)[0], 2, 1).unwrap());
-    let refused = BearingData::of_records(&[test], &how).unwrap_err().to_string();
+    let refused = BearingData::from_records(&[test], &how).unwrap_err().to_string();
     assert_eq!(
         refused,
         "`rotation_hz`: 3000 Hz is above half the sampling rate of 1024 Hz: is the speed in rev/min? Then it is \

@@ -41,7 +41,10 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
     for (periodic, level) in [(true, 0.01), (true, 0.001), (false, 0.01), (false, 0.001)] {
         for seed in 1..6 {
             let measured = one_shaker_and_its_shadow(periodic, 0.02, level, seed);
-            let how = FrfSettings { segments: Segmentation::of(2048), ..FrfSettings::default() };
+            let how = FrfSettings {
+                segments: Segmentation::with_samples(2048),
+                ..FrfSettings::default()
+            };
             let how = if periodic { FrfSettings::default() } else { how };
             let table = frf(&measured, &how).unwrap();
             let told =
@@ -86,7 +89,10 @@ fn a_weak_shaker_of_its_own_is_kept() {
             let (force, x) = (noisy(&force, 2 * seed), noisy(motion.displacement(), 2 * seed + 1));
             let responses = [(ResponseQuantity::Displacement, &x)];
             let measured = Measurement::from_records(&force, &responses).unwrap();
-            let how = FrfSettings { segments: Segmentation::of(2048), ..FrfSettings::default() };
+            let how = FrfSettings {
+                segments: Segmentation::with_samples(2048),
+                ..FrfSettings::default()
+            };
             let table = frf(&measured, &how).unwrap();
             assert_eq!(table.responses.len(), 4, "{follows} {own} {seed}: {table}");
         }

@@ -31,7 +31,7 @@ fn record() -> (Sampling, [Vec<f64>; 2]) {
 
 fn measurement() -> Measurement {
     let (sampling, [x, y]) = record();
-    let channels = Channels::of_responses(ResponseQuantity::Displacement, "x,y");
+    let channels = Channels::from_responses(ResponseQuantity::Displacement, "x,y");
     let columns = [("x", x.as_slice()), ("y", y.as_slice())];
     Measurement::from_columns(sampling, &columns, &channels).unwrap()
 }
@@ -121,7 +121,7 @@ fn what_cannot_be_analysed_is_refused() {
 
     let (sampling, [x, y]) = record();
     let columns = [("x", x.as_slice()), ("v", y.as_slice())];
-    let both = Channels::of_responses(ResponseQuantity::Displacement, "x")
+    let both = Channels::from_responses(ResponseQuantity::Displacement, "x")
         .and(ResponseQuantity::Velocity, "v");
     let both = Measurement::from_columns(sampling, &columns, &both).unwrap();
     let mixed = decay(&both, &default);
@@ -146,7 +146,7 @@ fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
             sampling.times().map(|t| (exact(at, t) / step).round() * step).collect()
         });
         let columns = [("x", rounded[0].as_slice()), ("y", rounded[1].as_slice())];
-        let channels = Channels::of_responses(ResponseQuantity::Displacement, "x,y");
+        let channels = Channels::from_responses(ResponseQuantity::Displacement, "x,y");
         let test = Measurement::from_columns(sampling, &columns, &channels).unwrap();
         let found = decay(&test, &DecaySettings::default()).unwrap();
         assert_eq!(found.summary().modes.len(), 2, "{bits}: {found}");

@@ -8,7 +8,7 @@ use mechid_signal::{Sampling, noise};
 fn measured(sampling: Sampling, exact: Vec<f64>, level: f64, seed: u64) -> Measurement {
     let noise = noise::white(sampling, 1, level, seed).unwrap();
     let x: Vec<f64> = exact.iter().zip(noise.channel(0)).map(|(x, e)| x + e).collect();
-    let channels = Channels::of_responses(ResponseQuantity::Displacement, "x");
+    let channels = Channels::from_responses(ResponseQuantity::Displacement, "x");
     Measurement::from_columns(sampling, &[("x", x.as_slice())], &channels).unwrap()
 }
 

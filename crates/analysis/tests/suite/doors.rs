@@ -309,7 +309,8 @@ fn units_are_read_in_names_that_are_not_utf8() {
         std::fs::write(&path, text).unwrap();
         let channels = Channels::new("Force", ResponseQuantity::Displacement, "Disp");
         let measured = Measurement::open(&path, &channels).unwrap();
-        let how = FrfSettings { segments: Segmentation::of(16), ..FrfSettings::default() };
+        let how =
+            FrfSettings { segments: Segmentation::with_samples(16), ..FrfSettings::default() };
         frf(&measured, &how).unwrap().remarks.join("; ")
     };
     assert_eq!(read(b"\xb5m"), read("µm".as_bytes()));

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, dmatrix};
 
 fn summary(mass: DMatrix<f64>, damping: DMatrix<f64>, stiffness: DMatrix<f64>) -> ModalSummary {
     let system = SecondOrderSystem::new(mass, damping, stiffness).unwrap();
-    ModalSummary::of(&Machine::known(system)).unwrap()
+    ModalSummary::from_machine(&Machine::known(system)).unwrap()
 }
 
 #[test]

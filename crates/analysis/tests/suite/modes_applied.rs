@@ -33,7 +33,7 @@ fn pulses() -> Record {
 
 /// Exact response to pulses whose decays end within the record: that of a period.
 fn response(forces: &Record) -> Record {
-    let spectrum = Spectrum::of(forces);
+    let spectrum = Spectrum::from_record(forces);
     let mut lines = DMatrix::<C>::zeros(spectrum.len(), 4);
     for n in 0..spectrum.len() - 1 {
         let forces = spectrum.lines().row(n).transpose();

@@ -100,7 +100,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
     let blind = predict(&test, &linear, &Predict::default()).unwrap();
     assert!(blind.summary().channels[0].nrmse > 0.05, "{blind}");
 
-    let modes = ModalSummary::of(&read).unwrap().to_string();
+    let modes = ModalSummary::from_machine(&read).unwrap().to_string();
     assert!(modes.contains("the linear part; the nonlinear terms are k2: x1^2"), "{modes}");
     // The displacement alone is not enough for its force.
     let refused = reconstruct(&test, &read, &Reconstruct::auto()).unwrap_err();
@@ -109,7 +109,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
 
 /// A derivative of two periods of a displacement.
 fn derivative(x: &Record, order: i32) -> Record {
-    let mut lines = Spectrum::of(&x.window(0, PERIOD).unwrap()).lines().clone();
+    let mut lines = Spectrum::from_record(&x.window(0, PERIOD).unwrap()).lines().clone();
     for (n, mut row) in lines.row_iter_mut().enumerate() {
         let factor = Complex::new(0.0, n as f64 * x.sampling().omega0() * 2.0).powi(order);
         row.iter_mut().for_each(|line| *line *= factor);
@@ -186,7 +186,7 @@ fn a_backbone_holds_that_of_the_truth() {
     let noisy = noise::add_white(&force, noise::NoiseLevel::FractionOfRms(0.02), 7).unwrap();
     let test = test_of(&noisy, &x).period(PERIOD).unwrap();
     let identified = identify(&[test], &how()).unwrap().machine().unwrap();
-    let rows = ModalSummary::of(&identified).unwrap().backbone;
+    let rows = ModalSummary::from_machine(&identified).unwrap().backbone;
     assert_eq!(rows.len(), 10);
     let amplitudes: Vec<f64> = rows.iter().map(|row| row.amplitude).collect();
     assert!((amplitudes[9] / x.column(0).amax() - 1.0).abs() < 0.02, "{amplitudes:?}");
@@ -197,7 +197,7 @@ fn a_backbone_holds_that_of_the_truth() {
         assert!(gap.abs() < 4.0 * error && error < 0.02 * hz, "{row:?}, {truth:?}");
     }
     assert!(rows[9].frequency_hz.value > 1.2 * rows[0].frequency_hz.value);
-    assert!(ModalSummary::of(&identified).unwrap().to_string().contains("backbone"));
+    assert!(ModalSummary::from_machine(&identified).unwrap().to_string().contains("backbone"));
 }
 
 #[test]
@@ -341,7 +341,7 @@ fn one_shaker_at_a_time(cubic: f64, seed: u64) -> Vec<Measurement> {
     }
     let x1 = Spectrum::from_lines(sampling, given.clone()).unwrap().to_record().unwrap();
     let hardening = Record::new(sampling, x1.data().map(|x| cubic * x.powi(3))).unwrap();
-    let hardening = Spectrum::of(&hardening);
+    let hardening = Spectrum::from_record(&hardening);
     let shaken = |shaker: usize| {
         let [mut force, mut x] = [(); 2].map(|()| DMatrix::zeros(sampling.lines(), 2));
         for n in 0..sampling.lines() - 1 {

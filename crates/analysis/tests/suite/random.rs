@@ -287,7 +287,7 @@ fn damped() -> RandomTest {
 /// The window blunts the resonance by several standard errors of the damping's mean, and ties lines together.
 #[test]
 fn intervals_of_frequency_responses_hold() {
-    let how = Identify::responses(Estimator::H1, Segmentation::of(512));
+    let how = Identify::responses(Estimator::H1, Segmentation::with_samples(512));
     let (share, _, all) = judged(&damped(), 0.0, &how, 80);
     assert!(share >= 0.89, "{share}");
     let errors: Vec<f64> = all
@@ -306,7 +306,7 @@ fn resonances_narrower_than_a_line_warn() {
         let system = Sdof::new(10.0, 20.0 * ratio * omega, 10.0 * omega * omega).unwrap().system();
         RandomTest { system, ..rig() }
     };
-    let how = Identify::responses(Estimator::H1, Segmentation::of(512));
+    let how = Identify::responses(Estimator::H1, Segmentation::with_samples(512));
     let leaks = |found: &Identified| {
         let mut checks = found.checks().iter();
         checks.find(|check| check.subject == Subject::Leakage).unwrap().is_conspicuous()
@@ -322,7 +322,8 @@ fn resonances_narrower_than_a_line_warn() {
 #[test]
 fn frequency_responses_tell_of_a_peak_that_the_window_blunts() {
     let told = |rig: RandomTest, samples: usize| {
-        let how = FrfSettings { segments: Segmentation::of(samples), ..FrfSettings::default() };
+        let how =
+            FrfSettings { segments: Segmentation::with_samples(samples), ..FrfSettings::default() };
         let table = frf(&measured(rig.measure(1).unwrap(), 1), &how).unwrap();
         table.remarks.iter().any(|remark| remark.contains("makes it blunt"))
     };
@@ -348,7 +349,7 @@ fn the_length_of_segments_is_chosen() {
 #[test]
 fn a_table_of_segments_is_fitted_as_its_record() {
     let test = random_test(3);
-    let segments = Segmentation::of(256);
+    let segments = Segmentation::with_samples(256);
     let how = Identify::responses(Estimator::H1, segments.clone());
     let own = identify(std::slice::from_ref(&test), &how).unwrap();
     let table = frf(&test, &FrfSettings { segments, ..FrfSettings::default() }).unwrap();

@@ -47,7 +47,7 @@ fn noisy_response(response: &Response, share: f64, seed: u64) -> Response {
 
 /// The record so many samples later, whole or not.
 fn later(record: &Record, samples: f64) -> Record {
-    let spectrum = Spectrum::of(record);
+    let spectrum = Spectrum::from_record(record);
     let dt = record.sampling().dt();
     let turned = DMatrix::from_fn(spectrum.len(), spectrum.channels(), |n, c| {
         spectrum.line(n, c) * Complex::cis(-spectrum.omega(n) * samples * dt)

@@ -153,11 +153,11 @@ impl BearingArgs {
         let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {
             if self.tables.frf_table {
                 let tables = paths.map(FrequencyResponses::read).collect::<Result<Vec<_>, _>>()?;
-                return Ok(BearingData::of_responses(&tables, &how)?);
+                return Ok(BearingData::from_responses(&tables, &how)?);
             }
             let open = |path: &PathBuf| self.input.open_other(path, &channels, self.input.window());
             let tests: Vec<Measurement> = paths.map(open).collect::<Result<_, _>>()?;
-            Ok(BearingData::of_records(&tests, &how)?)
+            Ok(BearingData::from_records(&tests, &how)?)
         };
         let tests = data(&mut [&self.input.record].into_iter().chain(&self.more))?;
         let baseline =

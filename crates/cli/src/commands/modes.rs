@@ -320,11 +320,11 @@ impl ModesArgs {
             let machine = read_sparse_system(path)?;
             let near = self.near_hz.first();
             let search = near.map_or(ModeSearch::Lowest, |hz| ModeSearch::NearOmega(TAU * hz));
-            let selected = SelectedModes::of(input_name(path), &machine, search, count)?;
+            let selected = SelectedModes::compute(input_name(path), &machine, search, count)?;
             return Outcome::new(selected.to_string(), &selected);
         }
         let machine = Machine::read(path)?;
-        let modes = ModalSummary::of(&machine)?;
+        let modes = ModalSummary::from_machine(&machine)?;
         let names = if modes.response_names.is_empty() {
             (1..=modes.degrees_of_freedom).map(|dof| dof.to_string()).collect()
         } else {

@@ -144,7 +144,7 @@ impl MultisineArgs {
         }
         let sampling = Sampling::from_rate_hz(self.rate, self.samples)?;
         let inputs = self.design(sampling)?.inputs(sampling)?;
-        let summary = ExcitationSummary::of(&inputs)?;
+        let summary = ExcitationSummary::new(&inputs)?;
         let mut outcome = Outcome::new(summary.to_string(), &summary)?;
         if let Some(path) = &self.output {
             outcome = outcome.with_begun(self.record(path, &inputs)?);

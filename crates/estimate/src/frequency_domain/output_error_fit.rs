@@ -53,7 +53,7 @@ pub struct OutputErrorFit {
     pub sinusoids: Vec<Vec<Sinusoid>>,
 }
 
-/// Transient loads of open records, as defined at [`FrequencyData::of_open_record`].
+/// Transient loads of open records, as defined at [`FrequencyData::as_open_record`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLoads {
     tau: Vec<f64>,

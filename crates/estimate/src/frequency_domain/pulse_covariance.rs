@@ -59,7 +59,7 @@ impl ForceResponses {
     ) -> Option<Self> {
         let covariance = |row: usize| noise.covariance(row).clone();
         let to_force = |dof: usize| {
-            let force = data.of_force(dof);
+            let force = data.unit_force_data(dof);
             let whitened = Whitened::residual_of(&force, unknowns, values, covariance)?;
             Some(whitened.residual)
         };

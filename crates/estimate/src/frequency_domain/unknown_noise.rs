@@ -235,7 +235,7 @@ fn spectrum_of_residual(
         row.columns_mut(0, n).scale_mut(data.measured().per_displacement(*omega).norm_sqr());
     }
     let (omega, measured, forces) = (data.omega(), data.measured(), Some(&of_forces));
-    let noise = NoiseSpectrum::of_measured(omega, covariance, measured, 1, pooling, forces)?;
+    let noise = NoiseSpectrum::from_measured(omega, covariance, measured, 1, pooling, forces)?;
     Ok(noise.with_force_variance(data.force_variance()))
 }
 

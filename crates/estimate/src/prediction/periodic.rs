@@ -24,7 +24,7 @@ pub fn predict_periodic(
     force: &Record,
 ) -> Result<Response, EstimateError> {
     check_size("channels of the force", system.dof(), force.channels())?;
-    let forces = Spectrum::of(force);
+    let forces = Spectrum::from_record(force);
     let mut lines = [(); 3].map(|()| DMatrix::zeros(forces.len(), system.dof()));
     for n in (0..forces.len()).filter(|n| 2 * n < force.len()) {
         let omega = forces.omega(n);

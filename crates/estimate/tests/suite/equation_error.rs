@@ -79,7 +79,7 @@ fn exact_steady_states_give_the_machine_back() {
 fn spectra_and_few_chosen_lines_do_as_well() {
     let system = bearing();
     let (force, motion, _) = records(&system, ResponseQuantity::Displacement);
-    let (f, x) = (Spectrum::of(&force), Spectrum::of(&motion));
+    let (f, x) = (Spectrum::from_record(&force), Spectrum::from_record(&motion));
     let data = FrequencyData::from_spectra(&f, &x, ResponseQuantity::Displacement, [3, 9, 17, 40])
         .unwrap();
     let found = equation_error(&data, &Unknowns::unknown_mass(2).unwrap()).unwrap();

@@ -511,7 +511,7 @@ fn averages_measured_elsewhere_are_fitted_as_their_record() {
     let errors: Vec<_> = (0..58).map(|at| frf.variance(at).map(|v| (0.5 * v).sqrt())).collect();
     let count = (force.len() - 256) / 128 + 1;
     for errors in [Some(&errors[..]), None] {
-        let read = Frf::of_segments(
+        let read = Frf::from_segments(
             &lines,
             response.clone(),
             frf.coherence().clone(),

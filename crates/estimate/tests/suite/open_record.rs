@@ -49,7 +49,7 @@ fn data(rig: &RandomTest, seed: u64) -> FrequencyData {
 
 fn fit(rig: &RandomTest, seed: u64) -> Result<OutputErrorFit, EstimateError> {
     let unknowns = Unknowns::unknown_mass(rig.system.dof())?;
-    output_error(&data(rig, seed).of_open_record(rig.sampling), &unknowns)
+    output_error(&data(rig, seed).as_open_record(rig.sampling), &unknowns)
 }
 
 /// Share of 95 % intervals that hold, worst and all together, over some runs; and the RMS error of each
@@ -115,7 +115,7 @@ fn a_record_taken_as_a_period_misleads() {
     let all = |of: &(dyn Fn(FrequencyData) -> FrequencyData + Sync)| -> f64 {
         rms((0..6).into_par_iter().map(|seed| error(&of(data(&rig, seed)))).collect())
     };
-    let (period, open) = (all(&|data| data), all(&|data| data.of_open_record(rig.sampling)));
+    let (period, open) = (all(&|data| data), all(&|data| data.as_open_record(rig.sampling)));
     assert!(period > 20.0 * open, "{period} {open}");
 }
 
@@ -127,7 +127,7 @@ fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
         let [force, response] = rig.period(seed).unwrap().map(|all| all.window(400, len).unwrap());
         let band = lines::band(force.sampling(), 3.0, 190.0);
         let data = FrequencyData::from_records(&force, &response, rig.quantity, band).unwrap();
-        data.of_open_record(force.sampling())
+        data.as_open_record(force.sampling())
     };
     let records = [record(1, 1500), record(2, 1100)];
     let data = records[0].and(&records[1]).unwrap();

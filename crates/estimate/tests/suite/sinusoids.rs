@@ -34,7 +34,7 @@ fn noisy(rig: &RandomTest, seed: u64) -> [Record; 2] {
 fn fit(rig: &RandomTest, [force, response]: [&Record; 2]) -> OutputErrorFit {
     let band = lines::band(force.sampling(), 3.0, 190.0);
     let data = FrequencyData::from_records(force, response, rig.quantity, band).unwrap();
-    let data = data.of_open_record(force.sampling());
+    let data = data.as_open_record(force.sampling());
     output_error(&data, &Unknowns::unknown_mass(rig.system.dof()).unwrap()).unwrap()
 }
 

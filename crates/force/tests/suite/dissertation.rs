@@ -109,7 +109,7 @@ fn check_single(npi: f64, expected: [Ranges; 4]) {
     let machine = dissertation_sdof();
     let sampling = npi_sampling(npi, 256, machine.natural_frequency()).unwrap();
     let force = excitation(sampling, 1, 50.0);
-    let (truth, all) = (Spectrum::of(&force), lines::full(sampling));
+    let (truth, all) = (Spectrum::from_record(&force), lines::full(sampling));
     for ((name, scheme), expected) in schemes().into_iter().zip(expected) {
         let response = integrate_periodic(&*scheme, &machine.system(), &force).unwrap();
         let stored = as_stored(name, &response);
@@ -162,7 +162,7 @@ fn check_bearing(len: usize, npi: f64, expected: [([f64; 2], f64); 4]) {
     let bearing = dissertation_bearing(KyxSign::Plus).system();
     let sampling = npi_sampling(npi, len, 1.799248).unwrap();
     let force = excitation(sampling, 2, 100.0);
-    let (truth, all) = (Spectrum::of(&force), lines::full(sampling));
+    let (truth, all) = (Spectrum::from_record(&force), lines::full(sampling));
     for ((name, scheme), (expected, largest)) in schemes().into_iter().zip(expected) {
         let response = integrate_periodic(&*scheme, &bearing, &force).unwrap();
         let stored = as_stored(name, &response);

@@ -66,7 +66,7 @@ fn every_quantity_of_every_degree_of_freedom_gives_both_forces() {
             let error = relative_error(found.record(), &force).unwrap();
             // Condition of the dynamic stiffness × 1e-16, over the unexcited lines too.
             assert!(error < 1e-11, "{quantity}: {error:.1e}");
-            let truth = Spectrum::of(&force);
+            let truth = Spectrum::from_record(&force);
             let ratio = spectrum_ratio(found.spectrum(), &truth, 0, &LINES).unwrap();
             assert!(ratio.iter().all(|r| (r - 1.0).abs() < 1e-11));
             let errors = line_errors(found.spectrum(), &truth, 1, &LINES).unwrap();
@@ -105,8 +105,9 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
     .unwrap();
     let measured = Measurement::from_record(ResponseQuantity::Displacement, x.clone());
     let found = frequency_domain(&wrong, &measured, &[0, 1], &LINES, &Noise::Unknown).unwrap();
-    let spurious = spurious_ratio(found.spectrum(), &Spectrum::of(&force), 0, 1, &LINES).unwrap();
-    let motion = Spectrum::of(&x);
+    let spurious =
+        spurious_ratio(found.spectrum(), &Spectrum::from_record(&force), 0, 1, &LINES).unwrap();
+    let motion = Spectrum::from_record(&x);
     for (n, ratio) in LINES.into_iter().zip(spurious) {
         // F̂x − Fx = ΔKxy·Y, of a force of 100 N.
         let expected = 5.0 * motion.line(n, 1).norm() / 100.0;

@@ -54,7 +54,7 @@ fn close(found: f64, truth: f64, tolerance: f64) {
 #[test]
 fn on_lines_the_rest_is_that_of_least_squares() {
     let record = displacement([70.0, 100.0]);
-    let spectrum = Spectrum::of(&record);
+    let spectrum = Spectrum::from_record(&record);
     let level = [2e-4, 5e-4];
     let noise = Noise::PerChannel(level.to_vec());
     let found = frequency_domain(&bearing(), &measured(record), &[0], &LINES, &noise).unwrap();

@@ -61,7 +61,7 @@ impl NonlinearForce for TermForces {
     fn force(&self, _time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
         g.fill(0.0);
         for (term, coefficient, at) in &self.terms {
-            let value = coefficient * term.law().value(at.of(x), at.of(v));
+            let value = coefficient * term.law().value(at.value(x), at.value(v));
             at.signs().for_each(|(place, sign)| g[place] += sign * value);
         }
     }
@@ -70,7 +70,7 @@ impl NonlinearForce for TermForces {
         tangents.stiffness.fill(0.0);
         tangents.damping.fill(0.0);
         for (term, coefficient, at) in &self.terms {
-            let slopes = term.law().slopes(at.of(x), at.of(v));
+            let slopes = term.law().slopes(at.value(x), at.value(v));
             let both = [&mut tangents.stiffness, &mut tangents.damping];
             for (tangent, slope) in both.into_iter().zip(slopes) {
                 for (column, of_column) in at.signs() {

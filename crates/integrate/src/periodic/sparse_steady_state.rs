@@ -51,7 +51,7 @@ pub fn sparse_steady_state(
         let (what, got) = ("the force", force.channels());
         return Err(IntegrateError::Components { what, got, dof: dofs.forced.len() });
     }
-    let forces = Spectrum::of(force);
+    let forces = Spectrum::from_record(force);
     let channels = dofs.observed.len();
     let mut motions = [(); 3].map(|()| DMatrix::<Complex<f64>>::zeros(forces.len(), channels));
     let mut solution = vec![Complex::ZERO; dof];

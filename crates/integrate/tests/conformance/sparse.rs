@@ -154,8 +154,8 @@ fn the_steady_state_of_a_sparse_system_is_that_of_its_receptance() {
     let force = Record::new(sampling, force).unwrap();
     let dofs = SelectedDofs { forced: &[4, 20], observed: &[20, 0] };
     let response = sparse_steady_state(&sparse, dofs, &force).unwrap();
-    let lines = Spectrum::of(&force);
-    let found = Spectrum::of(response.displacement());
+    let lines = Spectrum::from_record(&force);
+    let found = Spectrum::from_record(response.displacement());
     for line in 0..lines.len() {
         let receptance = dense.receptance(lines.omega(line)).unwrap();
         for (channel, at) in dofs.observed.iter().enumerate() {

@@ -63,24 +63,10 @@ pub(super) fn read(
     budget: &mut Budget,
 ) -> Result<Content, Trouble> {
     let unusable = |what: &str| Err(Trouble::Unusable(what.into()));
-    let failed =
-        |error: hdf5_pure::Error| Trouble::Unusable(format!("data that cannot be read ({error})"));
-    if attributes.has("MATLAB_empty") {
-        return unusable("an empty array");
+    if let Some(class) = unusable_class(attributes) {
+        return unusable(class);
     }
-    match attributes.text("MATLAB_class") {
-        Some("char") => return unusable("text"),
-        Some("function_handle") => return unusable("a function"),
-        _ if attributes.has("MATLAB_object_decode") => {
-            return unusable(
-                "an object of MATLAB, such as a timetable or a string: save S = struct('time', \
-                 seconds(T.Time - T.Time(1)), 'x', T.x) of it",
-            );
-        }
-        _ if attributes.has("MATLAB_sparse") => return unusable("a sparse matrix"),
-        _ => {}
-    }
-    match dataset.dtype().map_err(failed)? {
+    match dataset.dtype().map_err(cannot_be_read)? {
         DType::F32 | DType::F64 => {}
         DType::I8 | DType::I16 | DType::I32 | DType::I64 => {}
         DType::U8 | DType::U16 | DType::U32 | DType::U64 => {}
@@ -92,22 +78,45 @@ pub(super) fn read(
         DType::ObjectReference => return references(dataset, len, budget),
         _ => return unusable("no numbers"),
     }
-    let dimensions = dataset.shape().map_err(failed)?;
+    Ok(Content::Numbers(array(dataset, len, budget)?))
+}
+
+/// Returns what a data set of MATLAB contains instead of numbers; `None` for numbers.
+fn unusable_class(attributes: &Attributes) -> Option<&'static str> {
+    if attributes.has("MATLAB_empty") {
+        return Some("an empty array");
+    }
+    match attributes.text("MATLAB_class") {
+        Some("char") => Some("text"),
+        Some("function_handle") => Some("a function"),
+        _ if attributes.has("MATLAB_object_decode") => Some(
+            "an object of MATLAB, such as a timetable or a string: save S = struct('time', \
+             seconds(T.Time - T.Time(1)), 'x', T.x) of it",
+        ),
+        _ if attributes.has("MATLAB_sparse") => Some("a sparse matrix"),
+        _ => None,
+    }
+}
+
+/// Reads a data set of real numbers after its memory is subtracted from the budget.
+fn array(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Array, Trouble> {
+    let unusable = |what: &str| Err(Trouble::Unusable(what.into()));
+    let dimensions = dataset.shape().map_err(cannot_be_read)?;
     let count = dimensions.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
-    let element_bytes = dataset.element_size().map_err(failed)?;
+    let element_bytes = dataset.element_size().map_err(cannot_be_read)?;
     let Some(count) = count else { return unusable("more numbers than can be counted") };
     if count == 0 {
         return unusable("an empty array");
     }
     // Each number uses eight bytes in memory, and a chunk is unpacked as a whole.
     take_numbers(count, element_bytes, len, budget).map_err(Trouble::Fault)?;
-    if let Some(chunk) = dataset.chunk_shape().map_err(failed)? {
+    if let Some(chunk) = dataset.chunk_shape().map_err(cannot_be_read)? {
         let numbers = chunk.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
         let mut room = *budget;
         take_numbers(numbers.unwrap_or(u64::MAX), element_bytes, len, &mut room)
             .map_err(Trouble::Fault)?;
     }
-    let values = dataset.read_f64().map_err(failed)?;
+    let values = dataset.read_f64().map_err(cannot_be_read)?;
     let shape: Vec<usize> = dimensions
         .iter()
         .filter(|len| **len != 1)
@@ -128,7 +137,11 @@ pub(super) fn read(
             return Err(Trouble::Unusable(format!("an array of {many}")));
         }
     }
-    Ok(Content::Numbers(Array { values, shape }))
+    Ok(Array { values, shape })
+}
+
+fn cannot_be_read(error: hdf5_pure::Error) -> Trouble {
+    Trouble::Unusable(format!("data that cannot be read ({error})"))
 }
 
 /// Returns the lengths of the dimensions of a data set whose elements need `numbers` numbers each,

@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn headers_are_read_past_whatever_else_they_hold() {
-        // Type 0, 600 bytes unpacked, 3 as they stand, a struct of a list of two numbers and a truth.
+        // Type 0, 600 bytes unpacked, 3 as stored, a struct of a list of two numbers and a Boolean.
         let header = [
             0x15, 0x00, 0x15, 0xb0, 0x09, 0x15, 0x06, 0x2c, 0x19, 0x25, 0x02, 0x04, 0x11, 0x00,
             0x00,

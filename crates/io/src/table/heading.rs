@@ -45,6 +45,32 @@ pub(super) fn first_rows(text: &[u8], layout: Layout) -> Vec<Beginning<'_>> {
     rows.filter(|row| row.fields.filled() > 0).take(ROWS).collect()
 }
 
+/// Numbers of fields in the rows of a table that are not empty.
+struct Filled {
+    /// Number in the first row, without a comment.
+    first: usize,
+    /// Smallest number in the rows after the first.
+    usual: usize,
+    /// `true` if all rows after the first have this number.
+    is_uniform: bool,
+}
+
+impl Filled {
+    /// Counts the fields of a table below the rows `above`.
+    ///
+    /// There may be one name more than fields: in all rows the last field is missing, or in all but
+    /// the first row, whose extra field is a comment.
+    fn new(above: &[Beginning<'_>], table: &[Beginning<'_>]) -> Self {
+        let first = table[0].fields.filled();
+        let usual = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(first);
+        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == usual);
+        let has_comment = usual + 1 == first
+            && above.iter().flat_map(texts).any(|name| name.eq_ignore_ascii_case("comment"));
+        let first = if has_comment && is_uniform { usual } else { first };
+        Self { first, usual, is_uniform }
+    }
+}
+
 impl Heading {
     /// Detects names and units above the numbers; `None` if the first row names the columns,
     /// perhaps with units in the second row, or if no row does.
@@ -55,15 +81,8 @@ impl Heading {
         if table.len() < MIN_NUMBERS && begin > 0 || table.is_empty() {
             return None;
         }
-        let (filled, width) = (table[0].fields.filled(), table[0].fields.len());
-        let above = &rows[..begin];
-        // There is one name more than fields: in all rows the last field is missing, or in all but
-        // the first row, whose extra field is a comment.
-        let usual = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(filled);
-        let is_uniform = table[1..].iter().all(|row| row.fields.filled() == usual);
-        let has_comment = usual + 1 == filled
-            && above.iter().flat_map(texts).any(|name| name.eq_ignore_ascii_case("comment"));
-        let filled = if has_comment && is_uniform { usual } else { filled };
+        let (above, width) = (&rows[..begin], table[0].fields.len());
+        let Filled { first: filled, usual, is_uniform } = Filled::new(above, table);
         let is_longer = |row: &Beginning<'_>| is_uniform && row.fields.filled() == usual + 1;
         let is_alike = |row: &Beginning<'_>| {
             let count = row.fields.filled();

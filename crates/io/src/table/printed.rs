@@ -297,8 +297,8 @@ mod tests {
         off.channel(0).iter().enumerate().map(time).map(print).collect()
     }
 
-    /// Counted over 100 seeded records each: none of the rounded ones is refused, none of those with
-    /// genuine jitter or a sample missing is taken for rounding.
+    /// With 100 seeded records each, no rounded one is refused, and none with genuine jitter or a
+    /// missing sample is taken for rounding.
     #[test]
     fn rounding_is_told_from_jitter_and_from_a_gap() {
         for (rate, decimals) in [(51_200.0, 5), (25_600.0, 6), (96_000.0, 5)] {

@@ -111,7 +111,7 @@ impl RecordFile {
     }
 
     /// Creates a record file from a table in memory.
-    pub fn of_table(table: Table) -> Self {
+    pub fn from_table(table: Table) -> Self {
         let (path, options) = (PathBuf::from(table.file()), ReadOptions::default());
         let values = table.contents.columns.iter().filter_map(|column| column.values.as_ref().ok());
         let bytes = values.map(|values| size_of_val(values.as_slice())).sum();

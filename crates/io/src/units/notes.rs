@@ -161,8 +161,8 @@ const UNIT_WORDS: [&str; 16] = [
 fn without_unit_word(note: &str) -> &str {
     let word_and_rest = UNIT_WORDS.into_iter().find_map(|word| {
         let start = note.get(..word.len()).filter(|start| start.to_lowercase() == word)?;
-        let rest = &note[start.len()..];
-        (!rest.starts_with(char::is_alphanumeric)).then_some((word, rest))
+        let tail = &note[start.len()..];
+        (!tail.starts_with(char::is_alphanumeric)).then_some((word, tail))
     });
     let Some((word, rest)) = word_and_rest else { return note };
     let marked = rest.trim_start().strip_prefix([':', '=']).map(str::trim_start);

@@ -45,9 +45,9 @@ const TREATMENTS: [&str; 10] =
 pub(super) fn without_treatment(text: &str) -> Option<&str> {
     let lower = text.to_lowercase();
     let treatment = TREATMENTS.into_iter().find(|word| lower.ends_with(word))?;
-    let rest = text.get(..text.len().checked_sub(treatment.len())?)?;
-    let rest = rest.trim_end_matches(['_', '-', ' ']);
-    (!rest.is_empty()).then_some(rest)
+    let stem = text.get(..text.len().checked_sub(treatment.len())?)?;
+    let stem = stem.trim_end_matches(['_', '-', ' ']);
+    (!stem.is_empty()).then_some(stem)
 }
 
 /// Splits a positive number from the text after it: `0.1 mm`, `1e-3 m`, `10^3 N`.

@@ -200,7 +200,7 @@ fn responses(
         for (k, mut row) in data.row_iter_mut().enumerate() {
             row *= window(k);
         }
-        Spectrum::of(&Record::new(part.sampling(), data).unwrap()).lines().clone()
+        Spectrum::from_record(&Record::new(part.sampling(), data).unwrap()).lines().clone()
     };
     let spacing = case.rate_hz / len as f64;
     let first = (case.band_hz[0] / spacing).ceil() as usize;

@@ -133,9 +133,10 @@ impl Data {
         let before = noise.order().min(first);
         let basis = columns(poles, self.constant, first - before, end, self.len());
         let rows = first - before..end;
-        let own = channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
+        let measured =
+            channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
         let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
-        parts.extend(own);
+        parts.extend(measured);
         let white: Vec<DMatrix<f64>>;
         if noise.order() > 0 {
             white = parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();

@@ -226,7 +226,7 @@ impl Case {
             }
         }
         let record = Record::from_channel(sampling, force).unwrap();
-        Spectrum::of(&record).lines().clone()
+        Spectrum::from_record(&record).lines().clone()
     }
 }
 

@@ -203,7 +203,7 @@ impl<'a> Balance<'a> {
         for (term, coefficient) in self.system.terms().iter().zip(self.system.coefficients()) {
             let at = term.coordinate();
             let force = DVector::from_fn(limits::INSTANTS, |s, _| {
-                let q = at.of(&course.row(s).iter().copied().collect::<Vec<_>>());
+                let q = at.value(&course.row(s).iter().copied().collect::<Vec<_>>());
                 coefficient * term.law().value(q, 0.0)
             });
             for (h, harmonic) in self.waves.tr_mul(&force).iter().enumerate() {
@@ -234,7 +234,7 @@ impl<'a> Balance<'a> {
             let at = term.coordinate();
             let mut bent = self.waves.clone();
             for (s, mut row) in bent.row_iter_mut().enumerate() {
-                let q = at.of(&course.row(s).iter().copied().collect::<Vec<_>>());
+                let q = at.value(&course.row(s).iter().copied().collect::<Vec<_>>());
                 row *= coefficient * term.law().slopes(q, 0.0)[0];
             }
             let harmonics = self.waves.tr_mul(&bent);

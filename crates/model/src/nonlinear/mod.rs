@@ -116,7 +116,7 @@ impl NonlinearSystem {
         let mut tangents = [self.linear.stiffness().clone(), self.linear.damping().clone()];
         for (term, coefficient) in self.terms.iter().zip(&self.coefficients) {
             let at = term.coordinate();
-            let slopes = term.law().slopes(at.of(displacement), at.of(velocity));
+            let slopes = term.law().slopes(at.value(displacement), at.value(velocity));
             for (tangent, slope) in tangents.iter_mut().zip(slopes) {
                 for (row, sign) in at.signs() {
                     for (column, other) in at.signs() {

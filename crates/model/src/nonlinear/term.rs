@@ -24,7 +24,7 @@ impl Coordinate {
     ///
     /// # Panics
     /// If there is no such degree of freedom.
-    pub fn of(self, values: &[f64]) -> f64 {
+    pub fn value(self, values: &[f64]) -> f64 {
         match self {
             Self::Dof(i) => values[i],
             Self::Difference(i, j) => values[i] - values[j],
@@ -133,7 +133,7 @@ impl Term {
     /// Returns f(q, q̇) for displacements (m) and velocities (m/s) with one entry per degree of
     /// freedom, in the unit of force (N) divided by the unit of the coefficient.
     pub fn value(&self, displacement: &[f64], velocity: &[f64]) -> f64 {
-        self.law.value(self.coordinate.of(displacement), self.coordinate.of(velocity))
+        self.law.value(self.coordinate.value(displacement), self.coordinate.value(velocity))
     }
 
     /// Returns the SI unit of the coefficient, such as `N/m³`.

@@ -194,7 +194,7 @@ impl Problem<'_> {
 /// are not finite.
 fn lines_of(record: &Prepared, samples: DMatrix<f64>) -> Option<DMatrix<Complex<f64>>> {
     let record = Record::new(record.response.sampling(), samples).ok()?;
-    Some(Spectrum::of(&record).lines().clone())
+    Some(Spectrum::from_record(&record).lines().clone())
 }
 
 /// Returns the factor of a line's products in the equivalent sum over `samples` samples, and

@@ -51,7 +51,7 @@ fn prescribed_on(sampling: Sampling, channels: usize) -> Response {
 fn band_limited_force(system: &NonlinearSystem) -> Record {
     const FINER: usize = 32;
     let fine = Sampling::new(sampling().dt() / FINER as f64, FINER * LEN).unwrap();
-    let force = Spectrum::of(&system.force(&prescribed_on(fine, system.dof())).unwrap());
+    let force = Spectrum::from_record(&system.force(&prescribed_on(fine, system.dof())).unwrap());
     let lines = force.lines().rows(0, sampling().lines()).into_owned();
     Spectrum::from_lines(sampling(), lines).unwrap().to_record().unwrap()
 }

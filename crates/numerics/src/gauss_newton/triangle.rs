@@ -108,7 +108,8 @@ impl Linearisation for Triangle {
 mod tests {
     use super::*;
 
-    /// A search meets parameters at which the response overflows: it has no step there, however many rows there are.
+    /// A search may reach parameters at which the response overflows: it has no step there, for any
+    /// number of rows.
     #[test]
     fn a_jacobian_that_is_not_finite_has_no_step() {
         for rows in [1, 100, 40_000] {

@@ -121,7 +121,7 @@ impl ToFigure for Identified {
     /// nonlinear terms, the restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
-        if let Some((fitted, points)) = restoring::of(self) {
+        if let Some((fitted, points)) = restoring::whole_periods(self) {
             return restoring::figure(&title, fitted, points);
         }
         match self.drawn_spectra() {

@@ -22,7 +22,7 @@ const POINTS: usize = 81;
 const REACH: f64 = 1.2;
 
 /// Returns the nonlinear terms of a fit of whole periods with the points of their surface.
-pub fn of(identified: &Identified) -> Option<(&WithTerms, &RestoringForce)> {
+pub fn whole_periods(identified: &Identified) -> Option<(&WithTerms, &RestoringForce)> {
     let fitted = identified.fitted().nonlinear.as_ref()?;
     Some((fitted, fitted.restoring.as_ref()?))
 }

@@ -22,27 +22,27 @@ pub fn elements_page(
     identified: &IdentifiedElements,
     settings: &PageSettings,
 ) -> Result<String, ReportError> {
-    let found = identified.summary();
-    let files: Vec<&str> = found.tests.iter().map(|test| test.file.as_str()).collect();
+    let summary = identified.summary();
+    let files: Vec<&str> = summary.tests.iter().map(|test| test.file.as_str()).collect();
     let name = files.first().map_or("", |file| file.rsplit(['/', '\\']).next().unwrap_or(file));
     let default_title = || format!("Identification of {name}");
     let title = settings.title.clone().unwrap_or_else(default_title);
-    let mut doubts = conspicuous(found);
-    doubts.extend(found.combinations.iter().map(|row| row.text.clone()));
+    let mut doubts = conspicuous(summary);
+    doubts.extend(summary.combinations.iter().map(|row| row.text.clone()));
     let heading = html! {
         header {
             h1 { (title) }
             p.subtitle { (files.join(", ")) " · maximum likelihood" }
             (about(&settings.about))
-            (remarks(&doubts, &merits(found)))
-            (modes(&found.modes))
+            (remarks(&doubts, &merits(summary)))
+            (modes(&summary.modes))
         }
     };
     let sections = [
-        ("data", "Data", data(found)),
+        ("data", "Data", data(summary)),
         ("machine", "Machine", machine(identified)),
         ("response", "Response and fit", response(identified)?),
-        ("residual", "Residual", residual(found)),
+        ("residual", "Residual", residual(summary)),
     ];
     Ok(document(&title, &heading, &sections, settings.command.as_deref()))
 }
@@ -88,30 +88,30 @@ fn data(found: &ElementSummary) -> Markup {
 
 /// Returns the unknowns, how they were found, what could be added, and the notes.
 fn machine(identified: &IdentifiedElements) -> Markup {
-    let found = identified.summary();
-    let interval = format!("{} % interval", compact(100.0 * found.confidence, 3));
+    let summary = identified.summary();
+    let interval = format!("{} % interval", compact(100.0 * summary.confidence, 3));
     let header = ["unknown", "value", "±", &interval, "unit", "from its prior"];
-    let rows = found.parameters.iter().map(|row| {
+    let rows = summary.parameters.iter().map(|row| {
         let [value, error, interval] = row.cells();
         let share = row.estimate.prior.map(|prior| percent(prior.share));
         let unit = row.unit.to_owned();
         vec![row.estimate.name.clone(), value, error, interval, unit, share.unwrap_or_default()]
     });
-    let has_priors = found.parameters.iter().any(|row| row.estimate.prior.is_some());
+    let has_priors = summary.parameters.iter().any(|row| row.estimate.prior.is_some());
     let columns = if has_priors { 6 } else { 5 };
     let rows: Vec<Vec<String>> = rows.map(|row| row[..columns].to_vec()).collect();
-    let best = found.minima.first().map_or(0, |minimum| minimum.searches);
+    let best = summary.minima.first().map_or(0, |minimum| minimum.searches);
     let fit = vec![
         pair(
             "Searches that ended at the highest likelihood",
-            format!("{best} of {}", found.searches),
+            format!("{best} of {}", summary.searches),
         ),
-        pair("Minima found", found.minima.len().to_string()),
-        pair("Logarithm of the likelihood", significant(found.log_likelihood, 6)),
-        pair("Condition number", significant(found.condition_number, 3)),
+        pair("Minima found", summary.minima.len().to_string()),
+        pair("Logarithm of the likelihood", significant(summary.log_likelihood, 6)),
+        pair("Condition number", significant(summary.condition_number, 3)),
         pair(
             "Equations",
-            format!("{} for {}", found.equations, message::count(rows.len(), "unknown")),
+            format!("{} for {}", summary.equations, message::count(rows.len(), "unknown")),
         ),
     ];
     html! {
@@ -120,8 +120,8 @@ fn machine(identified: &IdentifiedElements) -> Markup {
             (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit }.html())
         }
         p.note { "± is one standard error." }
-        (candidates(found))
-        @for note in &found.notes { p.note { (note) "." } }
+        (candidates(summary))
+        @for note in &summary.notes { p.note { (note) "." } }
     }
 }
 

@@ -84,7 +84,7 @@ fn history(
     period: &Record,
     channels: &[usize],
 ) -> Vec<(String, Figure)> {
-    let spectrum = Spectrum::of(period);
+    let spectrum = Spectrum::from_record(period);
     let hz: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
     let of_channel = |&c: &usize| {
         let label = name(c);
@@ -272,7 +272,7 @@ pub fn residual_spectrum(
     let compared = residual.mean.as_ref().unwrap_or(&residual.compared[0]);
     let motion = &compared.measured;
     let residual = Record::new(motion.sampling(), motion.data() - compared.predicted.data())?;
-    let (motion, residual) = (Spectrum::of(motion), Spectrum::of(&residual));
+    let (motion, residual) = (Spectrum::from_record(motion), Spectrum::from_record(&residual));
     let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
     let unit = compared.kind.unit();
@@ -402,7 +402,7 @@ pub(super) fn shapes(contents: &Contents<'_>, kind: ResponseQuantity) -> Option<
 
 /// Draws the restoring force of a system with nonlinear terms, for the first record.
 pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
-    let Some((fitted, points)) = surface::of(identified) else { return Ok(None) };
+    let Some((fitted, points)) = surface::whole_periods(identified) else { return Ok(None) };
     let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
                    confidence intervals, drawn to 1.2 times the amplitudes measured, and what they leave.";
     let figure = surface::figure("first record", fitted, points)?;

@@ -97,7 +97,7 @@ struct Contents<'a> {
 /// [`ReportError::Analysis`] if a record cannot be read again or the force cannot be reconstructed,
 /// [`ReportError::Plot`].
 pub fn page(identified: &Identified, settings: &PageSettings) -> Result<String, ReportError> {
-    let review = Review::of(identified, settings.reconstruct_force)?;
+    let review = Review::new(identified, settings.reconstruct_force)?;
     let name = PathBuf::from(&identified.summary().file);
     let name = name.file_name().unwrap_or_default().to_string_lossy();
     html(&Contents {

@@ -89,7 +89,7 @@ fn band_lines(sampling: Sampling, low_hz: f64, high_hz: f64) -> Result<Vec<usize
 /// line (with its mirror image) has two of `len` equal shares.
 fn keep_lines(white: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let gain = (white.len() as f64 / (2 * lines.len()) as f64).sqrt();
-    let spectrum = Spectrum::of(white);
+    let spectrum = Spectrum::from_record(white);
     let mut lines_kept = spectrum.lines() * nalgebra::Complex::from(0.0);
     for n in lines {
         lines_kept[(*n, 0)] = spectrum.line(*n, 0) * gain;
@@ -105,7 +105,7 @@ mod tests {
     fn only_the_band_is_excited_and_the_level_is_kept() {
         let s = Sampling::new(0.001, 20_000).unwrap(); // lines every 0.05 Hz
         let r = Random::band_limited(2.0, 10.0, 200.0, 3).unwrap().sample(s).unwrap();
-        let spectrum = Spectrum::of(&r);
+        let spectrum = Spectrum::from_record(&r);
         for n in 0..spectrum.len() {
             let inside = (200..=4000).contains(&n);
             assert_eq!(spectrum.line(n, 0).norm() > 1e-10, inside, "line {n}");

@@ -195,8 +195,8 @@ fn noise_is_no_hit_and_wrong_rules_are_refused() {
     assert!(hits(&[f64::NAN], DT, &usual).is_err());
 }
 
-/// Half-sines of 2 ms at 1024 Hz behind a linear filter of finite length that passes 0.4 of the sampling rate, computed at
-/// 32 times the rate, in noise of 0.05 N.
+/// Half-sines of 2 ms at 1024 Hz behind a linear filter of finite length that passes 0.4 of the
+/// sampling rate, computed at 32 times the rate, in noise of 0.05 N.
 fn behind_filter(pulses: &[(f64, f64)], samples: usize, seed: u64) -> Vec<f64> {
     const RATE: f64 = 1024.0;
     const OVER: usize = 32;

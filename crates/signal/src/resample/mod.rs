@@ -90,7 +90,7 @@ impl Interpolator {
             Interpolation::NaturalSpline => hermite(spline::natural),
             Interpolation::NotAKnotSpline => hermite(spline::not_a_knot),
             Interpolation::Pchip => hermite(pchip::slopes),
-            Interpolation::BandLimited => Pieces::Fourier(Spectrum::of(record)),
+            Interpolation::BandLimited => Pieces::Fourier(Spectrum::from_record(record)),
         };
         Ok(Self { sampling, pieces })
     }

@@ -73,7 +73,7 @@ fn excitations_side_by_side() {
 /// Crest factor of the samples, flatness of lines 1 to 400, and the amplitude of the weakest of
 /// them for a peak of 1.
 fn figures(record: &Record) -> (f64, f64, f64) {
-    let spectrum = Spectrum::of(record);
+    let spectrum = Spectrum::from_record(record);
     let flatness = measures::spectral_flatness(&spectrum, 0, 1..=400).unwrap();
     let weakest = (1..=400).map(|n| spectrum.line(n, 0).norm()).fold(f64::INFINITY, f64::min);
     let peak = measures::peak(record.channel(0));

@@ -43,7 +43,7 @@ proptest! {
         // The least line has power 1/2 of at most 37; rounding leaves 1e-15 of it.
         #[allow(clippy::disallowed_methods, reason = "mechid-signal has no linear algebra")]
         let rank = matrix.svd(false, false).rank(1e-6);
-        let order = persistent_excitation_order(&Spectrum::of(&record(&x)), 0, 1e-9).unwrap();
+        let order = persistent_excitation_order(&Spectrum::from_record(&record(&x)), 0, 1e-9).unwrap();
         prop_assert_eq!(order, rank);
     }
 }
@@ -98,7 +98,7 @@ fn flatness_by_hand() {
 fn effective_band_of_a_hammer_blow() {
     let s = Sampling::new(1e-5, 100_000).unwrap(); // lines every 1 Hz
     let blow = HalfSine::new(1.0, 0.0, 0.005).unwrap().sample(s).unwrap();
-    let band = effective_band(&Spectrum::of(&blow), 0, 20.0).unwrap();
+    let band = effective_band(&Spectrum::from_record(&blow), 0, 20.0).unwrap();
     let fall = |u: f64| (std::f64::consts::PI * u).cos().abs() / (1.0 - 4.0 * u * u).abs() - 0.1;
     let (mut low, mut high) = (1.0, 1.5);
     while high - low > 1e-9 {
@@ -108,6 +108,6 @@ fn effective_band_of_a_hammer_blow() {
     assert_eq!(band.low_hz, 1.0);
     // Within one line, and the first line is a little below the value at zero.
     assert!((band.high_hz - low / 0.005).abs() <= 1.0, "{band:?}, {}", low / 0.005);
-    let silent = Spectrum::of(&record(&[1.0; 8]));
+    let silent = Spectrum::from_record(&record(&[1.0; 8]));
     assert!(effective_band(&silent, 0, 20.0).is_err());
 }

@@ -35,7 +35,7 @@ proptest! {
     #[test]
     fn the_spectrum_is_what_was_asked((m, len) in any_multisine()) {
         let s = Sampling::new(0.02, len).unwrap();
-        let spectrum = Spectrum::of(&m.sample(s).unwrap());
+        let spectrum = Spectrum::from_record(&m.sample(s).unwrap());
         let scale = m.amplitudes().iter().fold(1.0_f64, |a, b| a.max(*b));
         let mut asked = vec![(0.0, 0.0); s.lines()];
         for ((n, a), p) in m.lines().iter().zip(m.amplitudes()).zip(m.phases()) {
@@ -63,7 +63,7 @@ proptest! {
     fn back_from_the_spectrum((m, len) in any_multisine()) {
         let s = Sampling::new(0.02, len).unwrap();
         let record = m.sample(s).unwrap();
-        let again = Multisine::from_spectrum(&Spectrum::of(&record), 0).unwrap();
+        let again = Multisine::from_spectrum(&Spectrum::from_record(&record), 0).unwrap();
         let scale = m.amplitudes().iter().sum::<f64>().max(1.0);
         let difference = (again.sample(s).unwrap().data() - record.data()).amax();
         prop_assert!(difference < 1e-12 * scale);

@@ -82,7 +82,7 @@ impl FrequencyData {
 
     /// Returns data of a step between the initial and final values of channel `channel`, without a
     /// force: its lines decrease as 1/s.
-    pub fn of_jump(&self, channel: usize) -> Self {
+    pub fn step_data(&self, channel: usize) -> Self {
         let jump = |row: usize, column: usize| {
             let omega = self.omega[row];
             let read = Complex::new(0.0, omega) * self.measured.per_displacement(omega);
@@ -97,7 +97,7 @@ impl FrequencyData {
 
     /// Returns data of a transient load on degree of freedom `dof`, the polynomial term s^`power`,
     /// without a response.
-    pub fn of_load(&self, dof: usize, power: usize) -> Self {
+    pub fn load_data(&self, dof: usize, power: usize) -> Self {
         let load = |row: usize, column: usize| {
             let omega = self.omega[row];
             let unit = self.measured.per_displacement(omega).inv();
@@ -116,7 +116,7 @@ impl FrequencyData {
 
     /// Returns data of a force of 1 N on degree of freedom `dof` at every line, without a response.
     #[must_use]
-    pub fn of_force(&self, dof: usize) -> Self {
+    pub fn unit_force_data(&self, dof: usize) -> Self {
         let force = |_, column: usize| Complex::from(if column == dof { 1.0 } else { 0.0 });
         Self {
             force: DMatrix::from_fn(self.len(), self.dof(), force),

@@ -145,7 +145,7 @@ impl FrfAverage {
         let mut acting: Vec<usize> = (0..self.inputs).collect();
         let mut following = Vec::new();
         while acting.len() > 1 && self.averages() > acting.len() as f64 {
-            let average = self.of_inputs(&acting);
+            let average = self.with_inputs(&acting);
             let Some(weakest) = average.weakest_follower() else { break };
             let force = acting.remove(weakest);
             following.push(self.crosstalk(force, &acting));
@@ -288,7 +288,7 @@ impl FrfAverage {
     /// # Panics
     /// If there is no such channel.
     #[must_use]
-    pub fn of_inputs(&self, inputs: &[usize]) -> Self {
+    pub fn with_inputs(&self, inputs: &[usize]) -> Self {
         let sums = self.sums.iter().map(|sum| sum.select_inputs(inputs)).collect();
         Self { inputs: inputs.len(), sums, ..self.clone() }
     }

@@ -10,7 +10,7 @@ use crate::limits::{INTERLEAVED_CHANCE, INTERLEAVED_ROUNDING, INTERLEAVED_ROUNDS
 
 /// Frequency responses to forces that are excited on interleaved lines.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OwnLines {
+pub struct InterleavedResponses {
     /// Responses to each force, responses × 1, on the lines that it excites.
     pub responses: Vec<Frf>,
     /// Crosstalk that was estimated and subtracted.
@@ -28,7 +28,7 @@ pub struct Crosstalk {
     pub share: f64,
 }
 
-impl OwnLines {
+impl InterleavedResponses {
     /// Estimates the responses from averages of all forces, one average over the lines of each
     /// force in turn.
     ///
@@ -45,12 +45,15 @@ impl OwnLines {
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
     /// section 2.7 (multisines on interleaved lines); Goodman (1957) for the coherence without a
     /// signal; the limits are ours.
-    pub fn of(own: &[FrfAverage], estimator: FrfEstimator) -> Result<Self, SpectraError> {
+    pub fn from_averages(
+        averages: &[FrfAverage],
+        estimator: FrfEstimator,
+    ) -> Result<Self, SpectraError> {
         let (mut raw, mut crosstalk, mut couplings) = (Vec::new(), Vec::new(), Vec::new());
-        for (driver, average) in own.iter().enumerate() {
-            check_size("channels of the force", own.len(), average.inputs)?;
-            raw.push(average.of_inputs(&[driver]).frf(estimator)?);
-            for force in (0..own.len()).filter(|force| *force != driver) {
+        for (driver, average) in averages.iter().enumerate() {
+            check_size("channels of the force", averages.len(), average.inputs)?;
+            raw.push(average.with_inputs(&[driver]).frf(estimator)?);
+            for force in (0..averages.len()).filter(|force| *force != driver) {
                 if let Some(coupling) = Coupling::estimate(average, force, driver) {
                     crosstalk.push(Crosstalk { force, driver, share: coupling.share() });
                     couplings.push(coupling);

@@ -13,7 +13,7 @@ use nalgebra::{Complex, DMatrix};
 
 pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
-pub use self::interleaved::{Crosstalk, OwnLines};
+pub use self::interleaved::{Crosstalk, InterleavedResponses};
 use self::scatter::Scatter;
 pub use self::scatter::smoothing_bias;
 pub use self::segments::Segments;
@@ -155,7 +155,7 @@ impl Frf {
     ///
     /// # Source
     /// Welch (1967); Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9.
-    pub fn of_segments(
+    pub fn from_segments(
         lines: &Lines,
         response: Vec<ComplexMatrix>,
         coherence: DMatrix<f64>,

@@ -56,8 +56,8 @@ mod tests {
         assert!((level - mean.sqrt()).abs() < 1e-6 * level, "{level}");
     }
 
-    /// A resonance a hundred times as high as the noise does not hide its level: some 350 lines beside it know the
-    /// root to 2.7 %, and the mean of 40 experiments a sixth of that.
+    /// A resonance a hundred times as high as the noise does not hide its level, because some 350
+    /// lines beside it give the root to 2.7 %, and the mean of 40 experiments to a sixth of that.
     #[test]
     fn the_level_is_found_beside_a_resonance() {
         let known: Vec<f64> =

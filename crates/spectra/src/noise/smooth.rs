@@ -321,11 +321,12 @@ mod tests {
         }
     }
 
-    /// Noise that falls like 1/f, one complex deviation a line, of which the first is quiet by chance.
+    /// Noise with a 1/f spectrum, one complex deviation per line; the first one is small by chance.
     #[test]
     fn a_line_at_the_end_that_is_quiet_by_chance_has_not_all_the_weight() {
         let omega: Vec<f64> = (1..=100).map(f64::from).collect();
-        // Deviations of a fixed sequence, exponentially distributed as squares of complex numbers are.
+        // Deviations of a fixed sequence, exponentially distributed as squares of complex numbers
+        // are.
         let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
         let mut variances = DMatrix::from_fn(100, 1, |line, _| deviation(line + 1) / omega[line]);
         for quiet in [1e-2, 1e-4, 1e-6] {

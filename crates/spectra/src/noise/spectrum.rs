@@ -112,7 +112,7 @@ impl NoiseSpectrum {
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
-    pub fn of_measured(
+    pub fn from_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
         measured: ResponseQuantity,

@@ -164,7 +164,7 @@ impl Ratios {
         let sampling = sequences.force.sampling();
         let lines: Vec<usize> = (1..sampling.len().div_ceil(2)).collect();
         let driven = machine.dof() - 1;
-        let truth = Spectrum::of(&sequences.force);
+        let truth = Spectrum::from_record(&sequences.force);
         let ratios =
             spectrum_ratio(force.spectrum(), &truth, driven, &lines).map_err(|e| e.to_string())?;
         Ok(Self { omega0: sampling.omega0(), ratios })

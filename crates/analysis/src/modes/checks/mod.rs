@@ -27,7 +27,7 @@ pub(super) fn channel_checks(
         let block = measurement.whole_block()?;
         let record =
             if measurements.len() > 1 { format!("{}: ", block.file) } else { String::new() };
-        rows.extend(checks::of_sensors(&block).into_iter().map(|finding| ModalCheck {
+        rows.extend(checks::sensor_findings(&block).into_iter().map(|finding| ModalCheck {
             code: "channel",
             passed: finding.verdict() == Verdict::Good,
             value: finding.value(),

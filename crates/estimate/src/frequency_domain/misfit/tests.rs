@@ -49,7 +49,7 @@ fn cases() -> Vec<(FrequencyData, Unknowns, DVector<f64>)> {
     let all = unknowns().into_iter().flat_map(|(unknowns, theta)| {
         let loads: Vec<f64> = (0..12).map(|at| 0.1 * (2.3 * f64::from(at)).sin()).collect();
         let with_loads: Vec<f64> = theta.iter().chain(&loads).copied().collect();
-        let open = data().of_open_record(Sampling::new(0.1, 64).unwrap());
+        let open = data().as_open_record(Sampling::new(0.1, 64).unwrap());
         [(data(), unknowns.clone(), theta), (open, unknowns, with_loads.into())]
     });
     all.collect()

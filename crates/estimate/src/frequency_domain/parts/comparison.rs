@@ -106,7 +106,7 @@ struct PartDifference {
 
 impl Scores<'_> {
     /// Returns the scores of a part.
-    fn of(&self, part: usize) -> DVector<f64> {
+    fn scores_of(&self, part: usize) -> DVector<f64> {
         self.scores.rows(part * self.basis.ncols(), self.basis.ncols()).into_owned()
     }
 
@@ -139,7 +139,7 @@ impl Scores<'_> {
     fn largest_scatter(&self, level: f64) -> Option<f64> {
         let of_row = |row: usize| {
             let root = self.root.row(row).transpose();
-            let square = |part: usize| root.dot(&self.of(part)).powi(2);
+            let square = |part: usize| root.dot(&self.scores_of(part)).powi(2);
             let expected = |part: usize| root.dot(&(self.covariance_of(part) * &root));
             let parts = self.parts.len();
             let (squares, expected) = (
@@ -156,7 +156,7 @@ impl Scores<'_> {
     fn largest_difference(&self, level: f64) -> Option<PartDifference> {
         let of_part = |(part, own): (usize, &DMatrix<f64>)| {
             let (inverse, _) = pseudo_inverse(&self.covariance_of(part))?;
-            let difference = &inverse * self.of(part);
+            let difference = &inverse * self.scores_of(part);
             let of_others = -self.basis.tr_mul(&(own * &difference));
             let one = |row: usize| {
                 let root = self.root.row(row).transpose();
@@ -200,8 +200,8 @@ impl PartsOfFit<'_> {
     pub fn compare(&self, split: &Split) -> Option<PartsComparison> {
         let cuts = Cuts::new(self, split)?;
         let parts: Vec<Part> = cuts.parts().collect();
-        let found = self.scores(&cuts).compare(&self.noise_level())?;
-        let largest = found.largest.map(|largest| Difference {
+        let comparison = self.scores(&cuts).compare(&self.noise_level())?;
+        let largest = comparison.largest.map(|largest| Difference {
             part: parts[largest.part],
             parameter: self.parameters[largest.parameter],
             by_part: largest.by_part,
@@ -210,10 +210,10 @@ impl PartsOfFit<'_> {
         });
         Some(PartsComparison {
             parts: parts.len(),
-            ratio: found.ratio,
-            degrees_of_freedom: found.degrees_of_freedom,
-            p_value: found.p_value,
-            error_scale: found.error_scale,
+            ratio: comparison.ratio,
+            degrees_of_freedom: comparison.degrees_of_freedom,
+            p_value: comparison.p_value,
+            error_scale: comparison.error_scale,
             largest,
         })
     }

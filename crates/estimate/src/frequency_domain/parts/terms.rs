@@ -67,7 +67,7 @@ impl Power {
     pub const ALL: [Self; 4] = [Self::Square, Self::Cube, Self::VelocityCube, Self::VelocitySign];
 
     /// Returns the power of a displacement or of its rate, in the power of the unit of either.
-    fn of(self, displacement: f64, velocity: f64) -> f64 {
+    fn value(self, displacement: f64, velocity: f64) -> f64 {
         match self {
             Self::Square => displacement * displacement,
             Self::Cube => displacement.powi(3),
@@ -261,15 +261,15 @@ impl<'a> LikelyMotion<'a> {
             for row in rows.clone() {
                 let x = self.displacement[(row, dof)]
                     - other.map_or(Complex::new(0.0, 0.0), |o| self.displacement[(row, o)]);
-                let place = line(row);
-                motion[(place, 0)] = x;
-                motion[(place, 1)] = x * Complex::new(0.0, omega[row]);
+                let line_index = line(row);
+                motion[(line_index, 0)] = x;
+                motion[(line_index, 1)] = x * Complex::new(0.0, omega[row]);
             }
             let motion = Spectrum::from_lines(*sampling, motion).ok()?.to_record().ok()?;
-            let of_sample = |(x, v): (&f64, &f64)| power.of(*x, *v);
+            let of_sample = |(x, v): (&f64, &f64)| power.value(*x, *v);
             let both = motion.channel(0).iter().zip(motion.channel(1));
             let force = Record::from_channel(*sampling, both.map(of_sample).collect()).ok()?;
-            let force = Spectrum::of(&force);
+            let force = Spectrum::from_record(&force);
             for row in rows.clone() {
                 values[row] = force.line(line(row), 0);
             }

@@ -154,6 +154,6 @@ fn open_records() {
     let variances = [x, y, 0.0, 0.0].map(Complex::from);
     let covariance = DMatrix::from_diagonal(&variances.to_vec().into());
     let new = new.with_noise(LineNoise::new(vec![covariance; omega.len()]).unwrap()).unwrap();
-    let old = old.of_open_record(rig.sampling).with_noise(spectrum).unwrap();
+    let old = old.as_open_record(rig.sampling).with_noise(spectrum).unwrap();
     check(&old, &identified(&new, quantity), 1e-9);
 }

@@ -243,7 +243,7 @@ pub fn rule_ratios(case: &Case, make: fn(Rule) -> Filter) -> [Ratio; 4] {
 
 /// Maximum curvature of log ‖residual‖ against log ‖force‖ over all parameters tried.
 fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> usize {
-    let measured = Spectrum::of(m.record());
+    let measured = Spectrum::from_record(m.record());
     let receptances: Vec<_> =
         (0..128).map(|n| case.system.receptance(measured.omega(n)).unwrap()).collect();
     let points: Vec<[f64; 2]> = trials
