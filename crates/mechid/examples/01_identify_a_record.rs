@@ -1,34 +1,43 @@
-//! Reads the example record and identifies mass, damping and stiffness, as `mechid identify` does.
+//! Identifies a machine from a file, with intervals and checks, and reconstructs the force, in four
+//! statements.
+//!
+//! Prints the identified parameters and modes with their intervals and checks, the predicted part of a
+//! second window, and the force with its standard error.
 //!
 //! `cargo run --package mechid --example 01_identify_a_record`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
-use std::error::Error;
+use mechid::{
+    Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct, Window,
+};
 
-use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::equation_error;
-use mechid::io::{Table, TimeAxis};
-use mechid::model::ResponseQuantity;
-use mechid::spectra::{Lines, RepeatedPeriods};
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+    let channels = Channels::new("force", Displacement, "displacement");
+    // The second of the two periods is used for validation.
+    let other = Measurement::open(rig, &channels)?.window(Window {
+        start: 257,
+        period: Some(256),
+        periods: None,
+    })?;
 
-pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    // The record is part of the repository; replace it by the path of your own record.
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
-    let table = Table::read(file)?;
-    let time = TimeAxis::Column("time");
-    let force = table.record(&time, &["force"])?;
-    let displacement = table.record(&time, &["displacement"])?;
+    let test = Measurement::open(rig, &channels)?.window(Window {
+        start: 1,
+        period: Some(256),
+        periods: Some(1),
+    })?;
+    let found = mechid::identify(&[test], &Identify::spectra(MaximumLikelihood))?;
+    let fit = found.validate(&other)?;
+    let force = mechid::reconstruct(&other, &found.machine()?, &Reconstruct::auto())?;
 
-    // The record has two periods of 256 samples; the excitation is on lines 4 to 60.
-    let period = force.sampling().with_len(256)?;
-    let lines = Lines::new(period, 4..=60)?;
-    let periods =
-        RepeatedPeriods::new(&lines, &force, &displacement, ResponseQuantity::Displacement)?;
-    let found = equation_error(&periods.mean()?, &Unknowns::unknown_mass(1)?)?;
-    print!("{found}");
-
-    let mode = &found.system()?.modes()?[0];
-    let frequency_hz = mode.natural_frequency() / std::f64::consts::TAU;
-    println!("{frequency_hz:.3} Hz, damping ratio {:.4}", mode.damping_ratio());
+    println!("{found}");
+    for channel in &fit.channels {
+        println!("{} predicted: {:.2} %", channel.quantity, channel.fit_percent);
+        assert!(channel.fit_percent > 99.0);
+    }
+    println!("\n{force}");
+    for doubt in found.doubts() {
+        println!("doubt: {doubt}");
+    }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! Identifies a machine in one experiment, then reconstructs an unknown force from another
 //! response.
 //!
+//! Prints the amplitude of the reconstructed force and its relative error.
+//!
 //! `cargo run --package mechid --example 03_find_the_force`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 

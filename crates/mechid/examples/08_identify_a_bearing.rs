@@ -1,6 +1,9 @@
 //! Identifies the eight coefficients of an oil film from two shakers on interleaved lines and two
 //! noisy displacements.
 //!
+//! Prints the coefficients and the modes with their standard errors, and the skew part of the
+//! stiffness.
+//!
 //! `cargo run --package mechid --example 08_identify_a_bearing`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 

@@ -27,14 +27,15 @@ macro_rules! examples {
 
 examples! {
     identify_a_record "../examples/01_identify_a_record.rs",
-    compare_schemes "../examples/02_compare_schemes.rs",
+    modes_of_a_test "../examples/02_modes_of_a_test.rs",
     find_the_force "../examples/03_find_the_force.rs",
-    design_measure_identify "../examples/04_design_measure_identify.rs",
-    weigh_the_noise "../examples/05_weigh_the_noise.rs",
-    force_through_noise "../examples/06_force_through_noise.rs",
-    choose_the_step "../examples/07_choose_the_step.rs",
+    a_force_with_its_band "../examples/04_a_force_with_its_band.rs",
+    design_measure_identify "../examples/05_design_measure_identify.rs",
+    weigh_the_noise "../examples/06_weigh_the_noise.rs",
+    force_through_noise "../examples/07_force_through_noise.rs",
     identify_a_bearing "../examples/08_identify_a_bearing.rs",
-    from_a_file "../examples/09_from_a_file.rs",
-    a_long_record "../examples/10_a_long_record.rs",
-    a_force_with_its_band "../examples/11_a_force_with_its_band.rs",
+    a_long_record "../examples/09_a_long_record.rs",
+    compare_schemes "../examples/10_compare_schemes.rs",
+    choose_the_step "../examples/11_choose_the_step.rs",
+    step_by_step "../examples/12_step_by_step.rs",
 }

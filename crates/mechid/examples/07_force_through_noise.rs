@@ -1,7 +1,9 @@
 //! Reconstructs the force from a noisy response: line by line if its lines are known, by shrinkage
 //! if they are not, by a Kalman smoother without periodicity.
 //!
-//! `cargo run --package mechid --example 06_force_through_noise`
+//! Prints the true and the stated error of each method, in per cent of the force.
+//!
+//! `cargo run --package mechid --example 07_force_through_noise`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use std::error::Error;

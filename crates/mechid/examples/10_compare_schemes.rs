@@ -1,7 +1,9 @@
 //! Compares the natural frequency of one machine in the simulations of five time-stepping schemes
 //! with the exact response.
 //!
-//! `cargo run --package mechid --example 02_compare_schemes`
+//! Prints the natural frequency and the damping ratio of each simulation.
+//!
+//! `cargo run --package mechid --example 10_compare_schemes`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use std::error::Error;

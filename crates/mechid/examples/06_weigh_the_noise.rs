@@ -1,7 +1,9 @@
 //! Compares least squares, instrumental variables and weighted estimates for a displacement whose
 //! noise is strongest at low frequencies.
 //!
-//! `cargo run --package mechid --example 05_weigh_the_noise`
+//! Prints the parameters of each estimator and their distance from the truth, in standard errors.
+//!
+//! `cargo run --package mechid --example 06_weigh_the_noise`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use std::error::Error;

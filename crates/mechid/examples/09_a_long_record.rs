@@ -1,6 +1,10 @@
 //! Identifies a machine from a record that does not fit into memory: it is read in chunks,
 //! repeatedly.
-#![allow(clippy::print_stdout, reason = "an example talks to its reader")]
+//!
+//! Prints the number of periods and the stiffness.
+//!
+//! `cargo run --package mechid --example 09_a_long_record`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use mechid::analysis::measurement::IN_MEMORY_SAMPLES;
 use mechid::io::CsvFile;
@@ -8,8 +12,7 @@ use mechid::model::Sdof;
 use mechid::signal::{Multisine, Phases, Sampling, lines};
 use mechid::{Channels, Displacement, Identify, LeastSquares, Measurement};
 
-/// Runs the example.
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // The record has three hundred thousand samples: a repeated period of a multisine and its exact
     // response.
     let period = Sampling::from_rate_hz(128.0, 1024)?;

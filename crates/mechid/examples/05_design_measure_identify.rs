@@ -1,7 +1,10 @@
 //! Designs a multisine of low crest factor, simulates eight measured periods, and identifies the
 //! machine with confidence intervals.
 //!
-//! `cargo run --package mechid --example 04_design_measure_identify`
+//! Prints the crest factor before and after the search, and the parameters and the natural frequency of
+//! two estimators with their intervals.
+//!
+//! `cargo run --package mechid --example 05_design_measure_identify`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use std::error::Error;

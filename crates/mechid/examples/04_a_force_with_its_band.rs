@@ -1,13 +1,16 @@
 //! Identifies an uncertain machine from a noisy test, and reconstructs an unknown force with its
 //! confidence band.
-#![allow(clippy::print_stdout, reason = "an example talks to its reader")]
+//!
+//! Prints the force with its standard error, and how many samples lie within two standard errors.
+//!
+//! `cargo run --package mechid --example 04_a_force_with_its_band`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use mechid::model::Sdof;
 use mechid::signal::{Multisine, Phases, Record, Sampling, lines, noise};
 use mechid::{Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct};
 
-/// Runs the example.
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let machine = Sdof::from_modal(25.0, 0.05, 75.0)?.system();
     let period = Sampling::from_rate_hz(128.0, 256)?;
     let measured = |force: &Record, seed: u64| -> Result<Record, Box<dyn std::error::Error>> {

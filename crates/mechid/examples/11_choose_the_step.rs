@@ -1,7 +1,10 @@
 //! Chooses the step of a scheme: its limit of stability, and the errors of period and damping below
 //! it.
 //!
-//! `cargo run --package mechid --example 07_choose_the_step`
+//! Prints, for each scheme, its limit of stability, the step with a period error of 1 %, and the
+//! numerical damping at this step.
+//!
+//! `cargo run --package mechid --example 11_choose_the_step`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use std::error::Error;
