@@ -492,7 +492,7 @@ pub enum AnalysisError {
         value: f64,
     },
     /// A period is not a whole number of the used samples.
-    #[error("a period of {} is no whole number of every {} sample", message::count(*period, "sample"), message::ordinal(*factor))]
+    #[error("a period of {} cannot be divided into steps of every {} sample", message::count(*period, "sample"), message::ordinal(*factor))]
     DecimatedPeriod {
         /// Number of samples in a period.
         period: usize,

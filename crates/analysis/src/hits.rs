@@ -116,8 +116,8 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
             && pulses as f64 <= RARE * force.len() as f64;
         is_hammer.then(|| {
             format!(
-                "the force of {} is zero but for {}, as that of a hammer: `hits` cuts such a record into its hits, \
-                 leaves bad ones out, and fits the others each as a record of its own",
+                "the force of {} is zero except for {}, as in a hammer test: `hits` cuts such a record into its hits, excludes \
+                 bad ones, and fits each of the others as a separate record",
                 buffered.file,
                 message::count(found.all.len(), "short pulse")
             )

@@ -82,7 +82,7 @@ impl Check for Distortion {
         let Self { term, explained, even_db, odd_db, p_value } = self;
         write!(
             f,
-            "{term} explains {:.1} % of the power that a linear model leaves ({p_value})",
+            "{term} explains {:.1} % of the residual power of a linear model ({p_value})",
             100.0 * explained
         )?;
         for (name, level) in [("even", even_db), ("odd", odd_db)] {

@@ -99,9 +99,9 @@ impl Check for Gain {
         let (i, j, ratio) = (self.row + 1, self.column + 1, three_digits(self.ratio));
         write!(
             f,
-            "C and K are symmetric but for one factor: c{i}{j} over c{j}{i} and k{i}{j} over k{j}{i} are both \
-             {ratio}, as where response {i} or force {i} is read {ratio} times too large beside number {j}: \
-             look at their units and gains"
+            "C and K are symmetric except for one factor: c{i}{j} over c{j}{i} and k{i}{j} over k{j}{i} are both \
+             {ratio}, as if response {i} or force {i} were read {ratio} times too large compared with number {j}: \
+             check their units and gains"
         )
     }
 }

@@ -93,14 +93,13 @@ impl Check for Leakage {
             (_, true) => write!(
                 f,
                 ": its damping follows from leakage, and the intervals are not reliable; use segments of \
-                 {samples_needed} samples or more, or fit the record with the loads of its ends (without \
+                 {samples_needed} samples or more, or fit the record as an open one (without \
                  `from_frf`)"
             ),
             (_, false) => write!(
                 f,
-                ", and what the window blunts could not be told from it: the intervals are not reliable; \
-                 use segments of {samples_needed} samples or more, or fit the record with the loads of \
-                 its ends (without `from_frf`)"
+                ", and the bias of the window could not be separated from its damping: the intervals are not reliable; \
+                 use segments of {samples_needed} samples or more, or fit the record as an open one (without `from_frf`)"
             ),
         }
     }

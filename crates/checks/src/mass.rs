@@ -87,7 +87,7 @@ impl Check for NegativeMass {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "m{i}{i} is {mass} kg, negative by no more than noise makes it: {errors} standard errors \
+                "m{i}{i} is {mass} kg, negative within its noise: {errors} standard errors \
                  ({p_value})"
             );
         }

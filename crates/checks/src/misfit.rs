@@ -119,7 +119,7 @@ impl Misfit {
         match verdict {
             Verdict::Good => "consistent with noise",
             _ if self.ratio < 1.0 && self.source == NoiseSource::Force => {
-                "the noise of the force is less than was taken, which biases the estimate; state it with \
+                "the noise of the force is less than assumed, which biases the estimate; state it with \
                  `force_noise`"
             }
             _ if self.ratio < 1.0 => {

@@ -118,11 +118,7 @@ impl Check for TermLeftOut {
     fn sentence(&self, names: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         self.write_term(names, f)?;
         let percent = three_digits(100.0 * self.explained);
-        write!(
-            f,
-            " explains {percent} % of the power that the model leaves ({}); with it",
-            self.p_value
-        )?;
+        write!(f, " explains {percent} % of the residual power ({}); with it", self.p_value)?;
         let mut largest: Vec<&ChangeByTerm> = self.changes.iter().collect();
         largest.sort_by(|a, b| b.in_errors.abs().total_cmp(&a.in_errors.abs()));
         for (at, change) in largest.iter().take(LISTED_CHANGES).enumerate() {

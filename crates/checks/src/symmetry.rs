@@ -124,13 +124,13 @@ impl Check for MassSymmetry {
         if self.verdict() == Verdict::Good {
             return write!(
                 f,
-                "M is symmetric as far as the noise shows: m{i}{j} and m{j}{i} differ by {errors} \
+                "M is symmetric within the noise: m{i}{j} and m{j}{i} differ by {errors} \
                  standard errors ({p_value})"
             );
         }
         write!(
             f,
-            "M is not symmetric, which the kinetic energy of a machine makes it: m{i}{j} is {above} kg \
+            "M is not symmetric, as the kinetic energy of a machine requires: m{i}{j} is {above} kg \
              and m{j}{i} {below} kg, {errors} standard errors apart ({p_value}). Possible causes: \
              crosstalk between forces or between responses, a gain that is wrong, a sensor that is not \
              at the point and in the direction of its force"

@@ -30,15 +30,11 @@ impl Check for UnmeasuredForce {
 
     fn sentence(&self, _: &Names<'_>, f: &mut Formatter<'_>) -> fmt::Result {
         let percent = three_digits(100.0 * self.fraction);
-        write!(
-            f,
-            "{percent} % of the motion is taken for the response to forces that were not measured"
-        )?;
+        write!(f, "{percent} % of the motion is attributed to unmeasured forces")?;
         f.write_str(match self.verdict() {
             Verdict::Good => "",
             _ => {
-                ": a nonlinearity under a random force looks like that, and so does a degree of freedom that \
-                 is missing; repeat the test at another level of the force, or with periods that repeat"
+                ": a nonlinearity under a random force has the same effect, and so has a missing degree of freedom; repeat the test at another level of the force, or with periods that repeat"
             }
         })
     }

@@ -93,7 +93,7 @@ impl Check for Whiteness {
             return write!(
                 f,
                 "correlated up to lag {lags} ({first_coefficient:.2} at lag 1) and no further ({beyond}), \
-                 as noise on the response does, which least squares takes as exact: the parameters are \
+                 as with noise on the response, which least squares ignores: the parameters are \
                  biased by more than their standard errors"
             );
         }

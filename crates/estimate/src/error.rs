@@ -72,7 +72,7 @@ pub enum EstimateError {
     },
     /// An entry of the damping matrix is given although proportional damping determines it.
     #[error(
-        "{parameter} cannot be given: of proportional damping every entry follows from mass and stiffness"
+        "{parameter} cannot be given: with proportional damping every entry follows from mass and stiffness"
     )]
     RelatedDamping {
         /// Name of the entry.
@@ -80,8 +80,7 @@ pub enum EstimateError {
     },
     /// Entries of M, C and K are related, which the estimator does not support.
     #[error(
-        "{estimator} takes every entry of M, C and K by itself: least squares on the equation of motion and \
-         maximum likelihood know of symmetric matrices and proportional damping"
+        "{estimator} estimates every entry of M, C and K separately: symmetric matrices and proportional damping need least squares on the equation of motion or maximum likelihood"
     )]
     Related {
         /// The estimator.
@@ -146,7 +145,7 @@ pub enum EstimateError {
     },
     /// A mode is too fast for a step from sample to sample.
     #[error(
-        "the fastest mode turns at {rate:.3e} rad/s, too fast for samples {dt:.3e} s apart: leave out \
+        "the fastest mode has {rate:.3e} rad/s, too fast for samples {dt:.3e} s apart: leave out \
          degrees of freedom without mass of their own, or sample faster"
     )]
     TooStiff {

@@ -125,7 +125,7 @@ pub fn discretised_with_noise(
     let sides = sides(&Solution::from_rule(system, response.sampling().dt(), discretisation)?);
     let samples = force.record().len();
     let at = |k: usize| error(system, response.sampling(), &sides, extent, noise, k);
-    // All samples between the ends are equal; three samples have one of them.
+    // The errors of all samples between the ends are equal, so three samples represent all.
     let distinct = [at(0), at(1.min(samples - 1)), at(samples - 1)];
     let error = DMatrix::from_fn(samples, system.dof(), |k, i| {
         distinct[if k == 0 { 0 } else { 1 + usize::from(k + 1 == samples) }][i]

@@ -230,8 +230,7 @@ impl FrequencyResponses {
         let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
         if any && responses.segments.is_none() {
             responses.remarks.push(format!(
-                "the columns {} state no segments that are possible, the same in every row: what a window blunts stays \
-                 in the responses",
+                "the columns {} state no segments that are possible, the same in every row: the bias of the window was not corrected",
                 AveragedSegments::COLUMNS.join(", ")
             ));
         }

@@ -127,8 +127,7 @@ impl BearingData {
         let mut remarks = [&displacement.remarks[..], &acceleration.remarks[..]].concat();
         remarks.extend(noise.is_none().then(|| {
             format!(
-                "{}: neither standard errors nor coherence in both tables; the noise was taken from the \
-                 residual, on the displacement alone",
+                "{}: neither standard errors nor coherence in both tables; the noise was estimated from the residual, for the displacement alone",
                 names.join(", ")
             )
         }));
@@ -173,8 +172,7 @@ impl BearingData {
         let mut remarks = block.unit_notes();
         if noise.is_none() {
             remarks.push(format!(
-                "{}: the periods show no noise ({} of them); it was taken from the residual, on the \
-                 displacement alone",
+                "{}: the periods show no noise ({} of them); it was estimated from the residual, for the displacement alone",
                 block.file,
                 periods.count()
             ));

@@ -103,15 +103,14 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     summary.remarks.extend(last.map(|last| {
         let (column, unit) = (&summary.channels[last.channel].column, summary.unit);
         format!(
-            "the first {} s of the decay are used: then {column} falls to a few steps of {} {unit}, in which its values come, and \
-             what rounding leaves of it is no longer its motion (`to` sets another end)",
+            "the first {} s of the decay are used: then {column} falls to a few steps of {} {unit}, its resolution, and rounding distorts the response (`to` sets another end)",
             significant(last.samples as f64 * record.sampling().dt(), 4),
             significant(last.step, 3)
         )
     }));
     summary.remarks.extend(coarse.into_iter().map(|(channel, steps)| {
         format!(
-            "the values of {} span {steps} steps of its converter: rounding is no noise of so few, and may show as modes; \
+            "the values of {} span {steps} steps of its converter: rounding of so few steps differs from noise and may appear as modes; \
              leave the column out, or measure with a higher gain",
             summary.channels[channel].column
         )

@@ -108,7 +108,7 @@ impl DecaySummary {
                 [one] => format!(
                     "mode {one} is not linear, and its one frequency and damping are a mean"
                 ),
-                all => format!("modes {} stand for one mode and are none", all.join(", ")),
+                all => format!("modes {} represent one mode together", all.join(", ")),
             };
             remarks.push(format!(
                 "the amplitude does not fall exponentially: frequency and damping that change with it describe the \
@@ -126,7 +126,7 @@ impl DecaySummary {
         }
         if self.analysis.modes.is_none() && self.modes.len() == self.analysis.max_modes {
             remarks.push(format!(
-                "as many modes were found as are looked for, {}: there may be more (`max_modes`)",
+                "the maximum number of modes was found, {}: there may be more (`max_modes`)",
                 self.modes.len()
             ));
         }

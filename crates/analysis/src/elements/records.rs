@@ -54,7 +54,7 @@ fn from_hits(
     how: &IdentifyElements,
 ) -> Result<ElementData, AnalysisError> {
     if measurement.window_settings().period.is_some() {
-        let why = "hits are no periods: leave out `period`".into();
+        let why = "hits are not periods: leave out `period`".into();
         return Err(AnalysisError::Setting { setting: "hits", why });
     }
     if measurement.channels().force.is_empty() {

@@ -105,8 +105,7 @@ impl fmt::Display for FleetSummary {
         if self.other_parts > 0 {
             writeln!(
                 f,
-                "note: the folder holds {} more, of other records or another analysis: a reader of \
-                 the whole folder takes them in, too",
+                "note: the folder holds {} more, of other records or another analysis: a reader of the whole folder includes them",
                 message::count(self.other_parts, "part")
             )?;
         }

@@ -116,15 +116,14 @@ pub(super) fn responses_of_hits(
     let mut remarks = cut.remarks.clone();
     if at_end > DIED_OUT {
         remarks.push(format!(
-            "at the end of a window the response is still {} % of its largest: leakage makes resonances \
-             blunt; fit the hits with `hits` of an identification, which takes the ends into account, or give \
+            "at the end of a window the response is still {} % of its largest: leakage widens resonances; fit the hits with `hits` of an identification, which estimates the transients, or give \
              `exponential_percent`",
             significant(100.0 * at_end, 2)
         ));
     }
     if before > DIED_OUT {
         remarks.push(format!(
-            "before a hit the response is still {} % of its largest, and no window mends that: wait longer \
+            "before a hit the response is still {} % of its largest, which no window corrects: wait longer \
              between hits, or fit them with `hits` of an identification",
             significant(100.0 * before, 2)
         ));

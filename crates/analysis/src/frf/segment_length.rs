@@ -72,9 +72,9 @@ impl Segmentation {
         let resolved = tried[enough..].iter().find(|(.., is_resolved)| *is_resolved);
         let (len, ..) = *resolved.unwrap_or(&tried[enough]);
         let why = if len > tried[enough].0 {
-            "in which the narrowest peak is wider than the window makes any"
+            "in which the narrowest peak is wider than the window alone would make it"
         } else {
-            "whose coherence, averages and lines say nine tenths of what those of any length say"
+            "that keep 90 % of the information (coherence, number of averages and lines)"
         };
         let remark = format!("segments of {len} samples were chosen: the shortest {why}");
         Ok(Some((Self { segment: Some(len), ..self.clone() }, remark)))

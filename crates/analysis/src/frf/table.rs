@@ -183,15 +183,14 @@ impl FrfTable {
         let omega = places.iter().map(|(omega, ..)| *omega).collect();
         let mut table = Self::from_parts(records, &parts[0], how, omega, responses, coherence);
         table.remarks.push(
-            "every force has lines of its own: the responses to it are those on its lines alone"
+            "the forces have separate lines: the responses to each force are estimated on its lines alone"
                 .into(),
         );
         table.remarks.extend(crosstalk.iter().map(|one| {
             let name = |force: usize| &table.force_names[parts[force].driven[0]];
             let [force, driver] = [one.force, one.driver].map(name);
             format!(
-                "{force} has {} % of {driver} on the lines of that one: its part of the response is taken off, \
-                 with the responses to it interpolated between its own lines",
+                "{force} has {} % of {driver} on the lines of the latter: its part of the response was subtracted, with its responses interpolated between its own lines",
                 significant(100.0 * one.share, 2)
             )
         }));
@@ -252,8 +251,7 @@ impl FrfTable {
         let response =
             self.responses.iter().find(|r| (r.motion, r.force) == (peak.motion + 1, force))?;
         Some(format!(
-            "the peak of {} at {} Hz is {} wide: the window makes it blunt, and a damping ratio read from it is too \
-             large; a longer `segment` shows more of it",
+            "the peak of {} at {} Hz is {} wide: the window widens it, and a damping ratio read from it is too large; a longer `segment` resolves it better",
             self.pair(response),
             significant(self.frequency_hz[peak.at], 5),
             message::count(peak.lines, "line")
@@ -341,7 +339,7 @@ impl FrfTable {
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
         if self.is_interleaved() {
-            let why = "every force has lines of its own, and this format has the same frequencies for all \
+            let why = "the forces have separate lines, and this format has the same frequencies for all \
                        functions: write a .csv file";
             return Err(AnalysisError::Setting { setting: "output", why: why.into() });
         }

@@ -241,7 +241,7 @@ impl Fitted {
     /// Returns a remark on standard errors that include the effect of an omitted term.
     pub(super) fn counted_term(&self) -> Option<String> {
         self.omitted.as_ref().map(|_| {
-            "standard errors and intervals count what the term that the model leaves out would change (see alternative)"
+            "standard errors and intervals include the effect of the omitted term (see alternative)"
                 .to_owned()
         })
     }

@@ -119,22 +119,20 @@ impl ForceNoise {
         let Some(levels) =
             levels_and_rms.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>()
         else {
-            return "the noise of the force is not known, for above the band that it drives its spectrum has no \
-                    even floor (it drives all lines or falls off slowly, or the record is too short): the noise is \
-                    taken for none, and biases the estimate if there is any; state it (`force_noise`)"
+            return "the noise of the force is not known, because the force spectrum has no flat floor above the excited band (it covers all lines or falls slowly, or the record is too short): it is assumed zero, and any noise biases the estimate; state it (`force_noise`)"
                 .into();
         };
         let of = match source {
             Some(ForceNoiseSource::Stated) => "as stated",
             Some(ForceNoiseSource::BetweenHits) => "as between the hits",
-            Some(ForceNoiseSource::AboveBand) | None => "as above the band that it drives",
+            Some(ForceNoiseSource::AboveBand) | None => "as above the excited band",
         };
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
         let high = levels.iter().copied().fold(0.0, f64::max);
         if high == 0.0 {
             return match source {
-                Some(ForceNoiseSource::Stated) => "the force was taken as exact, as stated".into(),
-                _ => "the force shows no noise of its own, and was taken as exact".into(),
+                Some(ForceNoiseSource::Stated) => "the force was assumed exact, as stated".into(),
+                _ => "the force shows no noise and was assumed exact".into(),
             };
         }
         let range = if significant(low, 3) == significant(high, 3) {

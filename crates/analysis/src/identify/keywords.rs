@@ -240,7 +240,7 @@ impl Keywords {
         }
         let likelihood = matches!(self.method, None | Some(Method::MaximumLikelihood));
         if self.noise.is_some_and(|noise| noise != Pooling::Automatic) && !likelihood {
-            return Err(refused("noise", "it weights `method` maximum-likelihood alone"));
+            return Err(refused("noise", "it applies to `method` maximum-likelihood alone"));
         }
         Ok(())
     }

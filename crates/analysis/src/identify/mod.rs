@@ -414,7 +414,7 @@ impl Identified {
         };
         if self.fitted.nonlinear.is_some() {
             return refused(
-                "the response of a system with nonlinear terms is no matter of single lines",
+                "the response of a system with nonlinear terms cannot be given line by line",
             );
         }
         let data = self.fitted.scattered.as_ref().unwrap_or(data);

@@ -314,11 +314,11 @@ fn remarks(
     excitation: Excitation<'_>,
 ) -> Vec<String> {
     let windows = match excitation {
-        Excitation::Lasting => "the windows are no periods",
-        Excitation::Hits(_) => "hits are no periods",
+        Excitation::Lasting => "the windows are not whole periods",
+        Excitation::Hits(_) => "hits are not periods",
     };
     let of_ends = format!(
-        "{windows}: the loads of their ends were fitted with the machine, on all lines of the band"
+        "{windows}: their transients were estimated together with the system, on all lines of the band"
     );
     let known: Vec<(&Block, &ForceNoise)> =
         records.iter().map(|record| &record.held).zip(force_noise).collect();

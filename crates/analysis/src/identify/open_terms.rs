@@ -56,8 +56,7 @@ pub(super) fn fit(
         discretisation: Discretisation::FirstOrderHold,
         extent: Extent::Open,
     };
-    let of_start = "the windows are no periods: the simulated response was fitted to their samples, each from a start of \
-                    its own";
+    let of_start = "the windows are not whole periods: the simulated response was fitted to their samples, each with its own initial state";
     Ok(Fitted {
         equations: estimate.equations() / unknowns.dof(),
         before_all: linear.before_all,

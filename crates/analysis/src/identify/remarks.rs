@@ -12,12 +12,11 @@ pub(super) fn noise_remark(periods: usize, shows: bool, models: &[NoiseModel]) -
     let model = distinct.join("; ");
     match (periods, shows) {
         (0 | 1, _) => format!(
-            "one period does not show its noise: it was taken from the residual, on the motion alone; \
+            "one period does not show its noise: it was estimated from the residual, for the response alone; \
              noise spectrum: {model}"
         ),
         (_, false) => format!(
-            "the periods differ by rounding only: the noise was taken from the residual, on the motion \
-             alone; noise spectrum: {model}"
+            "the periods differ by rounding only: the noise was estimated from the residual, for the response alone; noise spectrum: {model}"
         ),
         (periods, true) => format!("noise spectrum, from {periods} periods: {model}"),
     }

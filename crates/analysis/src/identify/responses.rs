@@ -180,8 +180,7 @@ fn estimated(
 pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
     (found.blunted > BLUNTED).then(|| {
         format!(
-            "the window of the segments blunts the responses: that was taken off them, by which a parameter moves \
-             by {} standard errors",
+            "the bias of the window of the segments was subtracted from the responses; this changes a parameter by {} standard errors",
             significant(found.blunted, 2)
         )
     })

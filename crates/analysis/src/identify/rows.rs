@@ -315,8 +315,7 @@ pub(super) fn omitted_covariance_remark(estimate: &Estimate) -> Option<String> {
     let count = estimate.parameters().len();
     (!carries_covariance(estimate)).then(|| {
         format!(
-            "the covariance of {count} parameters is no part of this result, which carries that of \
-             {MOST_WITH_COVARIANCE} at most: what reads the machine from it takes M, C and K as exactly known"
+            "the result omits the covariance of {count} parameters (at most {MOST_WITH_COVARIANCE} are included): programs that read the machine from it treat M, C and K as exactly known"
         )
     })
 }

@@ -282,9 +282,7 @@ impl SampleFit {
         let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
         if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {
             remarks.push(
-                "spectral derivatives hold the noise of every line, driven or not, and of low ones \
-                 most where the acceleration was measured: without --domain time and --derivatives \
-                 the same whole periods are fitted on the lines of the force alone"
+                "spectral derivatives contain the noise of every line, excited or not, and most of the low lines if the acceleration was measured: without `domain` time and `derivatives` the same whole periods are fitted on the excited lines alone"
                     .into(),
             );
         }

@@ -73,7 +73,7 @@ impl SinusoidRow {
         let list = message::list(named.iter().map(name), ", ", NAMED);
         (!named.is_empty()).then(|| {
             format!(
-                "{} that the forces do not account for {} fitted beside the machine and taken off the responses: \
+                "{} not caused by the forces {} fitted together with the machine and subtracted from the responses: \
                  {list}: run-out, an unbalance or mains?",
                 message::count(named.len(), "sinusoid"),
                 if named.len() == 1 { "was" } else { "were" },

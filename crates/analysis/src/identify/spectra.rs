@@ -254,8 +254,7 @@ fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
     let names: Vec<String> = idle.map(|channel| held.names.force_name(channel)).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: nothing but noise; if no force acts there, put 0 in its place (`force`), for noise is taken as a \
-             force that drives the machine",
+            "{}: only noise; if no force acts there, give 0 instead (`force`); otherwise the noise is treated as excitation",
             names.join(", ")
         )
     })
@@ -478,8 +477,7 @@ fn preferred(
         return Ok(plain);
     }
     let reason = format!(
-        "maximum likelihood was used: least squares, which noise biases, leaves {} % of the motion unexplained, \
-         and not {} %",
+        "maximum likelihood was used: least squares, which is biased by noise, leaves {} % of the motion unexplained instead of {} %",
         significant(100.0 * of_plain, 3),
         significant(100.0 * of_likely, 3)
     );

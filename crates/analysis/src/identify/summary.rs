@@ -200,9 +200,7 @@ impl IdentificationSummary {
         let looked_at = records.iter().filter_map(|record| {
             let (first, last) = (record.first_sample, record.held_to()?);
             let file = &record.file;
-            Some(format!(
-                "checks of single samples looked at samples {first} to {last} of {file} only"
-            ))
+            Some(format!("checks of single samples used samples {first} to {last} of {file} only"))
         });
         let of_units = records.iter().flat_map(|record| record.unit_remarks.iter().cloned());
         let of_scale = self.unscaled.as_ref().map(Unscaled::to_string);
@@ -237,8 +235,7 @@ impl IdentificationSummary {
         if let Some(part) = unexplained {
             let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
             doubts.push(format!(
-                "the {model} leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \
-             degree of freedom more, or a record that is not periodic",
+                "the {model} leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a missing degree of freedom, or a record that is not periodic",
                 100.0 * part
             ));
         }
@@ -428,9 +425,8 @@ pub(crate) fn least_squares_remark(fitted: &Fitted, checks: &[CheckRow]) -> Opti
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
     (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
-        "least squares takes the measured motion as exact, and noise on it biases the parameters; \
-         that alone can be what the warnings after the fit tell of. With --method \
-         maximum-likelihood, which allows for noise, they speak of the machine"
+        "least squares treats the measured response as exact, and noise on it biases the parameters; \
+         this alone may explain the warnings after the fit. Repeat with `method` maximum-likelihood: warnings that remain concern the machine"
             .into()
     })
 }

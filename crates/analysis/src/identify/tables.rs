@@ -211,8 +211,7 @@ fn remarks(
             .chain(measured.iter().flat_map(|measured| measured.remarks.iter().cloned()))
             .chain(added_decay.map(|rate| {
                 format!(
-                    "an exponential window adds {} 1/s to the decay of every mode of the table: it was taken off \
-                     damping and stiffness",
+                    "an exponential window adds {} 1/s to the decay of every mode of the table: this was subtracted from damping and stiffness",
                     significant(rate, 4)
                 )
             }))
@@ -483,7 +482,7 @@ impl Fit {
                 "maximum likelihood on frequency responses, weighted by their coherence"
             }
             Noise::Unknown => {
-                "maximum likelihood on frequency responses, with noise as the residual has it"
+                "maximum likelihood on frequency responses, with noise estimated from the residual"
             }
         };
         let misfit = noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise });

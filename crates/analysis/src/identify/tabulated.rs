@@ -135,7 +135,7 @@ fn with_reciprocal<'a>(
     }
     completed.retain(|f| whole.contains(&f.reference));
     let remark = format!(
-        "{}: by reciprocity the responses at {} to forces at other points are those at these points to a force there",
+        "{}: by reciprocity the responses at {} to forces at other points are used as those at these points to a force there",
         table.file,
         whole.join(", ")
     );
@@ -273,7 +273,7 @@ impl Tabulated {
 
 /// Returns the remark that the bias of the window was not corrected, with the reason.
 fn uncorrected(table: &FrequencyResponses, why: &str) -> String {
-    format!("{}: {why}: what a window blunts stays in the responses", table.file)
+    format!("{}: {why}: the bias of the window was not corrected", table.file)
 }
 
 /// Returns remarks on the noise that a table states; `is_averaged` if its segments are used,
@@ -297,7 +297,7 @@ fn noise_remarks(
     }
     if is_certain {
         remarks.push(format!(
-            "{}: a coherence of 1 states no noise; that of the residual was taken",
+            "{}: a coherence of 1 states no noise; the noise was estimated from the residual",
             table.file
         ));
     }

@@ -65,7 +65,7 @@ impl Span {
         let end = self.start + self.len;
         self.held().map(|(first, last)| {
             format!(
-                "period, mismatch and strongest lines looked at samples {first} to {last} of {file} \
+                "period, mismatch and strongest lines were computed from samples {first} to {last} of {file} \
                  only; the levels count all samples up to {end}"
             )
         })

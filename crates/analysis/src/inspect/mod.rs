@@ -154,8 +154,7 @@ impl Inspection<'_> {
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
-                "line {line} is the last and no line break ends it: if the file was cut off there, so \
-                 may be its last number"
+                "line {line} is the last and has no line break: the file may be cut off there, and its last number with it"
             )
         }));
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })

@@ -110,8 +110,8 @@ pub(crate) fn doubtful_unit(table: &Table, column: usize) -> Option<String> {
             message::number(unit.in_si),
             unit.quantity.si(),
             match stated.evidence {
-                Evidence::Likely => "is taken where the column is used",
-                _ => "is not taken where the column is used",
+                Evidence::Likely => "is applied where the column is used",
+                _ => "is not applied where the column is used",
             }
         ),
         None => "is not understood".into(),

@@ -115,9 +115,7 @@ pub(super) fn modes_of_tables(
     }
     if tables.is_smoothed() {
         notes.push(
-            "averages under a window err most at narrow resonances, which the noise of a table follows only \
-             in part: intervals there can be half as wide as they should be; the record itself has \
-             better ones"
+            "averages under a window have their largest errors at narrow resonances, and the stated noise of a table covers them only in part: intervals there can be half as wide as they should be; fit the record itself for better ones"
                 .into(),
         );
     }

@@ -56,8 +56,8 @@ pub fn predict_with_modes(
     ));
     if !steady && settle == 0 {
         remarks.push(
-            "the prediction begins at rest: motion that the record begins with is not in it, nor in \
-             the standard errors; `settle` fits it to the first samples"
+            "the prediction begins at rest: initial motion of the record is neither in it nor in the \
+             standard errors; `settle` fits it to the first samples"
                 .into(),
         );
     }

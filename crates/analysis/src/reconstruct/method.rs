@@ -365,8 +365,7 @@ fn little_power_remark(motion: &Measurement, request: &Request) -> Option<String
     let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
     let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
     Some(format!(
-        "the lines given hold {} % of the power of channel {} about its mean, and a force on others \
-         is not sought: they are counted in the period of {samples} samples, {} Hz apart",
+        "the lines given hold {} % of the power of channel {} about its mean, and no force is sought on other lines; lines are counted in the period of {samples} samples, {} Hz apart",
         significant(100.0 * share, 3),
         channel + 1,
         significant(step, 5)

@@ -259,14 +259,13 @@ impl Task {
         remarks.extend(forces.iter().filter_map(ForceRow::doubt));
         if uncertain && !how.counts_noise {
             remarks.push(
-                "the standard error counts the uncertainty of the machine, not the noise of the \
-                 record: state that with `noise`"
+                "the standard error includes the uncertainty of the machine, not the noise of the record: state this noise with `noise`"
                     .to_owned(),
             );
         }
         if !uncertain {
             remarks.push(
-                "the machine is taken as exactly known: its file has no covariance".to_owned(),
+                "the machine is treated as exactly known: its file has no covariance".to_owned(),
             );
         }
         ForceSummary {

@@ -61,8 +61,7 @@ pub fn reconstruct_with_modes(
     remarks.extend(periods::remark(&recorded, &window));
     if run.window_settings().period.is_none() && how.at_rest {
         remarks.push(
-            "the record is taken to begin and end at rest: motion at its ends is taken for that of \
-             the forces, and the standard errors do not have it"
+            "the record is assumed to begin and end at rest: motion at its ends is attributed to the forces, and the standard errors do not include this"
                 .into(),
         );
     }

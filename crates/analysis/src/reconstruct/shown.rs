@@ -24,24 +24,21 @@ pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<Stri
         && request.band_hz.is_none()
     {
         return Some(format!(
-            "the {responses} do not show a constant force, and the slower a force is the less of it: this method takes \
-             their noise at low frequencies for a large force; state the `lines` or the `band_hz` of the force, use \
+            "the {responses} are insensitive to slow forces: with this method their noise at low frequencies appears as a large force; state the `lines` or the `band_hz` of the force, use \
              `method` shrinkage, which finds where the noise prevails, or measure a displacement as well"
         ));
     }
     let hz = |value| significant(value, 4);
     match (how.seen_from_hz?, how.band_hz?, request.band_hz) {
         (seen, [low, high], None) if seen > 0.0 => Some(format!(
-            "the {responses} do not show a constant force, and below {} Hz less of a force than their \
-             noise: force and standard error are those of {} to {} Hz; for the slower part measure a \
+            "the {responses} are insensitive to slow forces, and below {} Hz their noise exceeds the part of a force in them: force and standard error are those of {} to {} Hz; for the slower part measure a \
              displacement as well",
             hz(seen),
             hz(low),
             hz(high)
         )),
         (seen, [low, _], Some(_)) if low < seen => Some(format!(
-            "below {0} Hz the {responses} show less of a force than their noise, and the band asked \
-             for begins at {1} Hz: the standard error has that part as unknown; begin the band at {0} \
+            "below {0} Hz the noise of the {responses} exceeds the part of a force in them, and the requested band begins at {1} Hz: the standard error includes that part as unknown; begin the band at {0} \
              Hz, or measure a displacement as well",
             hz(seen),
             hz(low)

@@ -101,7 +101,7 @@ pub fn remark(
         ""
     };
     Some(format!(
-        "the force found leaves unexplained {}: {unless}{}; do not believe its standard error",
+        "the identified force does not explain {}: {unless}{}; its standard error is not reliable",
         listed(&named.collect::<Vec<_>>()),
         causes(request, dofs).join(", or ")
     ))
@@ -117,13 +117,13 @@ fn causes(request: &Request, dofs: usize) -> Vec<String> {
         causes.push(format!("another force acts than on {degrees} of freedom {forced} (`forced`)"));
     }
     if matches!(request.rule, Rule::Given(_)) {
-        causes.push("`parameter` holds too much of the force back".into());
+        causes.push("`parameter` suppresses too much of the force".into());
     }
     if !request.periodic && request.start == Start::FromRest {
         causes.push("the record does not begin at rest".into());
     }
     causes.push("a sensor is dead, exchanged or in another unit".into());
-    causes.push("the machine is not this one".into());
+    causes.push("the machine differs from the one given".into());
     causes
 }
 

@@ -110,7 +110,7 @@ fn measured(
     // A random response needs averages: one window is not enough.
     let fitted = identified.fitted();
     if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
-        let origin = "measured on the lines of each hit, without what the ends of its window add";
+        let origin = "measured on the lines of each hit, without the transients of its window";
         return Ok((data.clone(), origin.into()));
     }
     let of_responses = fitted.coherence.is_some();
@@ -142,7 +142,7 @@ fn measured(
         format!(
             "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
                  where the force explains at least half of the motion (a resonance narrower than \
-                 the lines looks blunter than it is)",
+                 the lines appears wider than it is)",
             segment(first)
         )
     };

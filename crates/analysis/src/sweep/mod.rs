@@ -162,7 +162,7 @@ fn spectra_note(measured: &Block) -> Option<String> {
     if let Some(last) = measured.held_to() {
         let (first, file) = (measured.first_sample, &measured.file);
         return Some(format!(
-            "the lines that are driven were found in samples {first} to {last} of {file}"
+            "the excited lines were determined from samples {first} to {last} of {file}"
         ));
     }
     let seam = periodicity(measured.response().0);

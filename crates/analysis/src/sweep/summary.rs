@@ -160,7 +160,7 @@ impl SweepSummary {
             "\nThe error is that of the worst entry, relative to the largest of its matrix"
         } else {
             "\nThe error is the largest standard error, relative to the largest entry of its \
-             matrix: it knows nothing of bias"
+             matrix: it does not include bias"
         };
         text += if only_best { ".\n" } else { "; ± is one standard error.\n" };
         let (name, unit) = self.setting.label();

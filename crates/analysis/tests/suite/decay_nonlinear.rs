@@ -173,5 +173,5 @@ fn a_second_hit_and_the_largest_number_of_modes_are_said() {
     assert!((at - 3.0).abs() < 0.1, "{found}");
     let few = DecaySettings { max_modes: 1, ..DecaySettings::default() };
     let found = decay(&measured(sampling, one, 0.005, 6), &few).unwrap();
-    assert!(told(&found, "as are looked for"), "{found}");
+    assert!(told(&found, "the maximum number of modes was found"), "{found}");
 }

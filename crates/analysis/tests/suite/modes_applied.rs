@@ -75,7 +75,7 @@ fn predictions_and_forces_err_as_they_state() {
         assert!(prediction.to_string().contains("begins at rest"), "{prediction}");
         let how = Reconstruct { at_rest: true, ..Reconstruct::default() };
         let force = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
-        assert!(force.to_string().contains("taken to begin and end at rest"), "{force}");
+        assert!(force.to_string().contains("assumed to begin and end at rest"), "{force}");
         let difference = force.force().record().data() - forces.data();
         for (at, row) in force.summary().forces.iter().enumerate() {
             let error = measures::rms(difference.column(at).as_slice());
@@ -135,7 +135,7 @@ fn one_of_the_forces_is_found_from_some_of_the_responses() {
     // The wrong place: the responses cannot be explained.
     let how = Reconstruct { at_rest: true, ..Reconstruct::default().forced([1]) };
     let wrong = reconstruct_with_modes(&record, &system, &how, &mut |_| Ok(())).unwrap();
-    assert!(wrong.to_string().contains("leaves unexplained"), "{wrong}");
+    assert!(wrong.to_string().contains("force does not explain"), "{wrong}");
 }
 
 #[test]

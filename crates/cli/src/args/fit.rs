@@ -31,8 +31,8 @@ pub struct FitArgs {
     /// More records of the same machine, with the same columns and window: all are fitted together
     #[arg(value_name = "RECORD")]
     pub(super) more: Vec<PathBuf>,
-    /// First samples of more windows of the first record, each as long as that from --start on: all
-    /// are fitted together, as realisations of one excitation
+    /// First samples of further windows of the first record, each as long as the one that begins at
+    /// --start; all are fitted together, as realisations of one excitation
     #[arg(long, value_name = "SAMPLE,…", value_parser = at_least_one, value_delimiter = ',',
           requires = "period", help_heading = "Time and window")]
     more_starts: Vec<usize>,
@@ -46,33 +46,32 @@ pub struct FitArgs {
     /// Estimator of the parameters from the spectra: least-squares on the equation of motion (noise
     /// on the response biases it), instrumental (one half of the periods against the other; not
     /// biased), or maximum-likelihood on the response (not biased, of least scatter) [default:
-    /// maximum-likelihood where two periods or more show the noise, where it biases least squares,
-    /// or with --from-frf; otherwise least-squares]
+    /// maximum-likelihood if at least two periods show the noise, if noise biases least squares, or
+    /// with --from-frf; otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_parser = word::<Method>())]
     method: Option<Method>,
     /// Noise spectrum that weights the lines in maximum likelihood: white, smooth, neighbours:N
     /// (means over N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
     pub(super) noise: Option<Pooling>,
-    /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one
-    /// per degree of freedom; for open records, which are fitted as such then [default: that above
-    /// the band that the force drives, or between hits]
+    /// Standard deviation of the noise on the force samples, in N: one for all forces, or one per
+    /// degree of freedom; for open records, so the record is fitted as one [default: estimated
+    /// above the excited band, or between hits]
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true)]
     force_noise: Vec<f64>,
-    /// Extent of the window: open (any part of a response: the unknown loads of its ends are fitted
-    /// with the machine) or period (whole ones: the first sample follows the last again) [default:
-    /// period with --period; otherwise period unless the ends show, and in the time domain open but
-    /// for spectral derivatives]
+    /// Extent of the window: open (any part of a response; its transient is estimated with the
+    /// machine) or period (whole periods) [default: period with --period; otherwise period unless a
+    /// transient is found; in the time domain open, except for spectral derivatives]
     #[arg(long, value_name = "EXTENT", value_parser = word::<Extent>())]
     extent: Option<Extent>,
-    /// Assumption on the force between samples: held (as a converter drives a shaker) or linear,
-    /// exact if it is true, of open records, hits and in the time domain; euler, the dissertation's
-    /// rule, in the time domain, biased in proportion to the step [default: band-limited; in the
-    /// time domain the equation of motion at the samples if there is an acceleration, else linear]
+    /// Force between the samples: held (as a converter drives a shaker) or linear, exact if this is
+    /// true, for open records, hits and the time domain; euler (the dissertation's rule) for the
+    /// time domain, with a bias in proportion to the step [default: band-limited; in the time
+    /// domain the equation of motion at the samples if there is an acceleration, otherwise linear]
     #[arg(long, value_name = "ASSUMPTION", value_parser = word::<Discretisation>())]
     between_samples: Option<Discretisation>,
-    /// Channels behind a first-order high-pass, such as an AC coupled input, each with its corner
-    /// frequency in Hz; of open records and hits
+    /// Channels behind a first-order high-pass, such as an AC-coupled input, each with its corner
+    /// frequency in Hz; for open records and hits
     #[arg(long, value_name = "COLUMN=HZ,…", value_delimiter = ',')]
     ac_coupling: Vec<AcCoupling>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
@@ -95,16 +94,16 @@ pub struct FitArgs {
     nonlinear: NonlinearArgs,
     #[command(flatten)]
     time: TimeArgs,
-    /// Fit frequency responses, averaged over segments, with their coherence as weights, estimated
-    /// by where the noise is: h1 on the response, h2 on the force, hv on both
+    /// Fit frequency responses averaged over segments, weighted by their coherence; the estimator
+    /// depends on where the noise is: h1 on the response, h2 on the force, hv on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<frf::Estimator>(),
           help_heading = "Frequency responses")]
     from_frf: Option<frf::Estimator>,
     #[command(flatten)]
     segments: SegmentArgs,
-    /// Record to predict (same columns), of it COUNT samples from START on: report the percentage
-    /// of its response that the identified system predicts. Without a name, such as :2049:1024, it
-    /// is the first record itself [default: all of it]
+    /// Record to predict, with the same columns: COUNT samples from START on; the report states the
+    /// percentage of its response that the identified system predicts. Without a name, such as
+    /// :2049:1024, it is the first record itself [default: all samples]
     #[arg(long, value_name = "RECORD:START:COUNT", help_heading = "Validation")]
     validate: Option<Validated>,
     /// Add every line of the fit to the JSON: force, measured and fitted response with their
@@ -126,7 +125,7 @@ pub struct LineArgs {
     /// Use the lines with force between two frequencies, in Hz
     #[arg(long, value_name = "LOW:HIGH")]
     pub(super) band_hz: Option<Band>,
-    /// Lines to leave out of these, numbers and ranges as for --lines
+    /// Lines to exclude, numbers and ranges as for --lines
     #[arg(long, value_name = "LINES")]
     without_lines: Option<LineSpec>,
     /// Frequencies whose lines are excluded, in Hz, such as 50 (mains), 50:0.5 (half a hertz to
@@ -156,11 +155,11 @@ struct NonlinearArgs {
     /// others: three records or windows at least) [default: information]
     #[arg(long, value_name = "CRITERION", value_parser = word::<Criterion>())]
     criterion: Option<Criterion>,
-    /// Constants to estimate, too: laws (those inside the laws, from the values given), delay (of
-    /// the force), phase (that all channels have in common, as of equal filters)
+    /// Constants to estimate as well: laws (constants inside the laws, from the given values on),
+    /// delay (of the force), phase (common to all channels, as of equal filters)
     #[arg(long, value_name = "WHAT,…", value_parser = word::<Constant>(), value_delimiter = ',')]
     search: Vec<Constant>,
-    /// Weighting of the lines, by where the equation error is equally large on all of them:
+    /// Weights of the lines, from the quantity in which the equation error is equal on all of them:
     /// white-force, response, or smooth-spectrum (the residual's own); automatic: the likeliest
     /// [default: automatic]
     #[arg(long, value_name = "WEIGHTING", value_parser = word::<Weighting>())]
@@ -171,13 +170,13 @@ struct NonlinearArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Time domain")]
 struct TimeArgs {
-    /// Derivation of the velocity and the acceleration where only the displacement was measured, or
-    /// only the acceleration: by the spectrum of whole periods, or by a polynomial of an ORDER
-    /// through a sliding WINDOW of samples (odd)
+    /// Method for velocity and acceleration if only the displacement, or only the acceleration, was
+    /// measured: the spectrum of whole periods, or a polynomial of an ORDER through a sliding
+    /// WINDOW of samples (odd)
     #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
     derivatives: Option<Derivatives>,
-    /// Put FACTOR steps into every interval, which makes the error of --between-samples smaller,
-    /// with samples between by linear, spline or band-limited interpolation
+    /// Divide every interval into FACTOR steps, with linear, spline or band-limited interpolation
+    /// between the samples; this reduces the error of --between-samples
     #[arg(long, value_name = "FACTOR:INTERPOLATION", requires = "between_samples")]
     refine: Option<Refinement>,
 }
@@ -186,11 +185,10 @@ struct TimeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Samples of a segment, for a random excitation; the part that the next one repeats, in per
-    /// cent (50); and the window that weights its samples: hann, hamming (a narrower peak, more
-    /// leakage from far away), blackman (the least leakage, a wider peak) or rectangular (for
-    /// bursts that begin and end at rest) [default: the periods are the segments; of records
-    /// without --period, chosen by the coherence]
+    /// Segments for a random excitation: number of samples; overlap in per cent (50); and window of
+    /// the samples: hann, hamming (a narrower peak, more leakage from far away), blackman (the
+    /// least leakage, a wider peak) or rectangular (for bursts that begin and end at rest)
+    /// [default: the periods are the segments; without --period, chosen by the coherence]
     #[arg(long, value_name = "SAMPLES:OVERLAP:WINDOW")]
     segment: Option<Segmentation>,
 }

@@ -22,20 +22,18 @@ use crate::worker::worker_program;
 /// Every record becomes one row: parameters, standard errors, covariance, modes, findings,
 /// warnings, notes, or the error of a record that cannot be identified. The records are divided
 /// into parts of --part-records records, by rising path; a part is one file of the folder, complete
-/// or not there. Run again, the command computes what is missing: the parts that were not finished,
-/// and those in which a record, the analysis or the version of the program is another one.
+/// or absent. Repeated, the command computes the missing parts: those that were not finished, and
+/// those in which a record, the analysis or the version of the program has changed.
 ///
-/// Records are worked on in processes of their own. A record that takes too much memory or time, or
-/// that ends its process, becomes a row with its error, and the others go on. Named pipes, sockets
-/// and devices are ignored.
+/// Each worker is a separate process. A record that uses too much memory or time, or that ends its
+/// process, becomes a row with its error, and the others continue. Named pipes, sockets and devices
+/// are ignored.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Exit code 1 says that all records were gone through and some have no result.
+#[command(after_help = "Exit code 1 means that all records were processed and some have no result.
 
 Examples:
   mechid fleet day-1/ day-2/ --analysis analysis.json --output results
-  mechid fleet a.csv b.mat c.parquet --analysis analysis.json --output results --workers 2 --json"
-)]
+  mechid fleet a.csv b.mat c.parquet --analysis analysis.json --output results --workers 2 --json")]
 pub struct FleetArgs {
     /// The records, of any format; a folder means all files in it
     #[arg(value_name = "RECORD", required = true)]

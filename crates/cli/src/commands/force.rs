@@ -21,18 +21,18 @@ use crate::outcome::{Files, Outcome};
 /// Find the force that drove a known machine from its measured motion
 ///
 /// The window is one or more whole periods if --period or --lines is given (they are averaged), an
-/// open record otherwise. Where the machine comes from `mechid identify --json`, its uncertainty
-/// counts in the standard error of the force. A machine with nonlinear terms needs displacement,
-/// velocity and acceleration of every degree of freedom.
+/// open record otherwise. The uncertainty of a machine from `mechid identify --json` is included in
+/// the standard error of the force. A machine with nonlinear terms needs displacement, velocity and
+/// acceleration of every degree of freedom.
 ///
-/// The system may also be the result of `mechid modes --json`: the forces and responses are then
-/// those of the modal test, by name or in order, --forced counts its forces, and the force is found
-/// line by line in the band of the test, of whole periods or of a record that begins and ends at
-/// rest (--at-rest).
+/// The system may also be the result of `mechid modes --json`: forces and responses are then those
+/// of the modal test, by name or in order, --forced counts its forces, and the force is found line
+/// by line in the band of the test, for whole periods or a record that begins and ends at rest
+/// (--at-rest).
 ///
-/// A long text is read a stretch at a time. The methods continuous and discretised hold no open
-/// record either; any other method, --spectrum and --plot hold all of it, of the columns used
-/// alone. Of whole periods only their mean is held.
+/// A long text is read in chunks. The methods continuous and discretised do not keep an open record
+/// in memory; every other method, --spectrum and --plot keep the columns used. For whole periods
+/// only their mean is kept.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement --json > machine.json
@@ -63,9 +63,9 @@ pub struct ForceArgs {
     /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
     #[arg(long, value_name = "LINES")]
     lines: Option<LineSpec>,
-    /// Seek the force between two frequencies only, in Hz; force and standard error are then those
-    /// of this band [default: all, or without a displacement those at which the responses show a
-    /// force]
+    /// Estimate the force only between two frequencies, in Hz; its standard error is that of this
+    /// band, too [default: all; without a displacement the frequencies at which the responses show
+    /// a force]
     #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
     band_hz: Option<Band>,
     /// An open record begins at rest

@@ -15,9 +15,10 @@ use crate::outcome::{Files, Outcome};
 
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
-/// With a periodic excitation the periods are the segments that are averaged (--period says how
-/// long one is). With a random excitation say --segment: segments overlap under a window. Of a
-/// hammer test the good --hits are averaged. A long text is read a stretch at a time and not held.
+/// With a periodic excitation the periods are the segments that are averaged (--period is the
+/// length of one). With a random excitation give --segment: segments overlap under a window. For a
+/// hammer test the good hits are averaged (--hits). A long text is read in chunks and not kept in
+/// memory.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
@@ -36,8 +37,8 @@ pub struct FrfArgs {
     more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
-    /// Frequency response estimator, by where the noise is: h1 on the response, h2 on the force, hv
-    /// on both
+    /// Frequency response estimator; it depends on where the noise is: h1 on the response, h2 on
+    /// the force, hv on both
     #[arg(long, value_name = "ESTIMATOR", value_parser = word::<Estimator>(), default_value = "h1")]
     estimator: Estimator,
     #[command(flatten)]

@@ -10,23 +10,23 @@ use crate::outcome::{Files, Outcome};
 
 /// Find mass, damping and stiffness from a measured force and response
 ///
-/// In the frequency domain (the default) the window must hold whole periods of a periodic
-/// excitation, and one kind of motion is enough; the periods are averaged. Of a random excitation,
-/// or any record that is no period, the ends are fitted with the machine; of a hammer test those of
-/// each of the good --hits. In the time domain any record will do: displacement, velocity and
-/// acceleration for the equation of motion itself, or displacement and velocity with an assumption
-/// on the force between the samples; what was not measured, --derivatives finds.
+/// In the frequency domain (the default) the window must contain whole periods of a periodic
+/// excitation, and one kind of motion is enough; the periods are averaged. For a random excitation,
+/// or any record that is not a period, the transient is estimated with the machine; for a hammer
+/// test that of each good hit (--hits). In the time domain any record is possible: displacement,
+/// velocity and acceleration for the equation of motion itself, or displacement and velocity with
+/// an assumption on the force between the samples; --derivatives computes what was not measured.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
 ///
-/// With --machine, of a machine that is described by its elements, the unknown coefficients are
-/// found from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on
-/// a shake table.
+/// With --machine, the unknown coefficients of a machine described by its elements are identified
+/// from sensors anywhere: springs and dampers of a chain, the bearings of a rotor, a frame on a
+/// shake table.
 ///
-/// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
-/// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held
-/// whole are windows for spectral --derivatives, and for a --refine by a spline or band-limited,
-/// one long period, and what --validate predicts as a steady state.
+/// A long text is read in chunks and not kept in memory: the fit uses all of it, checks and plots
+/// in the time domain at most the first 262144 samples. Kept in memory are windows for spectral
+/// --derivatives and for --refine by a spline or band-limited, one long period, and a record that
+/// --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement

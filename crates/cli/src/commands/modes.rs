@@ -25,11 +25,11 @@ use crate::outcome::{Files, Outcome};
 /// Find the modes: of a test with forces, of a table of frequency responses, of a free decay, of an
 /// ambient record, of a machine
 ///
-/// With --force, any number of forces and of responses: shakers, a hammer (--hits leaves bad hits
-/// out), a hammer that roves from point to point (a record for each, --force-at). Frequencies,
-/// damping ratios and shapes are estimated by maximum likelihood on the spectral lines of the whole
-/// records, without windows; the number of modes is chosen, too. Without --force the record is
-/// taken for a free decay, or with --ambient for the response to forces that nobody measured.
+/// With --force, any number of forces and responses: shakers, a hammer (--hits excludes bad hits),
+/// a hammer that roves from point to point (a record for each, --force-at). Frequencies, damping
+/// ratios and shapes are estimated by maximum likelihood on the spectral lines of the whole
+/// records, without windows; the number of modes is chosen, too. Without --force the record is a
+/// free decay, or with --ambient the response to unmeasured forces.
 ///
 /// Without any column the file is a table of frequency responses: a universal file (datasets 58),
 /// or a table with the columns that `mechid frf --output` writes. A file in JSON is the description
@@ -70,13 +70,13 @@ pub struct ModesArgs {
     /// follow
     #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
     response_at: Vec<String>,
-    /// Frequencies to use, in Hz [default: those that the forces drive]
+    /// Frequencies to use, in Hz [default: the band that the forces excite]
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
     /// Number of modes [default: as many as the record shows; of a machine all]
     #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     modes: Option<usize>,
-    /// Largest number of modes to look for
+    /// Maximum number of modes
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
     max_modes: Option<usize>,
     /// Frequencies, in Hz, near which a mode is estimated even if it is weak; of a machine with
@@ -84,7 +84,7 @@ pub struct ModesArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
-    /// Keep this part of each record, at its end, out of a second fit, and predict it
+    /// Exclude this part at the end of each record from a second fit, and predict it
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
     /// Predict this record, with the same columns, from its forces
@@ -128,7 +128,7 @@ struct UnmeasuredArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           requires = "ambient", allow_negative_numbers = true)]
     without_hz: Vec<f64>,
-    /// Leave out the harmonics that are found
+    /// Exclude the harmonics that are found
     #[arg(long, requires = "ambient")]
     without_harmonics: bool,
     /// Beginning of a free decay, in seconds from the first sample of the window [default: found]
@@ -138,7 +138,7 @@ struct UnmeasuredArgs {
     /// [default: its end]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     to: Option<f64>,
-    /// The channels of a free decay have no constant
+    /// Fit a free decay without a constant in each channel
     #[arg(long)]
     no_offset: bool,
 }
@@ -278,7 +278,7 @@ impl ModesArgs {
     /// Refuses the first given option among some.
     fn refuse(&self, what: &str, options: &[(&'static str, bool)]) -> Result<(), CliError> {
         let Some(&(setting, _)) = options.iter().find(|(_, given)| *given) else { return Ok(()) };
-        let why = format!("it means nothing to {what}");
+        let why = format!("it does not apply to {what}");
         Err(AnalysisError::Setting { setting, why }.into())
     }
 

@@ -55,8 +55,7 @@ use crate::outcome::{Files, Outcome};
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed
 ///
-/// The picture shows over time what the record holds, noise and all, of up to four degrees of
-/// freedom.
+/// The picture shows the record over time, with its noise, for up to four degrees of freedom.
 ///
 /// Many runs, by --runs or --study, go into one Parquet file: its column run names the run of each
 /// row. mechid fleet identifies them all, and mechid trends shows the results.

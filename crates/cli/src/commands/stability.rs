@@ -18,9 +18,9 @@ use crate::outcome::{Files, Outcome};
 /// Show stability and accuracy of the time-stepping schemes
 ///
 /// For a free oscillation of period T stepped by Δt: the spectral radius (above 1 the motion grows
-/// without end), how much longer than T the numerical period is, and which share of its amplitude
-/// it loses per period. All of it is read off the stepping code itself. The conventions of a scheme
-/// on load and start do not matter to a free motion.
+/// without end), the relative elongation of the period, and the share of the amplitude lost per
+/// period. All values come from the stepping code itself. The conventions of a scheme on load and
+/// start have no effect on a free motion.
 ///
 /// With the description of an experiment (see mechid simulate) also the largest stable step of each
 /// scheme for that machine.

@@ -23,11 +23,10 @@ use crate::outcome::{Files, Outcome};
 /// stays. With NPI a period holds that many cycles of the natural frequency, so that the step is 2π
 /// NPI / (samples · ωn). The machine described is the truth that errors are measured against.
 ///
-/// Every n-th sample of a measured record is taken, without a filter; columns and window are chosen
+/// Every n-th sample of a measured record is used, without a filter; columns and window are chosen
 /// as in "mechid identify". Without --reference the standard errors are compared, which do not
-/// include bias. A long text is gone through once for all settings, a stretch at a time, and not
-/// held; of spectra one long period is, and the lines that are driven are found in the first 262144
-/// samples.
+/// include bias. A long text is read once for all settings, in chunks; for spectra one long period
+/// is kept in memory, and the excited lines are determined from the first 262144 samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid sweep examples/machine.json --npi 2,4,8 --estimator euler

@@ -374,7 +374,7 @@ fn hits_of_a_hammer_and_the_page() {
         assert!(page.contains(part), "{part}: {page}");
     }
     let message = refused(at, &format!("identify {fit} --period 512"));
-    assert!(message.contains("hits are no periods: leave out --period"), "{message}");
+    assert!(message.contains("hits are not periods: leave out --period"), "{message}");
     let message = refused(at, "report hits.csv --frf-table --output page.html");
     assert!(message.contains("--frf-table of a report belongs to --machine"), "{message}");
 }

@@ -221,7 +221,7 @@ fn a_last_line_that_nothing_ends_is_told() {
     ] {
         fs::write(folder.path().join(name), text).unwrap();
         let said = mechid(folder.path(), &format!("info {name}"));
-        assert_eq!(said.matches("no line break ends it").count(), usize::from(told.is_some()));
+        assert_eq!(said.matches("has no line break").count(), usize::from(told.is_some()));
         assert!(said.contains(told.unwrap_or("3 samples")), "{said}");
     }
 }

@@ -76,10 +76,10 @@ fn a_hammer_that_roves_gives_the_shapes() {
 fn what_means_nothing_is_refused() {
     let folder = examples();
     for (arguments, told) in [
-        ("machine.json --hits", "--hits: it means nothing to a machine"),
+        ("machine.json --hits", "--hits: it does not apply to a machine"),
         (
             "hammer-1.csv --acceleration a1 --force-at 1",
-            "--force-at: it means nothing to a free decay",
+            "--force-at: it does not apply to a free decay",
         ),
         ("hammer-1.csv --force force --acceleration a1 --band-hz 300:400", "no spectral line"),
         (

@@ -72,7 +72,7 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     assert_eq!(report["window"]["periods"], PERIODS);
     assert_eq!(report["window"]["last_sample"], samples);
     let remarks = report["remarks"].as_array().unwrap();
-    let part = "checks of single samples looked at samples 1 to 262000 of rec only";
+    let part = "checks of single samples used samples 1 to 262000 of rec only";
     assert!(remarks.iter().any(|r| r == part), "{remarks:?}");
     // What is not held counts all the same: 8 periods of a hundred times the noise, of 270.
     let beginning = both("identify --period 1000 --periods 262 --method maximum-likelihood");
@@ -300,7 +300,7 @@ fn levels_of_a_long_text_are_those_of_all_of_it() {
     assert_eq!(square["period"]["samples"], 2);
     assert_eq!(
         report["remarks"][0],
-        "period, mismatch and strongest lines looked at samples 1 to 262144 of rec.csv only; \
+        "period, mismatch and strongest lines were computed from samples 1 to 262144 of rec.csv only; \
          the levels count all samples up to 270000"
     );
     // All of a short window is looked at, wherever it stands.

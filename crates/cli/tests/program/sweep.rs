@@ -122,10 +122,10 @@ fn a_record_is_swept_by_taking_fewer_samples() {
     // A period that falls between the samples is said where it happens.
     let uneven = report(&format!("{spectra} --decimate 1,7"));
     let reason = uneven["points"][1]["failure"].as_str().unwrap();
-    assert_eq!(reason, "a period of 240 samples is no whole number of every 7th sample");
+    assert_eq!(reason, "a period of 240 samples cannot be divided into steps of every 7th sample");
     // Without a reference the standard errors are told as such.
     let own = told(&format!("{columns} --decimate 1,2"));
-    assert!(own.contains("it knows nothing of bias"), "{own}");
+    assert!(own.contains("it does not include bias"), "{own}");
 }
 
 #[test]

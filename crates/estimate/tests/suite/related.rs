@@ -304,7 +304,7 @@ fn relations_that_contradict_are_refused() {
     let damped = two().fix(Matrix::Damping, 0, 1, 0.0).unwrap();
     assert_eq!(
         damped.proportional_damping().unwrap_err().to_string(),
-        "c12 cannot be given: of proportional damping every entry follows from mass and stiffness"
+        "c12 cannot be given: with proportional damping every entry follows from mass and stiffness"
     );
     let known = two().symmetric(Matrix::Mass).unwrap().fix(Matrix::Mass, 0, 1, 0.5).unwrap();
     assert_eq!(known.fixed(Matrix::Mass, 1, 0), Some(0.5));

@@ -56,7 +56,7 @@ pub enum SimulateError {
     /// The periodic response of a nonlinear or large machine is unstable, so that a run leaves it.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
-         Floquet multiplier), so that no machine stays on it; choose \"response\": \"from-rest\" to see \
+         Floquet multiplier), so that no machine keeps it; choose \"response\": \"from-rest\" to see \
          where the response goes, or another amplitude or frequency",
         multiplier_text(*.multiplier)
     )]

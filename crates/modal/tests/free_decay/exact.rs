@@ -11,7 +11,7 @@ use crate::noisy::{Case, found_in_noise};
 const CASE: Case = Case { modes: 2, channels: 2, noise: 0.01, coloured: false, close: false };
 
 /// The number of modes, the intervals and the scatter hold in some experiments; the book
-/// (`free-decay.md`) has the figures of more.
+/// (`studies/decays.md`) has the figures of more.
 #[test]
 fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
     for (case, runs) in [

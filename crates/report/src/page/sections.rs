@@ -377,7 +377,7 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
             @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
         }
         (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
-        p.note { "Fit: 100 % less the size of the difference over that of the motion about its mean; 0 % is no better than the mean." }
+        p.note { "Fit: 100 % minus the ratio of the difference to the motion about its mean, in RMS values; 0 % is no better than the mean." }
         div.figures { (figure(&drawn)) }
     }))
 }

@@ -85,11 +85,11 @@ fn leakage(
     let lines = width(narrowest);
     let why = match averaged {
         Some(_) if settled => {
-            "a segment wide: its damping follows from what the window blunts, and its intervals are not \
+            "a segment wide: its damping follows from the bias of the window, and its intervals are not \
              reliable; use longer segments, or fit the record itself"
         }
         Some(_) => {
-            "a segment wide: what the window blunts could not be separated from it, and its intervals \
+            "a segment wide: the bias of the window could not be separated from its damping, and its intervals \
              are not reliable; use longer segments, or fit the record itself"
         }
         None => {
