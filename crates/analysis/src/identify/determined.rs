@@ -59,7 +59,7 @@ pub(super) fn check(
         } else {
             format!("which leaves {} a peak of the noise", frequencies.join(", "))
         };
-        return refused(format!("{} hold zero, {modes}", intervals(estimate)));
+        return refused(format!("{} contain zero, {modes}", intervals(estimate)));
     }
     Ok(())
 }
@@ -70,7 +70,7 @@ pub(super) fn modes_alone(fitted: &Fitted, modes: &[IdentifiedMode]) -> Option<S
     let is_alone = fitted.nonlinear.is_none() && is_open(&fitted.estimate);
     (is_alone && !frequencies.is_empty()).then(|| {
         let [named, open] = [message::list(&frequencies, ", ", NAMED), intervals(&fitted.estimate)];
-        format!("the data determine modes ({named}), but no parameter: {open} hold zero")
+        format!("the data determine modes ({named}), but no parameter: {open} contain zero")
     })
 }
 

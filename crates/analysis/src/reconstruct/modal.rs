@@ -56,8 +56,11 @@ pub fn reconstruct_with_modes(
         levels => Noise::PerChannel(levels.to_vec()),
     };
     let force = frequency_domain(system, &motion, &request.forced, &lines, &noise)?;
-    let mut remarks =
-        vec![format!("forces are counted as in {}: {}", system.name, system.inputs.join(", "))];
+    let mut remarks = vec![format!(
+        "the numbers of the forces are those of {}: {}",
+        system.name,
+        system.inputs.join(", ")
+    )];
     remarks.extend(periods::remark(&recorded, &window));
     if run.window_settings().period.is_none() && how.at_rest {
         remarks.push(

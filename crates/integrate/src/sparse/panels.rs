@@ -191,7 +191,7 @@ fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
     // row names. If this is the next column, the last column of a panel has the rows of all.
     let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
     let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
-    // An entry costs one, a row and a panel some of them.
+    // The unit of cost is an entry; a row and a panel cost several.
     let cost = |width: usize| {
         let rows = columns.column(first + width - 1).0.len() + width;
         (rows * (width + PER_ROW) + PER_PANEL) as f64 / width as f64

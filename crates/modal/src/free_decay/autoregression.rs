@@ -71,7 +71,7 @@ impl Autoregression {
     pub(super) fn whitened(&self, values: &[f64], first: usize, before: usize) -> Vec<f64> {
         let mut errors = values[before..].to_vec();
         let order = self.order();
-        // The first samples have fewer before them.
+        // The first samples have fewer previous samples than the order.
         let ramp = order.saturating_sub(first + before).min(errors.len());
         for (at, error) in errors.iter_mut().enumerate().take(ramp) {
             let of = first + before + at;

@@ -52,7 +52,7 @@ fn coherence(table: &FrequencyResponses, rows: &[usize]) -> Option<ModalCheck> {
     let impossible = values.iter().filter(|value| !(0.0..=1.0).contains(*value)).count();
     let text = if impossible > 0 {
         format!(
-            "{}: {impossible} of {} values of the coherence are not between 0 and 1, so it is none",
+            "{}: {impossible} of {} values of the coherence are not between 0 and 1, so it is not a coherence",
             table.file,
             values.len()
         )
