@@ -123,31 +123,31 @@ def identify(
         mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
         arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator of the parameters; without, maximum likelihood where the periods show the noise,
-        where it biases least squares, or where `from_frf` is given; otherwise least squares.
+        Estimator of the parameters. Without it, maximum likelihood if the periods show the
+        noise, if noise biases least squares, or with `from_frf`; otherwise least squares.
     noise : str, optional
-        Noise spectrum by which maximum likelihood weighs the lines of whole periods: ``"white"``,
-        ``"smooth"``, ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or
-        ``"auto"``, which chooses.
+        Noise spectrum that weights the lines in maximum likelihood: ``"white"``, ``"smooth"``,
+        ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or ``"auto"``,
+        which chooses.
     force_noise : float or sequence of float, optional
-        Standard deviation of the noise on the samples of the force, in N, one for all forces or one
-        per degree of freedom; for open records, which are fitted as such then. Without, that above
-        the band that the force drives, or between hits.
+        Standard deviation of the noise on the force samples, in N: one for all forces, or one
+        per degree of freedom; for open records, so the record is fitted as one. Without it,
+        estimated above the excited band, or between hits.
     lines : str, optional
         Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
-        ``"1:2:335"``; every line at which the force exceeds its noise, without.
+        ``"1:2:335"``. Without it, every line at which the force exceeds its noise.
     band_hz : (float, float), optional
         Use the lines with force between two frequencies, in Hz.
     without_lines : str, optional
-        Lines to leave out of these, numbers and ranges as for `lines`.
+        Lines to exclude, numbers and ranges as for `lines`.
     without_hz : sequence of float or dict, optional
-        Frequencies whose lines are left out, in Hz: a number, or a dict of ``frequency_hz``,
+        Frequencies whose lines are excluded, in Hz: a number, or a dict of ``frequency_hz``,
         ``half_width_hz`` and ``multiples`` (True for a rotation).
     mass : float or sequence of float or None, optional
         Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
         one.
     structure : str or sequence of str
-        What is known of the form of M, C and K: ``"symmetric"``, ``"chain"`` (masses in a row, with
+        Known structure of M, C and K: ``"symmetric"``, ``"chain"`` (masses in a row, with
         springs and dampers to neighbours and to the ground), ``"diagonal-mass"``,
         ``"proportional-damping"`` (C = αM + βK), or an entry such as ``"k13=0"``.
     domain : {"frequency", "time"}
@@ -155,46 +155,48 @@ def identify(
     from_frf : {"h1", "h2", "hv"}, optional
         Fit frequency responses, averaged over segments.
     segment : int or str or dict, optional
-        Samples of a segment; ``"1024:50:hann"`` says also the part that the next one repeats, in per cent,
-        and the window (hann, hamming, blackman, rectangular), as a dict of ``segment``,
-        ``overlap_percent`` and ``window`` does.
+        Samples of a segment; ``"1024:50:hann"`` adds the overlap in per cent and the window
+        (hann, hamming, blackman, rectangular), as does a dict of ``segment``,
+        ``overlap_percent`` and ``window``.
     between_samples : {"euler", "held", "linear"}, optional
-        Assumption on the force between samples: held or linear of open records, hits and in the time
-        domain, euler in the time domain alone. Without, the force is band-limited.
+        Force between the samples: held or linear for open records, hits and the time domain,
+        euler for the time domain only. Without it, the force is band-limited.
     ac_coupling : sequence of str or dict
-        Channels of open records and hits behind a first-order high-pass, such as ``"a1=0.5"`` with the
-        corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
+        Channels behind a first-order high-pass, for open records and hits, such as ``"a1=0.5"``
+        with the corner frequency in Hz, or a dict of ``channel`` and ``corner_hz``.
     extent : {"open", "period"}, optional
-        Extent of the window. Of open records the unknown loads of their ends are fitted with the
-        machine; without, the window is a period where `period` is given, and otherwise unless the ends
-        show (in the time domain it is open).
+        Extent of the window: open (its transient is estimated with the machine) or period.
+        Without it, a period if `period` is given; otherwise a period unless a transient is
+        found (in the time domain open).
     hits : bool or str or dict, optional
-        Cut the records of a hammer test into hits, leave bad ones out and fit each of the others as a
-        record of its own; ``"trigger=0.5,double=5"`` changes the rule, or a dict of
-        ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and ``before`` and
-        ``samples`` of a hit in samples.
+        Divide the records of a hammer test into hits, exclude bad ones and fit each of the
+        others as a separate record; ``"trigger=0.5,double=5"`` changes the rule, or a dict of
+        ``trigger_percent``, ``double_percent``, ``weak_percent``, ``bounce_s``, and ``before``
+        and ``samples`` of a hit in samples.
     derivatives : str, optional
-        How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
+        Method for velocity and acceleration that were not measured: ``"spectral"`` or
+        ``"savitzky-golay:WINDOW:ORDER"``.
     refine : str or dict, optional
         Steps in every sampling interval and the interpolation between the samples (linear, spline,
         band-limited), such as ``"8:band-limited"``.
     nonlinear : str, optional
-        Springs and dampers to fit beside mass, damping and stiffness, such as
-        ``"k3: x1^3, c2: |v1| v1"``.
+        Springs and dampers to fit in addition to mass, damping and stiffness, such as ``"k3:
+        x1^3, c2: |v1| v1"``.
     candidates : str, optional
-        Terms of which those are added that the data ask for, written in the same way.
+        Further terms to try, written in the same way; the useful ones are added.
     criterion : {"information", "held-out"}, optional
-        Criterion by which a candidate is added: the extended Bayesian information criterion, or the
-        misfit of each record, predicted by the fit to the others (three records at least).
+        Criterion for the addition of a candidate: the extended Bayesian information criterion,
+        or the misfit of each record, predicted by the fit to the others (three records at
+        least).
     search : sequence of {"laws", "delay", "phase"}
-        Constants to search for besides: those inside the laws, the delay of the force, the phase that
-        all channels have in common.
+        Constants to estimate as well: those inside the laws, the delay of the force, the phase
+        common to all channels.
     weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
         Weighting of the lines of a fit with nonlinear terms.
     validate : Measurement or dict, optional
-        Record to predict that is not fitted; a dict of ``record``, ``start`` (first sample, counted from
-        1) and ``samples`` (their number) says which of its samples, without ``record`` those of the
-        first one fitted.
+        Record to predict that is not fitted. A dict of ``record``, ``start`` (first sample,
+        counted from 1) and ``samples`` (their number) selects its samples; without ``record``
+        they are those of the first fitted record.
     settings : dict, optional
         ``settings`` of another result, instead of the options above; they are keywords, too.
     threads : int, optional
