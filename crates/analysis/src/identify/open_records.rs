@@ -150,11 +150,7 @@ pub(super) fn fit(
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let late = delay_of_open_records(&data, dt, unknowns, &fit, follows_force(&residuals));
-    let Compared { parts, omitted } = if residuals.iter().any(SpectralResidual::is_rounding) {
-        Compared::default()
-    } else {
-        agreement(&data, &fit, excitation)?
-    };
+    let Compared { parts, omitted } = agreement(&data, &fit, &residuals, excitation)?;
     // The noise of a pulse correlates its lines, which the score test does not allow for.
     let fault = if matches!(excitation, Excitation::Hits(_)) {
         None
@@ -219,13 +215,17 @@ fn sinusoid_rows(records: &[Windowed], fit: &OutputErrorFit) -> Vec<SinusoidRow>
     pairs.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect()
 }
 
-/// Compares the records and the bands of lines, and tests terms that the model omits. A single
-/// record is divided into stretches of time.
+/// Compares the records and the bands of lines, and tests terms that the model omits, unless a
+/// residual is only rounding. A single record is divided into stretches of time.
 fn agreement(
     data: &[FrequencyData],
     fit: &OutputErrorFit,
+    residuals: &[SpectralResidual],
     excitation: Excitation<'_>,
 ) -> Result<Compared, AnalysisError> {
+    if residuals.iter().any(SpectralResidual::is_rounding) {
+        return Ok(Compared::default());
+    }
     let joint = joined(data)?;
     let parts = PartsOfFit::new(&joint, &fit.estimate, fit.ends.as_ref(), Some(&fit.spectrum));
     let first = match (data, excitation) {

@@ -31,16 +31,7 @@ pub fn reconstruct_with_modes(
     how: &Reconstruct,
     take: &mut Take<'_>,
 ) -> Result<Reconstructed, AnalysisError> {
-    if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
-        let why = "modes give the force line by line: frequency-domain".into();
-        return Err(AnalysisError::Setting { setting: "method", why });
-    }
-    if run.window_settings().period.is_none() && how.lines.is_none() && !how.at_rest {
-        let why = "modes give the force of whole periods (`period`), or of a record that begins \
-                   and ends at rest"
-            .into();
-        return Err(AnalysisError::Setting { setting: "at_rest", why });
-    }
+    check_settings(run, how)?;
     let recorded = Recorded::with_columns(run, &system.outputs_of(run.channels())?, true)?;
     let places = system.inputs.len();
     let request = Request::new(how, &recorded, places, true)?;
@@ -88,7 +79,22 @@ pub fn reconstruct_with_modes(
     Ok(Reconstructed { summary, force, forced, lines })
 }
 
-/// Returns the band of the modes, or the part of it that is asked for.
+/// Checks that modes can give the force with these settings.
+fn check_settings(run: &Measurement, how: &Reconstruct) -> Result<(), AnalysisError> {
+    if !matches!(how.method, Method::Auto | Method::FrequencyDomain) {
+        let why = "modes give the force line by line: frequency-domain".into();
+        return Err(AnalysisError::Setting { setting: "method", why });
+    }
+    if run.window_settings().period.is_none() && how.lines.is_none() && !how.at_rest {
+        let why = "modes give the force of whole periods (`period`), or of a record that begins \
+                   and ends at rest"
+            .into();
+        return Err(AnalysisError::Setting { setting: "at_rest", why });
+    }
+    Ok(())
+}
+
+/// Returns the band of the modes, or the requested part of it.
 fn band(system: &ModalSystem, request: &Request) -> Result<[f64; 2], AnalysisError> {
     let [low, high] = system.band_hz;
     let Some([from, to]) = request.band_hz else { return Ok(system.band_hz) };
