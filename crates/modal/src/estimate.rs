@@ -294,7 +294,8 @@ fn explained(fit: &Fit<'_>) -> Vec<f64> {
         .collect()
 }
 
-fn log_likelihood(fit: &Fit<'_>) -> f64 {
+/// Returns the log-likelihood at the weights of a fit, without constants.
+pub(crate) fn log_likelihood(fit: &Fit<'_>) -> f64 {
     let outputs = fit.weights.level.len() as f64;
     let lines = fit.lines.len() as f64;
     let shapes: f64 = fit.weights.shape.iter().map(|value| value.ln()).sum();

@@ -8,14 +8,14 @@ use nalgebra::Complex;
 use crate::ModalError;
 use crate::constraint::ModalConstraint;
 use crate::covariance::Covariance;
-use crate::estimate::ModalEstimate;
+use crate::estimate::{ModalEstimate, log_likelihood};
 use crate::initial_poles::initial_poles;
 use crate::limits::{MAX_DAMPING, NEIGHBOUR_HALF_WIDTHS};
 use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
 use crate::model::{Model, ResidualPowers};
 use crate::noise::{Noise, shapes};
-use crate::order::{add_best, removal_losses, required_gain};
+use crate::order::{add_best, hidden, is_within_resonance, removal_losses, required_gain};
 use crate::projection::Weights;
 use crate::residues::with_participations;
 use crate::rules::drop_reasons;
@@ -144,9 +144,7 @@ impl<'a> Identification<'a> {
 
     /// Searches with the weights of the current noise estimate.
     fn search_with_noise(&mut self) {
-        let shapes = shapes(&self.fit.projection, &self.fit.weights, self.fit.model.modes());
-        self.fit.weights = self.noise.weights(self.lines, &self.fit.model, &shapes);
-        self.fit.refresh();
+        weigh(&mut self.fit, &self.noise);
         self.fit.search_roughly();
         log::debug!(
             "{} modes, {} steps, cost {:.1}",
@@ -184,8 +182,39 @@ impl<'a> Identification<'a> {
                 }
             }
         }
+        self.add_hidden(required, most);
         if let Some(most) = self.settings.modes {
             self.remove_beyond(most);
+        }
+    }
+
+    /// Adds modes beside others whose unmeasured forces took their response, if the likelihood of
+    /// fit and noise together rises by the penalty of their parameters.
+    fn add_hidden(&mut self, required: f64, most: usize) {
+        while self.settings.unmeasured_forces && self.modes_in_band() < most {
+            let mut trial = self.fit.clone();
+            weigh(&mut trial, &Noise::from_fit(&self.fit, None));
+            let Some(candidate) = hidden(&trial, required) else { return };
+            trial.model.push(&candidate);
+            trial.refresh();
+            trial.search_roughly();
+            let noise = Noise::from_fit(&trial, Some(Vec::new()));
+            weigh(&mut trial, &noise);
+            trial.search_roughly();
+            let gain = 2.0 * (log_likelihood(&trial) - log_likelihood(&self.fit));
+            let hz = candidate.pole.im / TAU;
+            log::debug!("hidden mode {hz:.3} Hz, gain {gain:.0}, required {required:.0}");
+            let modes = &trial.model.poles;
+            let stays =
+                modes.split_last().is_some_and(|(one, others)| is_within_resonance(*one, others));
+            if gain < required || !stays {
+                return;
+            }
+            (self.fit, self.noise) = (trial, noise);
+            self.update_noise();
+            if self.remove_impossible() {
+                return;
+            }
         }
     }
 
@@ -385,6 +414,13 @@ impl<'a> Identification<'a> {
         let (fit, noise) = (&self.fit, &self.noise);
         Ok(ModalEstimate::new(fit, noise, &covariance, self.dropped, &stated, constraints))
     }
+}
+
+/// Weights a fit by a noise estimate.
+fn weigh(fit: &mut Fit<'_>, noise: &Noise) {
+    let shapes = shapes(&fit.projection, &fit.weights, fit.model.modes());
+    fit.weights = noise.weights(fit.lines, &fit.model, &shapes);
+    fit.refresh();
 }
 
 /// Returns the initial residual powers.

@@ -90,6 +90,16 @@ pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;
 /// Largest distance in half-widths of two modes whose covariance is kept in a modal model; the
 /// errors of modes farther apart count as independent.
 pub const GROUP_HALF_WIDTHS: f64 = 10.0;
+/// Distance from a mode, in half-widths, within which its unmeasured force may hide another mode:
+/// the force acts where the mode resonates.
+pub const HIDDEN_HALF_WIDTHS: f64 = 1.0;
+/// Largest ratio of the widths of two modes of which one may hide the other; the tails of a wider
+/// one stand out.
+pub const HIDDEN_WIDTHS: f64 = 3.0;
+/// Minimum share of the residual around a mode that the measured forces explain at which a hidden
+/// mode is tried: noise explains the number of forces over that of the lines. The likelihood
+/// decides.
+pub const LEAST_HIDDEN_SHARE: f64 = 0.5;
 /// Minimum noise of a sensor, relative to the root-mean-square of its output: lower noise is
 /// rounding, and in data without noise ever more modes would be significant.
 pub const LEAST_NOISE: f64 = 1e-6;

@@ -13,6 +13,7 @@ use std::ops::Range;
 use nalgebra::Complex;
 
 use crate::lines::{Block, Lines, Load};
+use crate::order::Candidate;
 
 /// Powers of jω of the residual terms, which represent all modes outside the band.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -261,6 +262,13 @@ impl Model {
             participation[strongest] = Complex::new(1.0, 0.0);
             self.gauge[mode] = strongest;
         }
+    }
+
+    /// Adds a candidate as the last mode.
+    pub(crate) fn push(&mut self, candidate: &Candidate) {
+        self.poles.push(candidate.pole);
+        self.participation.push(candidate.participation.clone());
+        self.gauge.push(0);
     }
 
     /// Sorts the modes by frequency.

@@ -3,7 +3,10 @@
 use nalgebra::Complex;
 use rayon::prelude::*;
 
-use crate::limits::{MAX_DAMPING, MAX_TRIES, MIN_SCAN_LINES, SCAN_HALF_WIDTHS};
+use crate::limits::{
+    HIDDEN_HALF_WIDTHS, HIDDEN_WIDTHS, LEAST_HIDDEN_SHARE, MAX_DAMPING, MAX_TRIES, MIN_SCAN_LINES,
+    SCAN_HALF_WIDTHS,
+};
 use crate::lines::Lines;
 use crate::residues::leading_row;
 use crate::search::Fit;
@@ -24,6 +27,8 @@ pub(crate) struct Candidate {
     pub(crate) participation: Vec<C>,
     /// Decrease of −2 log L by this mode alone.
     pub(crate) gain: f64,
+    /// Share of the power of the residual around the candidate that it explains.
+    pub(crate) explained: f64,
 }
 
 /// Returns the decrease of −2 log L that one more mode must bring: its parameters times the
@@ -58,8 +63,36 @@ pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
     (0..modes).map(loss).collect()
 }
 
+/// Returns whether a pole lies within the resonance of a mode of the fit and is about as wide: the
+/// unmeasured force of a mode takes up no more than this.
+pub(crate) fn is_within_resonance(pole: C, modes: &[C]) -> bool {
+    let width = |mode: &C| pole.re / mode.re;
+    let inside = |mode: &&C| (pole.im - mode.im).abs() < HIDDEN_HALF_WIDTHS * -mode.re;
+    modes
+        .iter()
+        .filter(inside)
+        .any(|mode| (HIDDEN_WIDTHS.recip()..=HIDDEN_WIDTHS).contains(&width(mode)))
+}
+
+/// Returns the best candidate within the resonance of a mode of the fit whose response to the
+/// measured forces explains most of the residual around it.
+///
+/// If two close modes are fitted as one, the unmeasured force of this mode takes up what remains,
+/// and the weights hide the other mode. Noise and unmeasured forces are independent of the measured
+/// ones: they explain little of such a residual.
+pub(crate) fn hidden(fit: &Fit<'_>, required: f64) -> Option<Candidate> {
+    let mut candidates = candidates(fit, &|pole| is_within_resonance(pole, &fit.model.poles));
+    candidates.retain(|one| one.gain > required && one.explained > LEAST_HIDDEN_SHARE);
+    candidates.into_iter().next()
+}
+
 /// Returns the candidates of the residual, the best first.
 pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
+    candidates(fit, &|_| true)
+}
+
+/// Returns the candidates at some of the poles (rad/s) of the grid, the best first.
+fn candidates(fit: &Fit<'_>, is_tried: &dyn Fn(C) -> bool) -> Vec<Candidate> {
     let lines = fit.lines;
     let (low, high) = lines.band();
     let spacing = (high - low) / lines.blocks[0].len().max(2) as f64;
@@ -68,7 +101,9 @@ pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
     for damping in DAMPING_GRID {
         let mut omega = low;
         while omega < high {
-            grid.push((omega, damping));
+            if is_tried(C::new(-damping * omega, omega)) {
+                grid.push((omega, damping));
+            }
             omega += (GRID_STEP * damping * omega).max(0.75 * spacing);
         }
     }
@@ -127,6 +162,7 @@ impl Residual {
         let mut square = vec![C::default(); loads * loads];
         let mut cross = vec![C::default(); loads * outputs];
         let mut column = vec![C::default(); loads];
+        let mut power = 0.0;
         for block in &lines.blocks {
             let omega_block = &lines.omega[block.rows.clone()];
             let first = omega_block.partition_point(|w| *w < omega - half_range);
@@ -137,6 +173,7 @@ impl Residual {
                     column[load] = lines.load(load, row) * gain;
                 }
                 let residual = &self.values[row * outputs..(row + 1) * outputs];
+                power += residual.iter().map(|z| z.norm_sqr()).sum::<f64>();
                 for &a in &block.active {
                     let conjugate = column[a].conj();
                     for &b in &block.active {
@@ -151,6 +188,7 @@ impl Residual {
             pole,
             participation,
             gain,
+            explained: gain / power.max(f64::MIN_POSITIVE),
         })
     }
 }
@@ -220,9 +258,7 @@ pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candi
             continue;
         }
         let mut trial = fit.clone();
-        trial.model.poles.push(candidate.pole);
-        trial.model.participation.push(candidate.participation.clone());
-        trial.model.gauge.push(0);
+        trial.model.push(&candidate);
         trial.refresh();
         trial.search_roughly();
         let gain = fit.cost() - trial.cost();

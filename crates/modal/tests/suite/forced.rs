@@ -26,6 +26,16 @@ fn two_forces_and_a_close_pair() {
     check(&pair(8), 10);
 }
 
+/// In this record the first search sees one mode where there are two, 0.3 % apart; an unmeasured
+/// force on it takes up what the second one does.
+#[test]
+fn an_unmeasured_force_hides_no_mode() {
+    let mut close = pair(8);
+    close.frequency_hz[3] = 131.4;
+    let score = Score::of(&close, 4..5);
+    assert_eq!((score.found_share(), score.false_modes), (100.0, 0));
+}
+
 #[test]
 fn hits_with_decays_that_are_cut() {
     check(&hammer(), 10);
