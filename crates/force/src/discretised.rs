@@ -167,7 +167,8 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
-    // The input matrix of a short step is about I in step units, which also judges a single force.
+    // The input matrix of a short step is about I in step units, which allows a test of a single
+    // force, too.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

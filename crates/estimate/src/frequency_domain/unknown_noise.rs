@@ -192,7 +192,7 @@ fn with_coloured_noise(
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
         match before.fit.clone().followed(&mut misfit) {
             Ok(fit) => last = Some(Weighted { fit, noise }),
-            // The fit before is the result, with its weights.
+            // The result is the previous fit, with its weights.
             Err(_) => break,
         }
     }

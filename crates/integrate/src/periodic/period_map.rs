@@ -42,7 +42,8 @@ impl PeriodMap {
         };
         let steps = sampling.len();
         let over_period = -power_less_identity(&change, steps);
-        // Rounding changes the matrix of a step by ε of its change, and a product by ε of its result.
+        // Rounding changes the matrix of a step by ε of its change, and a product by ε of its
+        // result.
         let rounding = f64::EPSILON
             * (steps as f64 * change.norm() + f64::from(steps.ilog2() + 1) * over_period.norm());
         let size = over_period.norm().max(1.0);
