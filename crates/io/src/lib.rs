@@ -21,6 +21,7 @@
 mod contents;
 mod covariance;
 mod csv_text;
+mod details;
 mod error;
 mod escape;
 mod experiment;
@@ -53,6 +54,7 @@ mod units;
 pub use contents::{DecimalSign, Place};
 pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::{CsvFile, csv_text};
+pub use details::record_details;
 pub use error::IoError;
 pub use escape::{escaped, path_text};
 pub use experiment::{

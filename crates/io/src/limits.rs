@@ -5,6 +5,10 @@ use std::fmt;
 /// Memory per number while a file is read, in bytes: the number, and a copy while its column grows.
 pub(crate) const NUMBER_BYTES: usize = 16;
 
+/// Number of bytes at the beginning of a record that are searched for its details: headers of
+/// analysers are shorter.
+pub(crate) const DETAILS_BYTES: u64 = 64 << 10;
+
 /// Size, in bytes, that the text in any gzip file may have, however small the file is.
 const TEXT_BYTES: usize = 64 << 20;
 
