@@ -6,11 +6,12 @@ use std::fmt;
 use mechid_estimate::IdentifiedMode;
 use mechid_io::SystemMatrices;
 use mechid_model::{ModelError, Terms};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
 use crate::identify::rows::{CONFIDENCE, ModeRow, Uncertain, mode_cells};
 use crate::machine::Machine;
+use crate::modes::saved_errors;
 use crate::text::{compact, significant, text_table};
 
 /// Modes of a machine, with standard errors and intervals if its parameters have them.
@@ -39,7 +40,7 @@ pub struct ModalSummary {
 }
 
 /// One mode with its shape.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ShapedMode {
     /// Frequencies, damping, poles.
     #[serde(flatten)]
@@ -51,7 +52,7 @@ pub struct ShapedMode {
 }
 
 /// Frequency of a mode at one amplitude.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BackboneRow {
     /// Number of the mode of the undamped system, counted from 1 by rising frequency.
     pub mode: usize,
@@ -62,12 +63,13 @@ pub struct BackboneRow {
 }
 
 /// One entry of a mode shape: real and imaginary part.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ShapeEntry {
     /// Real and imaginary part.
     pub value: [f64; 2],
     /// Standard errors of real and imaginary part, in the same unit; `None` for an exactly known
     /// machine.
+    #[serde(default, deserialize_with = "saved_errors")]
     pub standard_error: Option<[f64; 2]>,
 }
 

@@ -2,7 +2,7 @@
 
 use mechid_estimate::IdentifiedMode;
 use mechid_modal::free_decay::Backbone;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::summary::DecaySummary;
 use crate::AnalysisError;
@@ -27,7 +27,7 @@ pub struct Harmonic {
 }
 
 /// Frequency and damping as functions of the amplitude (backbone curve).
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BackboneRow {
     /// Linear modes that represent this nonlinear mode, counted from 1.
     pub modes: Vec<usize>,
@@ -39,7 +39,7 @@ pub struct BackboneRow {
 }
 
 /// Frequency and damping at one amplitude.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BackbonePointRow {
     /// Time from the first sample used, in s.
     pub time_s: f64,

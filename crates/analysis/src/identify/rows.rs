@@ -3,11 +3,12 @@
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::{EIGENVALUE_ROUNDING, Parameter};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Unscaled;
 use crate::AnalysisError;
 use crate::measurement::Block;
+use crate::modes::SavedValue;
 use crate::text::{compact, significant, text_table};
 
 /// Level of the confidence intervals, a pure number such as 0.95.
@@ -44,7 +45,8 @@ pub struct LinesUsed {
 }
 
 /// A value with its standard error and confidence interval.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(from = "SavedValue")]
 pub struct Uncertain {
     /// Value, in its unit.
     pub value: f64,
@@ -84,7 +86,7 @@ pub struct ProportionalDamping {
 }
 
 /// One mode of a system.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ModeRow {
     /// `true` if the mode is underdamped.
     pub oscillates: bool,
@@ -219,7 +221,7 @@ impl Uncertain {
     }
 
     /// Returns a pure number in per cent.
-    pub(crate) fn percent(&self) -> Self {
+    pub fn percent(&self) -> Self {
         Self {
             value: 100.0 * self.value,
             standard_error: self.standard_error.map(|error| 100.0 * error),

@@ -8,12 +8,12 @@ use mechid_modal::stabilisation::Stabilisation;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
 
 /// Diagrams for a choice of the number of modes.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Diagrams {
     /// Poles of models of rising order: the initial estimates of the modes.
     pub stabilisation: StabilisationRows,
@@ -23,7 +23,7 @@ pub struct Diagrams {
 }
 
 /// Poles of models of rising order, column by column.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct StabilisationRows {
     /// Order of the model of each pole.
     pub order: Vec<usize>,
@@ -40,7 +40,7 @@ pub struct StabilisationRows {
 ///
 /// Peaks of the first singular value are modes; a peak of the second one at the same frequency is a
 /// second mode.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ModeIndicator {
     /// `true` for measured responses (tables), `false` for the responses of the identified modes
     /// and residual terms (records).

@@ -12,6 +12,7 @@ mod mode_set;
 mod prediction;
 pub(crate) mod resonances;
 mod rows;
+mod saved;
 mod settings;
 mod sources;
 mod summary;
@@ -31,6 +32,10 @@ pub use self::diagrams::{Diagrams, ModeIndicator, StabilisationRows};
 use self::forced::Test;
 pub use self::mode_set::ModeSet;
 pub use self::prediction::predict_with_modes;
+pub use self::saved::{
+    SavedBackbone, SavedCandidate, SavedCheck, SavedMode, SavedModes, SavedRecord, SavedResponse,
+};
+pub(crate) use self::saved::{SavedValue, saved_errors};
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
 pub(crate) use self::sources::driven_band;
