@@ -40,11 +40,14 @@ const ticks = ({g, s}, [low, high], wanted) => {
                 if (!marks.includes(m) || n % stride) minor.push(v);
                 else major.push([v, low >= 1e-3 && high < 1e6 ? String(+v.toPrecision(1)) : m > 1 ? m + raised(n) : raised(n).slice(1)]);
             }
-        if (major.length > 2) return {major, minor: stride > 1 ? [] : minor, factor: ""};
+        if (major.length > 2 || span > 1 && major.length) return {major, minor: stride > 1 ? [] : minor, factor: ""};
         major.length = 0;
     }
-    const rough = (high - low) / wanted, decade = 10 ** floor(log10(rough)), fixed = [s, 2 * s, 4 * s].find(v => within((high - low) / v, 2, 1.6 * wanted) === (high - low) / v);
-    const step = fixed ?? decade * ([1, 2, 5].find(m => rough / decade <= m * 1.000001) ?? 10);
+    const nice = v => { const decade = 10 ** floor(log10(v)); return decade * ([1, 2, 5].find(m => v / decade <= m * 1.000001) ?? 10); };
+    const fixed = [s, 2 * s, 4 * s].find(v => within((high - low) / v, 2, 1.6 * wanted) === (high - low) / v);
+    let step = fixed ?? nice((high - low) / wanted);
+    // One tick does not show the scale.
+    for (let n = 0; n < 2 && floor(high / step + 1e-9) - ceil(low / step - 1e-9) < 1; n++) step = nice(step / 2.6);
     let power = floor(log10(max(abs(low), abs(high))));
     power = power >= -2 && power < 5 ? 0 : 3 * floor(power / 3);
     const unit = 10 ** power, decimals = within(-floor(log10(step / unit) + 1e-9), 0, 12);
