@@ -1,32 +1,59 @@
-//! Frequency of the modes of a nonlinear system as a function of their amplitude.
+//! Frequency and damping of the modes of a nonlinear response as functions of their amplitude.
 
-use mechid_analysis::identify::rows::CONFIDENCE;
+use mechid_analysis::decay;
+use mechid_analysis::identify::rows::{CONFIDENCE, Uncertain};
 use mechid_analysis::modal::BackboneRow;
 use mechid_analysis::text::compact;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 
-/// Returns a panel for each mode: its frequency with the confidence interval.
-pub fn figure(file: &str, rows: &[BackboneRow]) -> Figure {
+/// Returns a panel for each mode of a machine: its frequency with the confidence interval.
+pub fn of_machine(title: &str, rows: &[BackboneRow]) -> Figure {
     let modes = rows.last().map_or(0, |row| row.mode);
     let panels = (1..=modes).map(|mode| {
         let of_mode: Vec<&BackboneRow> = rows.iter().filter(|row| row.mode == mode).collect();
         let amplitude: Vec<f64> = of_mode.iter().map(|row| row.amplitude).collect();
-        let of = |value: &dyn Fn(&BackboneRow) -> f64| -> Vec<f64> {
-            of_mode.iter().map(|row| value(row)).collect()
-        };
-        let mut panel = Panel::new(
+        let values: Vec<Uncertain> = of_mode.iter().map(|row| row.frequency_hz).collect();
+        let axes = (
             Axis::linear("Amplitude of the fundamental", "m"),
             Axis::linear(format!("Frequency of mode {mode}"), "Hz"),
         );
-        if of_mode.iter().all(|row| row.frequency_hz.interval.is_some()) {
-            let bound = |end: usize| {
-                of(&|row| row.frequency_hz.interval.map_or(row.frequency_hz.value, |i| i[end]))
-            };
-            let name = format!("{} % interval", compact(100.0 * CONFIDENCE, 3));
-            panel = panel.curve(Curve::band(name, &amplitude, &bound(0), &bound(1)));
-        }
-        let values = of(&|row| row.frequency_hz.value);
-        panel.curve(Curve::marked_line("free vibration without damping", &amplitude, &values))
+        panel(axes, "free vibration without damping", &amplitude, &values)
     });
-    panels.fold(Figure::new(format!("Backbone: {file}")), Figure::panel)
+    panels.fold(Figure::new(title), Figure::panel)
+}
+
+/// Returns frequency and damping ratio of a free decay over its amplitude, in this unit, with their
+/// confidence intervals.
+pub fn of_decay(title: &str, row: &decay::BackboneRow, unit: &str) -> Figure {
+    let amplitude: Vec<f64> = row.points.iter().map(|point| point.amplitude).collect();
+    let frequency: Vec<Uncertain> = row.points.iter().map(|point| point.frequency_hz).collect();
+    let damping: Vec<Uncertain> =
+        row.points.iter().map(|point| point.damping_ratio.percent()).collect();
+    let axis = || Axis::linear("Amplitude", unit);
+    Figure::new(title)
+        .panel(panel((axis(), Axis::linear("Frequency", "Hz")), "estimate", &amplitude, &frequency))
+        .panel(panel((axis(), Axis::linear("Damping ratio", "%")), "", &amplitude, &damping))
+        .share_x()
+}
+
+/// Returns values over amplitude with their intervals, if all of these are finite.
+fn panel((x, y): (Axis, Axis), name: &str, amplitude: &[f64], values: &[Uncertain]) -> Panel {
+    let panel = Panel::new(x, y);
+    let finite = |value: &Uncertain| {
+        value.interval.filter(|[low, high]| low.is_finite() && high.is_finite())
+    };
+    let intervals: Option<Vec<[f64; 2]>> = values.iter().map(finite).collect();
+    let panel = match intervals {
+        Some(intervals) => {
+            let end = |at: usize| -> Vec<f64> { intervals.iter().map(|ends| ends[at]).collect() };
+            let label = match name {
+                "" => String::new(),
+                _ => format!("{} % interval", compact(100.0 * CONFIDENCE, 3)),
+            };
+            panel.curve(Curve::band(label, amplitude, &end(0), &end(1)))
+        }
+        None => panel,
+    };
+    let values: Vec<f64> = values.iter().map(|value| value.value).collect();
+    panel.curve(Curve::marked_line(name, amplitude, &values))
 }

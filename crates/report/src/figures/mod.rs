@@ -1,6 +1,6 @@
 //! Figures of the results of an analysis.
 
-mod backbone;
+pub(crate) mod backbone;
 mod bearing;
 pub(crate) mod elements;
 mod force;
@@ -21,18 +21,20 @@ pub mod trends;
 use mechid_analysis::bearing::BearingTable;
 #[cfg(feature = "parquet")]
 use mechid_analysis::fleet::Trends;
+use mechid_analysis::modes::SavedModes;
 use mechid_analysis::{
     AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedElements,
-    IdentifiedResponses, Inspected, Machine, Modes, Reconstructed, SweepSummary,
+    IdentifiedResponses, Inspected, Machine, ModalSummary, Modes, Reconstructed, SweepSummary,
 };
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
 use mechid_spectra::FrequencyData;
+use serde::Serialize;
 
 use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
-use crate::page::figure_page;
+use crate::page::{PageSettings, figure_page, modes_page};
 
 /// A result that can be drawn.
 pub trait ToFigure {
@@ -61,6 +63,19 @@ pub trait ToFigure {
         let title = figure.name().to_owned();
         figure_page(&title, vec![(String::new(), figure)], None)
     }
+}
+
+/// Returns the page of a result with modes: their table, figure, shapes and checks.
+fn modes_of_result(
+    summary: &impl Serialize,
+    result: &impl ToFigure,
+    style: FigureStyle,
+) -> Result<String, ReportError> {
+    let modes = SavedModes::from_result(summary)?;
+    let (shaped, points) = modes.shapes();
+    let shapes = shapes::ModeShapes::from_modes(&shaped, &points, None);
+    let figure = result.styled_figure(style)?;
+    modes_page(&modes, Some(figure), shapes.as_ref(), &PageSettings::default())
 }
 
 fn receptance_or_responses(
@@ -191,6 +206,10 @@ impl ToFigure for Decayed {
         let title = format!("{}: free decay", self.summary().file);
         Ok(motion::motion(&title, self.compared(), "fitted"))
     }
+
+    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        modes_of_result(self.summary(), self, style)
+    }
 }
 
 impl ToFigure for Modes {
@@ -198,6 +217,10 @@ impl ToFigure for Modes {
     /// with the stabilisation diagram and the mode indicator.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         modes::figure(self)
+    }
+
+    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        modes_of_result(self.summary(), self, style)
     }
 }
 
@@ -245,7 +268,8 @@ impl ToFigure for Machine {
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let backbone = self.backbone()?;
         if !backbone.is_empty() {
-            return Ok(backbone::figure(&self.name, &backbone));
+            let title = format!("Backbone: {}", self.name);
+            return Ok(backbone::of_machine(&title, &backbone));
         }
         let modes = self.modes()?;
         let resonances: Vec<modal::Resonance> = modes
@@ -266,5 +290,9 @@ impl ToFigure for Machine {
         };
         let names = Names { displacement: &displacement, force: &force };
         modal::figure(&self.name, self.system(), names, &resonances, style)
+    }
+
+    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        modes_of_result(&ModalSummary::of(self)?, self, style)
     }
 }

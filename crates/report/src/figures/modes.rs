@@ -2,7 +2,7 @@
 //! indicator.
 
 use mechid_analysis::Modes;
-use mechid_analysis::modes::{ModeIndicator, StabilisationRows};
+use mechid_analysis::modes::{Diagrams, ModeIndicator, StabilisationRows};
 use mechid_analysis::text::{compact, significant};
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
@@ -31,6 +31,17 @@ pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
     let figure = Figure::new(files.join(", ")).panel(responses(modes));
     let figure = below.into_iter().flatten().fold(figure, Figure::panel);
     Ok(figure.share_x().mark_x("natural frequencies", &natural))
+}
+
+/// Draws the stabilisation diagram and the mode indicator of a saved result; `None` without poles
+/// and indicator.
+pub fn diagrams(title: &str, diagrams: &Diagrams) -> Option<Figure> {
+    let panels = [
+        stabilisation(&diagrams.stabilisation, (&[], &[])),
+        diagrams.mode_indicator.as_ref().map(indicator),
+    ];
+    let figure = panels.into_iter().flatten().fold(Figure::new(title), Figure::panel);
+    (!figure.panels().is_empty()).then(|| figure.share_x())
 }
 
 /// Returns every k-th value, so that few enough remain to be shown.

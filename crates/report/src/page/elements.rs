@@ -9,7 +9,7 @@ use mechid_signal::message;
 
 use super::sections::{pair, percent};
 use super::tables::Table;
-use super::{PageSettings, about, checks, document, figure, figures, modes, remarks};
+use super::{PageSettings, about, checks, document, figure, figures, modes_found, remarks};
 use crate::ReportError;
 use crate::figures::elements as sensors;
 
@@ -35,7 +35,7 @@ pub fn elements_page(
             p.subtitle { (files.join(", ")) " · maximum likelihood" }
             (about(&settings.about))
             (remarks(&doubts, &merits(summary)))
-            (modes(&summary.modes))
+            (modes_found(&summary.modes))
         }
     };
     let sections = [

@@ -59,17 +59,33 @@ pub(super) fn drawn_set(
     let width = if members.len() > BESIDE { WIDE } else { WIDTH };
     let is_alone = members.len() == 1;
     let sized = members.into_iter().map(|(name, figure)| {
-        let panels = figure.panels();
-        // The legend of many curves needs several rows.
-        let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
-        let [first, other] = if width > WIDTH { WIDE_PANEL } else { PANEL };
-        let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
         let title = if is_alone { "" } else { name.as_str() };
-        let figure = figure.titled(title).size(width, height);
+        let figure = sized(figure.titled(title), width);
         (name, figure)
     });
     let drawn = FigureSet::new(sized).draw(&id, &caption)?;
     Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption })
+}
+
+/// Draws a figure that fills a row.
+pub(super) fn drawn_wide(
+    id: String,
+    figure: Figure,
+    caption: String,
+) -> Result<Drawn, ReportError> {
+    let figure = sized(figure.titled(""), WIDE);
+    let drawn = FigureSet::new([(String::new(), figure)]).draw(&id, &caption)?;
+    Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption })
+}
+
+/// Returns the figure in its size at this width, px.
+fn sized(figure: Figure, width: f64) -> Figure {
+    let panels = figure.panels();
+    // The legend of many curves needs several rows.
+    let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
+    let [first, other] = if width > WIDTH { WIDE_PANEL } else { PANEL };
+    let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
+    figure.size(width, height)
 }
 
 fn times(record: &Record) -> Vec<f64> {

@@ -4,6 +4,7 @@ mod alone;
 mod checks;
 mod elements;
 mod figures;
+mod modes;
 mod sections;
 mod tables;
 #[cfg(feature = "parquet")]
@@ -24,6 +25,7 @@ use mechid_analysis::text::significant;
 pub use self::alone::figure_page;
 pub use self::elements::elements_page;
 use self::figures::Drawn;
+pub use self::modes::modes_page;
 use self::tables::Table;
 #[cfg(feature = "parquet")]
 pub use self::trends::trends_page;
@@ -224,7 +226,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
             p.subtitle { (files(contents)) " · " (report.estimator) }
             (about(contents.about))
             (remarks(&judgement::doubts(contents.review), &judgement::merits(contents.review)))
-            (modes(&ShapedMode::rows(&report.modes)))
+            (modes_found(&ShapedMode::rows(&report.modes)))
             @if let Some(part) = report.fit.unexplained_motion {
                 p.note { "Motion left unexplained: " strong { (significant(100.0 * part, 3)) " %" } }
             }
@@ -241,19 +243,23 @@ fn about(about: &[(String, String)]) -> Markup {
     }
 }
 
+/// Returns what is special about a mode; `None` for an oscillation that decays.
+fn mode_remark(mode: &ModeRow) -> Option<String> {
+    match (&mode.pole, &mode.growth_rate) {
+        (_, Some(rate)) => Some(format!("unstable: grows at {} 1/s", significant(rate.value, 3))),
+        (Some(pole), _) => {
+            Some(format!("does not oscillate: pole {} 1/s", significant(pole.value, 4)))
+        }
+        _ if mode.is_rigid_body => Some("rigid body".into()),
+        _ => None,
+    }
+}
+
 /// Returns all modes in a sortable table.
-fn modes(modes: &[ModeRow]) -> Markup {
+fn modes_found(modes: &[ModeRow]) -> Markup {
     let row = |(number, mode): (usize, &ModeRow)| {
         let [frequency, error, _] = mode.natural_frequency_hz.cells();
         let [ratio, ratio_error, _] = mode.damping_ratio.cells();
-        let remark = match (&mode.pole, &mode.growth_rate) {
-            (_, Some(rate)) => format!("unstable: grows at {} 1/s", significant(rate.value, 3)),
-            (Some(pole), _) => {
-                format!("does not oscillate: pole {} 1/s", significant(pole.value, 4))
-            }
-            _ if mode.is_rigid_body => "rigid body".into(),
-            _ => String::new(),
-        };
         let is_pair = mode.oscillates || mode.is_rigid_body || mode.partner.is_some();
         let dash = |text: String| if is_pair { text } else { "–".into() };
         vec![
@@ -262,7 +268,7 @@ fn modes(modes: &[ModeRow]) -> Markup {
             dash(error),
             dash(ratio),
             dash(ratio_error),
-            remark,
+            mode_remark(mode).unwrap_or_default(),
         ]
     };
     let rows: Vec<Vec<String>> = (1..).zip(modes).map(row).collect();
