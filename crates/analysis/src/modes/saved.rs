@@ -177,7 +177,7 @@ impl SavedModes {
         if json.get("modes").is_some() {
             Self::from_json(&input_name(path), json)
         } else {
-            Self::from_result(&ModalSummary::of(&Machine::read(path)?)?)
+            Self::from_result(&ModalSummary::from_machine(&Machine::read(path)?)?)
         }
     }
 

@@ -1,7 +1,7 @@
 //! Arguments of `mechid identify` and `mechid report`: which records, what in them, and how to
 //! identify the machine.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
@@ -345,7 +345,21 @@ impl FitArgs {
         Ok(Some(identified))
     }
 
-    /// Returns the records that are read.
+    /// Returns the first record.
+    pub fn record(&self) -> &Path {
+        &self.input.record
+    }
+
+    /// Returns the file of a saved result or of a described machine: JSON, without columns to read.
+    pub fn saved_result(&self) -> Option<&Path> {
+        let record = self.input.record.as_path();
+        let channels = self.channels.channels();
+        let has_columns = !channels.force.is_empty() || channels.first_response().is_some();
+        let is_json = record.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        (is_json && !has_columns && self.more.is_empty()).then_some(record)
+    }
+
+    /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         Files::default()
             .reads([&self.input.record])

@@ -7,12 +7,12 @@ pub mod hits;
 mod style;
 pub mod word;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
-use mechid::io::Geometry;
+use mechid::io::{Geometry, input_name, record_details};
 use mechid::report::ModeShapes;
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
@@ -100,6 +100,55 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("svg" | "png" | "html") => Ok(path),
         _ => Err("the file name must end in .svg, .png or .html".into()),
+    }
+}
+
+/// Heading of a page, and details of the measurement on it.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub struct AboutArgs {
+    /// Heading of the page [default: the name of the record]
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// File with further details for the page, one `name: value` per line, such as sensors,
+    /// operator, date, place and comment; what the head of the record states (comments above a
+    /// table, .lvm, universal file, Parquet) is shown, too
+    #[arg(long, value_name = "FILE")]
+    pub about: Option<PathBuf>,
+}
+
+impl AboutArgs {
+    /// Returns the option that was given, if there is one.
+    pub fn given(&self) -> Option<&'static str> {
+        let title = self.title.as_ref().map(|_| "--title");
+        title.or(self.about.as_ref().map(|_| "--about"))
+    }
+
+    /// Returns the details of the file, then those that the record states under other names.
+    pub fn details(&self, record: &Path) -> Result<Vec<(String, String)>, CliError> {
+        let mut about = self.stated()?;
+        for (name, value) in record_details(record) {
+            if about.iter().all(|(other, _)| !other.eq_ignore_ascii_case(&name)) {
+                about.push((name, value));
+            }
+        }
+        Ok(about)
+    }
+
+    /// Reads lines of `name: value`; a line without a colon continues the one before.
+    fn stated(&self) -> Result<Vec<(String, String)>, CliError> {
+        let Some(file) = &self.about else { return Ok(Vec::new()) };
+        let text = std::fs::read_to_string(file)
+            .map_err(|source| CliError::About { file: input_name(file), source })?;
+        let mut about: Vec<(String, String)> = Vec::new();
+        for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+            match (line.split_once(':'), about.last_mut()) {
+                (Some((name, value)), _) => about.push((name.trim().into(), value.trim().into())),
+                (None, Some((_, value))) => *value += &format!(" {line}"),
+                (None, None) => about.push(("Comment".into(), line.into())),
+            }
+        }
+        Ok(about)
     }
 }
 

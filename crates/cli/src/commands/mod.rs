@@ -79,7 +79,7 @@ impl Command {
             Command::Frf(args) => args.run(),
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
-            Command::Modes(args) => args.run(),
+            Command::Modes(args) => args.run(words),
             Command::Multisine(args) => args.run(),
             Command::Predict(args) => args.run(),
             Command::Report(args) => args.run(words),

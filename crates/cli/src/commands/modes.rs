@@ -1,26 +1,30 @@
 //! `mechid modes`: natural frequencies, damping ratios and shapes, from any kind of data.
 
 use std::f64::consts::TAU;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mechid::analysis::identify::Band;
 use mechid::analysis::modal::ShapedMode;
-use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
+use mechid::analysis::modes::{ModalTest, ModesSettings, Places, SavedModes};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary, ResponseQuantity};
 use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
-use mechid::report::{FigureStyle, ModeShapes, ToFigure, figure_page};
+use mechid::report::{PageSettings, ToFigure, modes_page};
 use mechid::selected_modes::SelectedModes;
 use mechid::{DecaySettings, ModeSet, Modes};
+use serde::Serialize;
 
 use crate::args::hits::HitRuleArgs;
 use crate::args::word::word;
 use crate::args::{
-    ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one, positive,
+    AboutArgs, ChannelArgs, PlotArgs, RecordArgs, ReportArgs, ShapeArgs, StyleArgs, at_least_one,
+    positive,
 };
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
+use crate::{options, repeat};
 
 /// Find the modes: of a test with forces, of a table of frequency responses, of a free decay, of an
 /// ambient record, of a machine
@@ -114,6 +118,8 @@ pub struct ModesArgs {
     #[command(flatten)]
     style: StyleArgs,
     #[command(flatten)]
+    about: AboutArgs,
+    #[command(flatten)]
     pub report: ReportArgs,
 }
 
@@ -143,35 +149,23 @@ struct UnmeasuredArgs {
     no_offset: bool,
 }
 
-/// Adds the figure of a result for `--plot`, or a page of it with the shapes of its modes.
-pub fn draw(
-    outcome: Outcome,
-    plot: &PlotArgs,
-    shapes: Option<&ModeShapes>,
-    result: &impl ToFigure,
-    style: FigureStyle,
-) -> Result<Outcome, CliError> {
-    match &plot.plot {
-        Some(path) if plot.is_page() => {
-            let figure = result.styled_figure(style)?;
-            let title = figure.name().to_owned();
-            let page = figure_page(&title, vec![(String::new(), figure)], shapes)?;
-            Ok(outcome.with_file(path, page))
-        }
-        _ => outcome.with_plot(plot, || Ok(result.styled_figure(style)?)),
-    }
-}
-
 impl ModesArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         let files = Files::default().reads([&self.input.record]).reads(&self.more);
         let files = files.reads(&self.compare).reads(&self.validate).writes(&self.synthesis);
+        let files = files.reads(&self.about.about);
         self.shapes.add_files(files.writes(&self.plot.plot))
     }
 
     /// Reads the data, identifies the modes, and reports.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
+        if let Some(option) = self.about.given()
+            && !self.plot.is_page()
+        {
+            let why = "of modes belongs to a page, --plot FILE.html";
+            return Err(CliError::MisplacedOption { option, why });
+        }
         let channels = self.channels.channels();
         let path = &self.input.record;
         if channels.first_response().is_none() {
@@ -183,10 +177,10 @@ impl ModesArgs {
             if is_json || path == Path::new("-") {
                 return match &self.compare {
                     Some(_) => self.compared(&ModeSet::read(path)?),
-                    None => self.machine_modes(path),
+                    None => self.machine_modes(path, words),
                 };
             }
-            return self.table_modes();
+            return self.table_modes(words);
         }
         self.refuse("a record", &[("quantity", self.quantity.is_some())])?;
         if channels.force.is_empty() && !self.unmeasured.ambient {
@@ -199,7 +193,8 @@ impl ModesArgs {
                 return self.compared(&ModeSet::from_shaped(&summary.file, names, &modes)?);
             }
             let outcome = Outcome::new(decayed.to_string(), &decayed)?;
-            return self.drawn(outcome, &decayed, &modes, &names);
+            let drawn = (&decayed, decayed.summary());
+            return self.drawn((outcome, words), drawn, &modes, &names);
         }
         let mut records = vec![self.input.open(&channels)?];
         for record in &self.more {
@@ -213,10 +208,10 @@ impl ModesArgs {
                 self.input.window(),
             )?])?;
         }
-        self.test_outcome(modes)
+        self.test_outcome(modes, words)
     }
 
-    fn table_modes(&self) -> Result<Outcome, CliError> {
+    fn table_modes(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         self.refuse("a table of frequency responses", &self.record_options())?;
         let files = std::iter::once(&self.input.record).chain(&self.more);
         let read = |file: &PathBuf| {
@@ -228,11 +223,11 @@ impl ModesArgs {
             })
         };
         let tables = files.map(read).collect::<Result<Vec<_>, _>>()?;
-        self.test_outcome(mechid::modes_of_responses(&tables, &self.settings())?)
+        self.test_outcome(mechid::modes_of_responses(&tables, &self.settings())?, words)
     }
 
     /// Reports the modes of a test, or compares them.
-    fn test_outcome(&self, mut modes: Modes) -> Result<Outcome, CliError> {
+    fn test_outcome(&self, mut modes: Modes, words: &[OsString]) -> Result<Outcome, CliError> {
         if self.compare.is_some() {
             return self.compared(&ModeSet::from_summary(modes.summary())?);
         }
@@ -251,7 +246,7 @@ impl ModesArgs {
             }
             (None, _) => outcome,
         };
-        self.drawn(outcome, &modes, &shaped, &names)
+        self.drawn((outcome, words), (&modes, modes.summary()), &shaped, &names)
     }
 
     /// Compares modes with `--compare`.
@@ -265,14 +260,30 @@ impl ModesArgs {
     /// Adds the requested pictures and files of shapes.
     fn drawn(
         &self,
-        outcome: Outcome,
-        result: &impl ToFigure,
+        (outcome, words): (Outcome, &[OsString]),
+        (result, summary): (&impl ToFigure, &impl Serialize),
         modes: &[ShapedMode],
         names: &[String],
     ) -> Result<Outcome, CliError> {
-        let shapes = self.shapes.mode_shapes(modes, names)?;
+        let saved = SavedModes::from_result(summary)?;
+        // A geometry has the columns, or the places where they were measured.
+        let shapes = self.shapes.mode_shapes(modes, names).or_else(|error| {
+            self.shapes.mode_shapes(modes, &saved.shapes().1).map_err(|_| error)
+        })?;
         let outcome = self.shapes.with_shapes(outcome, shapes.as_ref());
-        draw(outcome, &self.plot, shapes.as_ref(), result, self.style.style())
+        let style = self.style.style();
+        let Some(path) = self.plot.plot.as_ref().filter(|_| self.plot.is_page()) else {
+            return outcome.with_plot(&self.plot, || Ok(result.styled_figure(style)?));
+        };
+        let settings = PageSettings {
+            title: self.about.title.clone(),
+            command: Some(repeat::command(words)),
+            about: self.about.details(&self.input.record)?,
+            ..PageSettings::default()
+        };
+        let figure = result.styled_figure(style)?;
+        let page = modes_page(&saved, Some(figure), shapes.as_ref(), &settings)?;
+        Ok(outcome.with_file(path, options::spelled(&page)))
     }
 
     /// Refuses the first given option among some.
@@ -307,7 +318,7 @@ impl ModesArgs {
         options
     }
 
-    fn machine_modes(&self, path: &Path) -> Result<Outcome, CliError> {
+    fn machine_modes(&self, path: &Path, words: &[OsString]) -> Result<Outcome, CliError> {
         let mut refused = self.force_options();
         refused.retain(|(name, _)| *name != "near_hz");
         self.refuse("a machine", &refused)?;
@@ -331,7 +342,7 @@ impl ModesArgs {
             modes.response_names.clone()
         };
         let outcome = Outcome::new(modes.to_string(), &modes)?;
-        self.drawn(outcome, &machine, &modes.modes, &names)
+        self.drawn((outcome, words), (&machine, &modes), &modes.modes, &names)
     }
 
     fn settings(&self) -> ModesSettings {

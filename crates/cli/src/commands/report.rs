@@ -1,17 +1,21 @@
 //! `mechid report`: one HTML file with all results of an identification.
 
 use std::ffi::OsString;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mechid::io::{Geometry, input_name, is_standard_output, output_name};
-use mechid::report::{PageSettings, elements_page, page};
+use mechid::analysis::Machine;
+use mechid::analysis::modes::SavedModes;
+use mechid::io::{Geometry, is_standard_output, output_name};
+use mechid::report::{
+    ModeShapes, PageSettings, ReportError, ToFigure, elements_page, modes_page, page,
+};
+use mechid::signal::message;
 use serde::Serialize;
 
-use crate::args::ReportArgs;
 use crate::args::elements::ElementArgs;
 use crate::args::fit::{FitArgs, TableArgs};
+use crate::args::{AboutArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 use crate::{options, repeat};
@@ -25,7 +29,9 @@ use crate::{options, repeat};
 /// and mean periods cover all samples; the residual in time and, for an open record, its spectrum
 /// and the reconstructed force cover the first 262144 samples, and the page says so.
 ///
-/// With --machine the page is that of a machine of named elements.
+/// With --machine the page is that of a machine of named elements. A file in JSON, without columns,
+/// is a saved result of `mechid modes` or `mechid identify`, or the description of a machine: the
+/// page is that of its modes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
@@ -33,7 +39,8 @@ use crate::{options, repeat};
       --title 'Rotor at 3000 rpm' --output rotor.html
   mechid report a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
       --validate c.csv --output rig.html
-  mechid report chain.csv --machine chain.json --period 2048 --output chain.html")]
+  mechid report chain.csv --machine chain.json --period 2048 --output chain.html
+  mechid report modes.json --geometry frame.csv --output modes.html")]
 pub struct PageArgs {
     #[command(flatten)]
     fit: FitArgs,
@@ -48,13 +55,8 @@ pub struct PageArgs {
     /// File for the report (-: standard output)
     #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
     output: PathBuf,
-    /// Heading of the report [default: the name of the record]
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
-    title: Option<String>,
-    /// File with further details for the page, one `name: value` per line, such as sensors,
-    /// operator, date, place and comment
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    about: Option<PathBuf>,
+    #[command(flatten)]
+    about: AboutArgs,
     /// Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411,
     /// and 82), or a table with rows name,x,y,z in m and line,name,name [default: a row, by the
     /// names of the channels]
@@ -62,21 +64,6 @@ pub struct PageArgs {
     geometry: Option<PathBuf>,
     #[command(flatten)]
     pub report: ReportArgs,
-}
-
-/// Reads lines of `name: value`; a line without a colon continues the one before.
-fn read_about(file: &Path) -> Result<Vec<(String, String)>, CliError> {
-    let text = fs::read_to_string(file)
-        .map_err(|source| CliError::About { file: input_name(file), source })?;
-    let mut about: Vec<(String, String)> = Vec::new();
-    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
-        match (line.split_once(':'), about.last_mut()) {
-            (Some((name, value)), _) => about.push((name.trim().into(), value.trim().into())),
-            (None, Some((_, value))) => *value += &format!(" {line}"),
-            (None, None) => about.push(("Comment".into(), line.into())),
-        }
-    }
-    Ok(about)
 }
 
 /// Parses the name of a page.
@@ -103,7 +90,7 @@ impl PageArgs {
         self.fit
             .files()
             .reads(self.elements.inputs())
-            .reads(&self.about)
+            .reads(&self.about.about)
             .reads(&self.geometry)
             .writes([&self.output])
     }
@@ -111,12 +98,15 @@ impl PageArgs {
     /// Reads, identifies, draws and writes; `words` are the arguments of the program.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let settings = PageSettings {
-            title: self.title.clone(),
+            title: self.about.title.clone(),
             reconstruct_force: self.reconstruct_force,
             command: Some(repeat::command(words)),
-            about: self.about.as_deref().map(read_about).transpose()?.unwrap_or_default(),
+            about: self.about.details(self.fit.record())?,
             geometry: self.geometry.as_ref().map(Geometry::read).transpose()?,
         };
+        if let Some(saved) = self.fit.saved_result() {
+            return self.saved_page(saved, &settings);
+        }
         if let Some(identified) = self.fit.identify_elements(&self.table, &self.elements)? {
             let text = self.fit.text_of_elements(&identified);
             return self.outcome(&text, &identified, &elements_page(&identified, &settings)?);
@@ -127,6 +117,26 @@ impl PageArgs {
         }
         let identified = self.fit.identify()?;
         self.outcome(&self.fit.text(&identified), &identified, &page(&identified, &settings)?)
+    }
+
+    /// Writes the page of a saved result with modes, or of a described machine.
+    fn saved_page(&self, file: &Path, settings: &PageSettings) -> Result<Outcome, CliError> {
+        let modes = SavedModes::read(file)?;
+        let (shaped, points) = modes.shapes();
+        let geometry = settings.geometry.as_ref();
+        let shapes = ModeShapes::from_modes(&shaped, &points, geometry)
+            .or_else(|| ModeShapes::from_modes(&shaped, &modes.columns(), geometry));
+        if shapes.is_none() && settings.geometry.is_some() {
+            return Err(CliError::NoShapes { names: points.join(", ") });
+        }
+        let figure = match modes.has_system().then(|| Machine::read(file)?.figure()) {
+            Some(Ok(figure)) => Some(figure),
+            None | Some(Err(ReportError::NothingResonates { .. })) => None,
+            Some(Err(error)) => return Err(error.into()),
+        };
+        let page = modes_page(&modes, figure, shapes.as_ref(), settings)?;
+        let text = format!("{}: {}\n", modes.name, message::count(modes.modes.len(), "mode"));
+        self.outcome(&text, &serde_json::json!({}), &page)
     }
 
     /// Prints the identification, and writes its page.
