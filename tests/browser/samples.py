@@ -78,6 +78,39 @@ def cubic(folder):
     (folder / "cubic.csv").write_text("\n".join(rows) + "\n")
 
 
+# Mass (kg), damping (N·s/m), stiffness (N/m) and cubic stiffness (N/m³) of the decay whose frequency falls with its amplitude.
+HARDENING = (1.0, 1.2, (2 * math.pi * 10) ** 2, 4e8)
+
+
+def hardening(folder):
+    """A mass on a hardening spring, released at 2 mm: Runge-Kutta's steps of a 64th of a sample."""
+    m, c, k, cube = HARDENING
+
+    def rate(x, v):
+        return v, -(c * v + k * x + cube * x**3) / m
+
+    noise, step = random.Random(1), 1 / 256 / 64
+    rows, x, v = ["# Operator: M. Curie", "# Sensors: laser 4", "time,x"], 2e-3, 0.0
+    for n in range(2048):
+        rows.append(f"{n / 256},{x + noise.gauss(0, 1e-6):.9e}")
+        for _ in range(64):
+            x1, v1 = rate(x, v)
+            x2, v2 = rate(x + step / 2 * x1, v + step / 2 * v1)
+            x3, v3 = rate(x + step / 2 * x2, v + step / 2 * v2)
+            x4, v4 = rate(x + step * x3, v + step * v3)
+            x, v = x + step / 6 * (x1 + 2 * x2 + 2 * x3 + x4), v + step / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+    (folder / "hardening.csv").write_text("\n".join(rows) + "\n")
+
+
+def hardening_hz(amplitude):
+    """Frequency of the undamped oscillation: a complete elliptic integral, by the arithmetic-geometric mean."""
+    m, _, k, cube = HARDENING
+    a, b = math.sqrt((k + cube * amplitude**2) / m), math.sqrt((k + cube * amplitude**2 / 2) / m)
+    while abs(a - b) > 1e-14 * a:
+        a, b = (a + b) / 2, math.sqrt(a * b)
+    return a / (2 * math.pi)
+
+
 def make(program, pages, folder):
     """Write all pages into a folder; `pages` is the program of pages of known numbers."""
     subprocess.run([pages, folder], check=True)
@@ -105,5 +138,12 @@ def make(program, pages, folder):
            "--displacement", "dx,dy", "--stator-mass", 20, "--rotation-hz", 50, "--period", 256, "--plot", "bearing.html")
     mechid(program, folder, "modes", examples / "decay.csv", "--acceleration", "a1,a2,a3", "--plot", "decay.html",
            "--shapes", "decay.unv")
+    modes = (examples / "hammer-1.csv", examples / "hammer-2.csv", "--force", "force", "--force-at", "1,2",
+             "--acceleration", "a1,a2", "--response-at", "1,2", "--hits", "--diagrams", "--json")
+    saved = mechid(program, folder, "modes", *modes, "--plot", "modes.html", "--about", "about.txt")
+    (folder / "modes.json").write_text(saved)
+    mechid(program, folder, "report", "modes.json", "--output", "saved.html")
+    hardening(folder)
+    mechid(program, folder, "modes", "hardening.csv", "--displacement", "x", "--plot", "backbone.html")
     mechid(program, folder, "frf", examples / "hammer-1.csv", "--force", "force,0", "--acceleration", "a1,a2", "--hits",
            "--exponential-percent", 1, "--band-hz", "2:100", "--plot", "frf.html")
