@@ -293,6 +293,6 @@ impl ToFigure for Machine {
     }
 
     fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
-        modes_of_result(&ModalSummary::of(self)?, self, style)
+        modes_of_result(&ModalSummary::from_machine(self)?, self, style)
     }
 }
