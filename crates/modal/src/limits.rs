@@ -93,8 +93,8 @@ pub const GROUP_HALF_WIDTHS: f64 = 10.0;
 /// Distance from a mode, in half-widths, within which its unmeasured force may hide another mode:
 /// the force acts where the mode resonates.
 pub const HIDDEN_HALF_WIDTHS: f64 = 1.0;
-/// Largest ratio of the widths of two modes of which one may hide the other; the tails of a wider
-/// one stand out.
+/// Largest ratio of the widths of a mode and of another that it hides; the tails of a wider one
+/// stand out.
 pub const HIDDEN_WIDTHS: f64 = 3.0;
 /// Minimum share of the residual around a mode that the measured forces explain at which a hidden
 /// mode is tried: noise explains the number of forces over that of the lines. The likelihood

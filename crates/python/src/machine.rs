@@ -23,7 +23,7 @@ pub struct Machine(pub mechid::Machine);
 #[pyclass(frozen, module = "mechid._mechid")]
 pub struct ModalSystem(pub mechid::ModalSystem);
 
-/// What answers forces: a machine, or the modes of a test.
+/// Machine or modes of a test, which respond to forces.
 #[derive(FromPyObject)]
 pub enum Answering<'py> {
     Machine(PyRef<'py, Machine>),

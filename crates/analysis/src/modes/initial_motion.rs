@@ -21,9 +21,9 @@ pub(super) struct FreeMotion {
 }
 
 impl FreeMotion {
-    /// Fits the amplitudes by least squares to what a response from rest leaves of the first
-    /// `settle` samples of the measured channels, given by quantity, column and output; a constant
-    /// of each channel is fitted beside them.
+    /// Fits the amplitudes by least squares to the difference between the first `settle` samples of
+    /// the measured channels and a response from rest; a constant of each channel is fitted beside
+    /// them.
     ///
     /// # Errors
     /// [`AnalysisError::Setting`] if these samples do not determine every amplitude.

@@ -16,18 +16,19 @@ use crate::predict::{
 };
 use crate::text::significant;
 
-/// Predicts the response of the modes of a test to the forces of a record, in the band of the test.
+/// Predicts the response of the modes of a test to the forces of a record, in the band of the
+/// test.
 ///
 /// With a period, it is the steady state under the mean period; otherwise the response over the
-/// whole window, from rest or with the free motion that explains the first samples (`settle`) best.
+/// whole window, from rest or with the free motion that fits the first samples (`settle`) best.
 /// There is no prediction outside the band, and measured responses are compared within it. The
 /// standard error of a channel is the RMS of the errors due to the uncertainty of the modes and of
 /// this free motion; the residual terms are assumed exact.
 ///
 /// # Errors
 /// [`AnalysisError::NoForce`], [`AnalysisError::Setting`] if the columns differ from those of the
-/// modes, if no line of the record is in the band, or if `settle` cannot be used, and an error if the
-/// record cannot be read.
+/// modes, if no line of the record is in the band, or if `settle` cannot be used, and an error if
+/// the record cannot be read.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), sections 5.2 and 6.2 (response of the modal sum).

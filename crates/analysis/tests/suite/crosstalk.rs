@@ -47,10 +47,12 @@ fn a_force_that_follows_another_has_no_responses_and_is_told() {
             };
             let how = if periodic { FrfSettings::default() } else { how };
             let table = frf(&measured, &how).unwrap();
-            let told =
-                table.remarks.iter().find(|remark| remark.contains("force 2 follows force 1"));
+            let told = table
+                .remarks
+                .iter()
+                .find(|remark| remark.contains("force 2 is coherent with force 1"));
             assert!(
-                told.is_some_and(|told| told.contains(" at 2")),
+                told.is_some_and(|told| told.contains("(2")),
                 "{periodic} {level} {seed}: {table}"
             );
             assert_eq!(table.responses.len(), 2);

@@ -280,7 +280,7 @@ fn a_whole_period_closes() {
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
     refused(folder, &segments, &["--extent: it belongs to", "not to --from-frf"]);
     let weights = format!("{common} --method least-squares --noise smooth");
-    refused(folder, &weights, &["--noise: it weights --method maximum-likelihood alone"]);
+    refused(folder, &weights, &["--noise: it applies to --method maximum-likelihood alone"]);
     let weights = format!("{common} --noise per-line --extent period");
     refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
     let lines = "--domain time --lines odd --plot a.svg";

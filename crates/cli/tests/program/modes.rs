@@ -175,7 +175,9 @@ fn a_table_gives_the_modes_of_the_record() {
     }
     let message = refused(path, "modes hammer-1.csv");
     assert!(message.trim_end().lines().count() == 1, "{message}");
-    assert!(refused(path, "modes table.csv --hits").contains("means nothing to a table"));
+    assert!(
+        refused(path, "modes table.csv --hits").contains("--hits: it does not apply to a table")
+    );
 }
 
 /// Judge: the same machine in two records, and the same machine as its description.

@@ -172,7 +172,7 @@ fn what_the_machine_is_known_to_is_expected() {
                 );
                 continue;
             }
-            assert_eq!(told.contains("unexplained"), doubted, "{way}, {found}");
+            assert_eq!(told.contains("does not explain"), doubted, "{way}, {found}");
         }
     }
 }

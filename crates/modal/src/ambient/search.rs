@@ -17,7 +17,7 @@ const EASIER: f64 = 0.125;
 /// Maximum number of trials of one step.
 const TRIALS: usize = 12;
 
-/// Number of updates of the information from which a refused step is blamed on them.
+/// Minimum number of updates of the information at which it is computed anew if a step is refused.
 const TRUSTED_UPDATES: usize = 4;
 
 /// Minimum curvature along a step that an update takes from the gradients, as a share of the
