@@ -6,8 +6,8 @@ use mechid_io::{NodalModes, input_name, read_json};
 use mechid_modal::compare::{ComparedMode, Measured};
 use mechid_modal::indicators::ShapeWithCovariance;
 use nalgebra::{Complex, DMatrix, DVector};
+use serde::Deserialize;
 
-use super::saved::SavedModes;
 use super::summary::ModesSummary;
 use crate::modal::{ModalSummary, ShapedMode};
 use crate::{AnalysisError, Machine};
@@ -23,11 +23,75 @@ pub struct ModeSet {
     pub modes: Vec<ComparedMode>,
 }
 
-/// One entry of a shape with the standard errors of its real and imaginary part.
-#[derive(Debug, Clone, Copy)]
-struct Entry {
+/// A saved result with modes, as far as a comparison needs it.
+#[derive(Debug, Deserialize)]
+struct Saved {
+    modes: Vec<SavedMode>,
+    #[serde(default)]
+    inputs: Vec<String>,
+    /// Responses of a test with forces or of an ambient record.
+    #[serde(default)]
+    outputs: Vec<Column>,
+    /// Responses of a free decay.
+    #[serde(default)]
+    channels: Vec<Column>,
+    /// Responses of a machine.
+    #[serde(default)]
+    response_names: Vec<String>,
+    #[serde(default)]
+    analysis: SavedAnalysis,
+}
+
+#[derive(Debug, Deserialize)]
+struct Column {
+    column: String,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct SavedAnalysis {
+    #[serde(default)]
+    places: Option<SavedPlaces>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SavedPlaces {
+    responses: Vec<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SavedMode {
+    #[serde(default = "oscillates")]
+    oscillates: bool,
+    natural_frequency_hz: SavedValue,
+    #[serde(default)]
+    damping_ratio: Option<SavedValue>,
+    shape: Vec<SavedEntry>,
+    #[serde(default)]
+    participation: Vec<SavedEntry>,
+}
+
+fn oscillates() -> bool {
+    true
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct SavedValue {
+    value: f64,
+    #[serde(default)]
+    standard_error: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct SavedEntry {
     value: [f64; 2],
+    #[serde(default)]
     standard_error: Option<[f64; 2]>,
+}
+
+impl SavedValue {
+    fn measured(self) -> Measured {
+        Measured { value: self.value, standard_error: self.standard_error.unwrap_or(0.0) }
+    }
 }
 
 impl ModeSet {
@@ -53,8 +117,29 @@ impl ModeSet {
     /// # Errors
     /// [`AnalysisError::SavedModes`] if it has none, [`AnalysisError::NothingToCompare`].
     pub fn from_json(name: &str, json: serde_json::Value) -> Result<Self, AnalysisError> {
-        let (modes, points) = SavedModes::from_json(name, json)?.shapes();
-        Self::from_shaped(name, points, &modes)
+        let saved: Saved = serde_json::from_value(json).map_err(|error| {
+            AnalysisError::SavedModes { file: name.into(), why: error.to_string() }
+        })?;
+        let at_forces = !saved.outputs.is_empty() && saved.inputs.len() > saved.outputs.len();
+        let stated = saved.analysis.places.map(|places| places.responses).unwrap_or_default();
+        let columns = |columns: Vec<Column>| columns.into_iter().map(|c| c.column).collect();
+        let points: Vec<String> = if at_forces {
+            saved.inputs
+        } else if !stated.is_empty() {
+            stated
+        } else if !saved.outputs.is_empty() {
+            columns(saved.outputs)
+        } else if !saved.channels.is_empty() {
+            columns(saved.channels)
+        } else {
+            saved.response_names
+        };
+        let modes = saved.modes.into_iter().filter(|mode| mode.oscillates).map(|mode| {
+            let shape = if at_forces { mode.participation } else { mode.shape };
+            let damping_ratio = mode.damping_ratio.map(SavedValue::measured);
+            (mode.natural_frequency_hz.measured(), damping_ratio, shape)
+        });
+        Self::new(name, points, modes)
     }
 
     /// Takes the modes of a test; its points are the stated ones, or the columns.
@@ -93,14 +178,13 @@ impl ModeSet {
             standard_error: value.standard_error.unwrap_or(0.0),
         };
         let modes = modes.iter().filter(|mode| mode.row.oscillates).map(|mode| {
-            let entry = |entry: &crate::modal::ShapeEntry| Entry {
+            let entry = |entry: &crate::modal::ShapeEntry| SavedEntry {
                 value: entry.value,
                 standard_error: entry.standard_error,
             };
-            let damping_ratio = Some(measured(&mode.row.damping_ratio));
             (
                 measured(&mode.row.natural_frequency_hz),
-                damping_ratio.filter(|ratio| ratio.value.is_finite()),
+                Some(measured(&mode.row.damping_ratio)),
                 mode.shape.iter().map(entry).collect(),
             )
         });
@@ -114,7 +198,7 @@ impl ModeSet {
     pub fn from_nodal(nodal: &NodalModes) -> Result<Self, AnalysisError> {
         let exact = |value: f64| Measured { value, standard_error: 0.0 };
         let modes = nodal.modes.iter().map(|mode| {
-            let entry = |z: &Complex<f64>| Entry { value: [z.re, z.im], standard_error: None };
+            let entry = |z: &Complex<f64>| SavedEntry { value: [z.re, z.im], standard_error: None };
             // A file of undamped modes has a damping of zero, which is not a value to compare.
             let damping_ratio = Some(mode.damping_ratio).filter(|ratio| *ratio != 0.0).map(exact);
             (exact(mode.frequency_hz), damping_ratio, mode.shape.iter().map(entry).collect())
@@ -125,7 +209,7 @@ impl ModeSet {
     fn new(
         name: &str,
         points: Vec<String>,
-        modes: impl Iterator<Item = (Measured, Option<Measured>, Vec<Entry>)>,
+        modes: impl Iterator<Item = (Measured, Option<Measured>, Vec<SavedEntry>)>,
     ) -> Result<Self, AnalysisError> {
         let nothing = || AnalysisError::NothingToCompare { file: name.into() };
         let mut compared = Vec::new();
@@ -173,7 +257,7 @@ impl ModeSet {
 }
 
 /// Returns a shape with independent errors of real and imaginary parts.
-fn with_covariance(shape: &[Entry]) -> Result<ShapeWithCovariance, AnalysisError> {
+fn with_covariance(shape: &[SavedEntry]) -> Result<ShapeWithCovariance, AnalysisError> {
     let values = shape.iter().map(|entry| Complex::new(entry.value[0], entry.value[1]));
     let errors = shape.iter().map(|entry| entry.standard_error.unwrap_or_default());
     let (re, im): (Vec<f64>, Vec<f64>) = errors.map(|[re, im]| (re * re, im * im)).unzip();
