@@ -1,7 +1,8 @@
 //! Errors of the usual tools over those of maximum likelihood, on the same records.
 //!
 //! `cargo run --release -p mechid-modal --example modal_rivals -- SEEDS` compares root-mean-square
-//! errors of f and ζ, mode by mode:
+//! errors of f and ζ, mode by mode; with a FOLDER after SEEDS the records and the modes of both truth
+//! and estimates are written there instead, for `sdypy_ema.py`. The usual tools here:
 //!
 //! - random forces: responses by H1 from Hann-windowed segments with half of each in the next one,
 //!   then pLSCF, at the best of three lengths of segments;
@@ -16,6 +17,8 @@
 mod generator;
 
 use std::f64::consts::TAU;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use mechid_modal::plscf::{ResponseTable, plscf};
 use mechid_modal::{ModalSettings, identify_modes};
@@ -31,11 +34,45 @@ const MAX_DAMPING: f64 = 0.2;
 
 fn main() {
     let seeds: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);
+    let folder = std::env::args().nth(2).map(PathBuf::from);
     for case in
         [generator::one_by_one(), generator::pair(8), generator::pair(30), generator::hammer()]
     {
-        compare(&case, seeds);
+        match &folder {
+            None => compare(&case, seeds),
+            Some(folder) => write(&case, seeds, folder).unwrap(),
+        }
     }
+}
+
+/// Writes the records of a case (forces, then motion), and its modes: true ones and estimates.
+fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
+    let name = case.name.split(',').next().unwrap_or_default().replace(' ', "-");
+    let [low, high] = case.band_hz;
+    let mut modes = format!("seed,frequency_hz,damping_ratio\nband,{low},{high}\n");
+    for mode in case.in_band() {
+        modes += &format!("true,{},{}\n", case.frequency_hz[mode], case.damping[mode]);
+    }
+    for seed in 0..seeds {
+        let (forces, motion) = case.record(seed);
+        let names = |of: &str, record: &Record| {
+            (1..=record.channels()).map(|k| format!("{of}{k}")).collect::<Vec<_>>().join(",")
+        };
+        let mut text = format!("{},{}\n", names("f", &forces), names("a", &motion));
+        for k in 0..forces.len() {
+            let row = forces.data().row(k).iter().chain(&motion.data().row(k)).copied().collect();
+            let row: Vec<f64> = row;
+            text += &row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            text.push('\n');
+        }
+        fs::write(folder.join(format!("{name}-{seed}.csv")), text)?;
+        let estimate = identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();
+        for mode in estimate.modes() {
+            let (f, zeta) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
+            modes += &format!("{seed},{f},{zeta}\n");
+        }
+    }
+    fs::write(folder.join(format!("{name}.modes.csv")), modes)
 }
 
 /// Prints one line for each mode of a case.
