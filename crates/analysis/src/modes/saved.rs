@@ -170,7 +170,7 @@ impl SavedModes {
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read, [`AnalysisError::SavedModes`] if it is
-    /// not a result with modes, and the errors of [`ModalSummary::of`].
+    /// not a result with modes, and the errors of [`ModalSummary::from_machine`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
         let json: serde_json::Value = read_json(path)?;
