@@ -154,7 +154,7 @@ impl Path<'_> {
         if self.updates > 0 {
             fit.information = information(&fit.parameters, self.lines, self.span)?;
             self.updates = 0;
-            // Steps that were refused for the updates say nothing of the new information.
+            // Steps that were refused for the updates do not concern the new information.
             self.damping = self.damping.min(FIRST_DAMPING);
         }
         Some(())
