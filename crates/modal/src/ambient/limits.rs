@@ -49,8 +49,15 @@ pub(super) const COARSE_POOLING: f64 = 0.3;
 /// may exceed it, because their spectrum falls faster than the leakage.
 pub const MAX_LEAKAGE: f64 = 0.07;
 
-/// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band.
+/// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band, while modes
+/// are chosen.
 pub(super) const NOISE_TERMS: usize = 3;
+
+/// Number of polynomials of the noise that are tried at a time: an even and an odd one.
+pub(super) const NOISE_TERMS_ADDED: usize = 2;
+
+/// Maximum number of polynomials of the noise; Akaike's criterion chooses within it.
+pub(super) const MOST_NOISE_TERMS: usize = 15;
 
 /// Number of neighbouring modes on either side whose forces may be correlated with the force of a
 /// mode.

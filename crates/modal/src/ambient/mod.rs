@@ -12,6 +12,7 @@ mod initial;
 mod likelihood;
 mod limits;
 mod lines;
+mod noise_order;
 mod order;
 mod parameters;
 mod prepare;

@@ -8,6 +8,7 @@ use super::limits::{
     DAMPING_SIGNIFICANCE, MAX_DAMPING, NUISANCE_POLES, POOLING, REFUSALS, STRONG_EVIDENCE,
 };
 use super::lines::BandLines;
+use super::noise_order::with_enough_noise_terms;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
 use super::search::{Effort, Fit, search_pooled};
@@ -55,7 +56,8 @@ pub(super) fn choose(
     let fit = initial_fit(&first, band)
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
-        .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL));
+        .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL))
+        .map(|fit| with_enough_noise_terms(fit, band));
     let chosen = fit.map(|fit| choice.judged(fit)).filter(|chosen| !chosen.sound.is_empty());
     (chosen, choice.dropped)
 }

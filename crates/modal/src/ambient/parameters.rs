@@ -189,6 +189,13 @@ impl Parameters {
         result
     }
 
+    /// Returns the parameters with `terms` polynomials of the noise; those that are new are zero.
+    pub fn with_noise_terms(&self, terms: usize) -> Self {
+        let layout = Layout::new(self.layout.modes, self.layout.outputs, terms);
+        let values = self.values.clone().resize_vertically(layout.len(), 0.0);
+        Self { kernel: self.kernel, layout, values }
+    }
+
     fn copy_noise(&mut self, from: &Self) {
         let (first, old) = (self.layout.noise(0, 0), from.layout.noise(0, 0));
         for i in 0..self.layout.noise_terms * self.layout.outputs {

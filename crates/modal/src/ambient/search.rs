@@ -196,6 +196,15 @@ pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort)
     Some(fit)
 }
 
+/// Returns the step to the maximum of a quadratic likelihood; `None` if the information is not
+/// positive definite.
+pub(super) fn full_step(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    damped_step(information, gradient, LEAST_INFORMATION)
+}
+
 fn damped_step(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,

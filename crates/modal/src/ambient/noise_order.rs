@@ -1,0 +1,48 @@
+//! Number of polynomials of the sensors' noise: decided by Akaike's criterion.
+
+use super::information::information;
+use super::likelihood::gradient;
+use super::limits::{MOST_NOISE_TERMS, NOISE_TERMS_ADDED, POOLING};
+use super::lines::BandLines;
+use super::parameters::Parameters;
+use super::search::{Effort, Fit, full_step, search_pooled};
+
+/// Adds polynomials to the noise of all sensors as long as Akaike's criterion falls.
+///
+/// Noise that the polynomials cannot follow is taken for the tails of the resonances and biases
+/// the damping, the more so the longer the record is.
+///
+/// # Source
+/// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723.
+pub(super) fn with_enough_noise_terms(mut fit: Fit, band: &BandLines) -> Fit {
+    while let Some(next) = extended(&fit, band) {
+        fit = next;
+    }
+    fit
+}
+
+/// Returns the fit with further polynomials, if they lower the criterion.
+fn extended(fit: &Fit, band: &BandLines) -> Option<Fit> {
+    let layout = &fit.parameters.layout;
+    let terms = layout.noise_terms + NOISE_TERMS_ADDED;
+    if terms > MOST_NOISE_TERMS {
+        return None;
+    }
+    let needed = 2.0 * (NOISE_TERMS_ADDED * layout.outputs) as f64;
+    let start = fit.parameters.with_noise_terms(terms);
+    if expected_gain(&start, band)? < needed {
+        return None;
+    }
+    let next = search_pooled(start, band, Effort::FULL)?;
+    let gain = 2.0 * (fit.cost - next.cost);
+    (gain > needed).then_some(next)
+}
+
+/// Returns the increase of 2 ln L that a search from `start` would reach if ln L were quadratic
+/// (score statistic).
+fn expected_gain(start: &Parameters, band: &BandLines) -> Option<f64> {
+    let lines = band.pooled(&start.poles(), POOLING, start.layout.noise_terms);
+    let information = information(start, &lines, band.span)?;
+    let slope = gradient(start, &lines, band.span)?;
+    Some(-full_step(&information, &slope)?.dot(&slope))
+}
