@@ -3,10 +3,11 @@
 use std::fmt::Display;
 use std::sync::Arc;
 
-use mechid::report::{FigureStyle, ReportError, ToFigure};
+use mechid::report::{FigureStyle, PageSettings, ReportError, ToFigure};
 use pyo3::prelude::*;
 use serde::Serialize;
 
+use crate::page::{self, PageTexts};
 use crate::{failure, work};
 
 /// Result as JSON, as text and as a figure.
@@ -22,6 +23,9 @@ pub trait ResultOutput: Send + Sync {
 
     /// Returns the figure as an interactive HTML page.
     fn html(&self) -> Result<String, ReportError>;
+
+    /// Returns the page of a result with modes.
+    fn page(&self, settings: &PageSettings) -> Result<String, ReportError>;
 }
 
 impl<T: Serialize + Display + ToFigure + Send + Sync> ResultOutput for T {
@@ -39,6 +43,10 @@ impl<T: Serialize + Display + ToFigure + Send + Sync> ResultOutput for T {
 
     fn html(&self) -> Result<String, ReportError> {
         self.styled_page(FigureStyle::default())
+    }
+
+    fn page(&self, settings: &PageSettings) -> Result<String, ReportError> {
+        page::of_modes(self, Some(self.figure()?), settings)
     }
 }
 
@@ -83,5 +91,12 @@ impl Answer {
     /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         html(py, Arc::clone(&self.0))
+    }
+
+    /// Returns the report of a result with modes, as an HTML page.
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        let settings = texts.settings(py)?;
+        let result = Arc::clone(&self.0);
+        work::watched(py, None, || Ok(()), move || result.page(&settings))
     }
 }

@@ -1,5 +1,6 @@
 //! Bearing tests.
 
+use mechid::analysis::bearing::BearingPlan;
 use mechid::io::FrequencyResponses;
 use mechid::{BearingData, IdentifyBearing, identify_bearing};
 use pyo3::prelude::*;
@@ -54,4 +55,16 @@ pub fn bearing_of_responses(
         )
     };
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
+}
+
+/// Identifies a bearing at the speeds and loads of a campaign, whose description is JSON.
+#[pyfunction]
+#[pyo3(signature = (campaign, threads))]
+pub fn bearing_campaign(
+    py: Python<'_>,
+    campaign: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let plan: BearingPlan = failure::settings(py, campaign)?;
+    work::watched(py, threads, || Ok(()), move || plan.run()).map(Answer::new)
 }

@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use mechid::analysis::AnalysisError;
 use mechid::io::parse_machine;
+use mechid::report::elements_page;
 use mechid::{ElementData, IdentifyElements};
 use pyo3::prelude::*;
 
 use crate::machine::Machine;
 use crate::measurement::Measurement;
+use crate::page::PageTexts;
 use crate::responses::ResponseTable;
 use crate::{answer, arrays, failure, work};
 
@@ -94,6 +96,13 @@ impl IdentifiedElements {
     /// Returns the figure as an interactive HTML page.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         answer::html(py, Arc::clone(&self.0))
+    }
+
+    /// Returns the report of the program, as an HTML page.
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        let settings = texts.settings(py)?;
+        let identified = Arc::clone(&self.0);
+        work::watched(py, None, || Ok(()), move || elements_page(&identified, &settings))
     }
 
     /// Returns the names of the unknowns, and their covariance.

@@ -8,13 +8,14 @@ use mechid::analysis::identify::ValidationWindow;
 use mechid::analysis::review::Review;
 use mechid::analysis::review::receptance::ActingAlone;
 use mechid::estimate::EstimateError;
-use mechid::report::{PageSettings, page};
+use mechid::report::page;
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::machine::Machine;
 use crate::measurement::Measurement;
+use crate::page::PageTexts;
 use crate::{answer, arrays, failure, work};
 
 /// Identified machine with the records of its identification.
@@ -98,8 +99,8 @@ impl Identified {
     }
 
     /// Returns the report of the program, as an HTML page.
-    fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
-        let settings = PageSettings { title, reconstruct_force: force, ..PageSettings::default() };
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        let settings = texts.settings(py)?;
         let identified = Arc::clone(&self.0);
         work::watched(py, None, || Ok(()), move || page(&identified, &settings))
     }

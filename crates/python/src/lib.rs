@@ -17,6 +17,7 @@ mod fleet;
 mod identified;
 mod machine;
 mod measurement;
+mod page;
 mod predicted;
 mod program;
 mod questions;
@@ -31,7 +32,7 @@ mod _mechid {
     #[pymodule_export]
     use super::answer::Answer;
     #[pymodule_export]
-    use super::bearing::{bearing, bearing_of_responses};
+    use super::bearing::{bearing, bearing_campaign, bearing_of_responses};
     #[pymodule_export]
     use super::elements::{IdentifiedElements, described_machine, identify_elements};
     #[pymodule_export]
@@ -42,6 +43,8 @@ mod _mechid {
     use super::machine::{Machine, ModalSystem, selected_modes};
     #[pymodule_export]
     use super::measurement::{Measurement, find_column, rate_of, time_column};
+    #[pymodule_export]
+    use super::page::shapes_file;
     #[pymodule_export]
     use super::predicted::{Predicted, predict_record};
     #[pymodule_export]

@@ -13,6 +13,7 @@ use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::page::{PageTexts, of_modes};
 use crate::{arrays, failure, work};
 
 /// System with the covariance of its parameters, if it was identified.
@@ -134,6 +135,20 @@ impl Machine {
         let machine = self.0.clone();
         let draw = move || machine.styled_page(FigureStyle::default());
         work::watched(py, None, || Ok(()), draw)
+    }
+
+    /// Returns the report of the program, as an HTML page.
+    fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
+        let settings = texts.settings(py)?;
+        let machine = self.0.clone();
+        let write = move || {
+            let figure = match machine.figure() {
+                Err(ReportError::NothingResonates { .. }) => None,
+                figure => Some(figure?),
+            };
+            of_modes(&ModalSummary::from_machine(&machine)?, figure, &settings)
+        };
+        work::watched(py, None, || Ok(()), write)
     }
 
     /// Returns the modes as the program prints them: JSON and text.

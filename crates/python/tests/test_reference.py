@@ -11,6 +11,7 @@ from typing import Any
 
 import mechid
 from mechid import fleet, plotting
+from mechid._results import Drawn, Plotted, Reported, Result, Shaped
 
 from .conftest import ROOT
 
@@ -66,14 +67,11 @@ def page() -> str:
     things = {name: getattr(mechid, name) for name in mechid.__all__ if name != "__version__"}
     functions = [section(n, t) for n, t in things.items() if not isinstance(t, type)]
     kinds = [section(n, t) for n, t in things.items() if isinstance(t, type)]
-    drawn = [
-        section(f"plotting.{name}", thing)
-        for name, thing in vars(plotting).items()
-        if inspect.isfunction(thing) and not name.startswith("_")
-    ]
+    shared = [section(kind.__name__, kind) for kind in (Result, Plotted, Drawn, Reported, Shaped)]
+    drawn = [section(f"plotting.{name}", getattr(plotting, name)) for name in plotting.__all__]
     many = [section(f"fleet.{name}", getattr(fleet, name)) for name in fleet.__all__]
-    parts = [HEAD, "## Functions\n", *functions, "## Records and results\n", *kinds, "## Plots\n", *drawn,
-             "## Many records\n", *many]
+    parts = [HEAD, "## Functions\n", *functions, "## Records and results\n", *kinds,
+             "## What results have in common\n", *shared, "## Plots\n", *drawn, "## Many records\n", *many]
     return "\n".join(parts)
 
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._doors import bearing as bearing
+    from ._doors import bearing_campaign as bearing_campaign
     from ._doors import compare_modes as compare_modes
     from ._doors import decay as decay
     from ._doors import frf as frf
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from ._mechid import __version__ as __version__
     from ._records import Measurement as Measurement
     from ._records import ResponseTable as ResponseTable
+    from ._results import BearingTable as BearingTable
     from ._results import Decayed as Decayed
     from ._results import Finding as Finding
     from ._results import FrequencyResponses as FrequencyResponses
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
 # Where each name is: imported when it is used, so that the program starts without NumPy.
 _HOMES = {
     "bearing": "_doors",
+    "bearing_campaign": "_doors",
     "compare_modes": "_doors",
     "decay": "_doors",
     "frf": "_doors",
@@ -81,6 +84,7 @@ _HOMES = {
     "__version__": "_mechid",
     "Measurement": "_records",
     "ResponseTable": "_records",
+    "BearingTable": "_results",
     "Decayed": "_results",
     "Finding": "_results",
     "FrequencyResponses": "_results",
@@ -106,6 +110,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BearingTable",
     "Decayed",
     "Finding",
     "FrequencyResponses",
@@ -133,6 +138,7 @@ __all__ = [
     "Validation",
     "__version__",
     "bearing",
+    "bearing_campaign",
     "compare_modes",
     "decay",
     "frf",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
@@ -24,6 +25,7 @@ from ._records import (
     reading_of,
 )
 from ._results import (
+    BearingTable,
     Decayed,
     FrequencyResponses,
     Identified,
@@ -537,6 +539,37 @@ def bearing(
             [one._inner for one in wet], [one._inner for one in still], json.dumps(settings), threads
         )
     return IdentifiedBearing(inner)
+
+
+@careful
+def bearing_campaign(
+    campaign: Mapping[str, Any] | str | os.PathLike[str], *, threads: int | None = None
+) -> BearingTable:
+    """Identify the coefficients of a bearing at several speeds and loads.
+
+    Parameters
+    ----------
+    campaign : mapping or path
+        Description, or its JSON file: ``points``, each with ``tests``, ``baseline``, ``rotation_hz`` and
+        ``load``, beside ``channels``, ``window`` (or ``frf_table``), a common ``baseline`` and ``settings``
+        as `bearing` has them.
+    threads : int, optional
+        Number of threads; as many as there are processors, without.
+
+    Returns
+    -------
+    BearingTable
+
+    Raises
+    ------
+    MechidError
+        If the description is wrong, a record cannot be read, or a bearing cannot be identified.
+    """
+    if isinstance(campaign, Mapping):
+        text = json.dumps(campaign, default=listed)
+    else:
+        text = Path(campaign).read_text(encoding="utf-8")
+    return BearingTable(_mechid.bearing_campaign(text, threads))
 
 
 def _response_tables(sources: Sequence[object]) -> list[_mechid.ResponseTable]:

@@ -9,15 +9,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, Protocol, Unpack, final
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, Protocol, Unpack, final
 
 import numpy as np
 
 from . import _mechid
 from ._errors import MechidError
+from ._figures import Figure, MatrixFigure, read_page
 from ._records import Measurement, RecordOptions, Window, measurements
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
     from pandas import DataFrame  # type: ignore[import-untyped]
     from xarray import Dataset
@@ -267,7 +269,62 @@ class _Compiled(Protocol):
     def html(self) -> str: ...
 
 
-class Drawn(Result):
+def framed(page: str, text: str) -> str:
+    """Return a page above a text, as an element of a notebook."""
+    # A document of its own, whose script and style reach nothing of the notebook.
+    frame = '<iframe sandbox="allow-scripts" srcdoc="{}" width="100%" height="640" style="border:0"></iframe>'
+    return f"<div>{frame.format(html.escape(page))}{_text_element(text)}</div>"
+
+
+def _text_element(text: str) -> str:
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+class Plotted:
+    """What has figures to draw with Matplotlib."""
+
+    # Figures that show a result best, in order.
+    _usual: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures by their names."""
+        raise NotImplementedError
+
+    def plot(self, name: str | None = None, member: str | int | None = None, **options: Any) -> list[Axes]:
+        """Draw one of the `figures` with Matplotlib and return its axes.
+
+        Parameters
+        ----------
+        name : str, optional
+            Name of the figure; the one that shows the result best, without.
+        member : str or int, optional
+            Which of the figures of a set, such as the responses to each force, by its name or its number
+            from 1; the first, without.
+        **options
+            As ``plot`` of the figure takes them: ``ax``, ``panel``, and of responses per unit force
+            ``show``, ``quantity``, ``scale`` and ``phase``.
+
+        Raises
+        ------
+        KeyError
+            If there is no such figure, member or panel.
+        ValueError
+            If a choice has no such value, or the number of axes is not that of the panels.
+        MechidError
+            If there is nothing to draw.
+        ImportError
+            If Matplotlib is not installed: ``pip install "mechid[plot]"``.
+        """
+        figures = self.figures
+        if name is None:
+            name = next((one for one in (*self._usual, *figures) if one in figures), "")
+        if name not in figures:
+            raise KeyError(f"no figure {name!r}: there are {', '.join(figures) or 'none'}")
+        return figures[name].plot(*(() if member is None else (member,)), **options)
+
+
+class Drawn(Result, Plotted):
     """A result that the program draws."""
 
     @property
@@ -299,18 +356,162 @@ class Drawn(Result):
         """
         return self._compiled.html()
 
+    @property
+    def _page(self) -> str:
+        return self.to_html()
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures of the page of the result by their names, to draw with Matplotlib.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return read_page(self._page)
+
     def _repr_html_(self) -> str:
-        text = f"<pre>{html.escape(str(self))}</pre>"
         try:
-            page = html.escape(self.to_html())
+            return framed(self.to_html(), str(self))
         except MechidError:
-            return text
-        # A document of its own, whose script reaches nothing of the notebook.
-        frame = f'<iframe sandbox="allow-scripts" srcdoc="{page}" width="100%" height="640" style="border:0"></iframe>'
-        return f"<div>{frame}{text}</div>"
+            return _text_element(str(self))
 
     def __str__(self) -> str:
         return self._compiled.text()
+
+
+class _Paged(Protocol):
+    """A compiled result with a report."""
+
+    def page(self, texts: Mapping[str, object]) -> str: ...
+
+
+class Reported(Drawn):
+    """A result that the program writes a report of."""
+
+    def report(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        title: str | None = None,
+        about: Mapping[str, str] | None = None,
+    ) -> str:
+        """Return one HTML page with everything that the result has to show, and write it.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the page goes, too.
+        title : str, optional
+            Heading; the name of the record, without.
+        about : mapping of str to str, optional
+            Further lines of the page, such as sensors, operator, date, place and comment. What the head of
+            the record states is shown, too.
+
+        Raises
+        ------
+        MechidError
+            If the result cannot be drawn.
+        """
+        return self._written(path, title=title, about=about)
+
+    def _written(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        title: str | None = None,
+        about: Mapping[str, str] | None = None,
+        geometry: str | os.PathLike[str] | None = None,
+        reconstruct_force: bool = False,
+    ) -> str:
+        inner: _Paged = self.__dict__["_inner"]
+        texts = {
+            "title": title,
+            "about": [(name, value) for name, value in (about or {}).items()],
+            "record": self._record if os.path.isfile(self._record) else "",
+            "geometry": None if geometry is None else os.fspath(geometry),
+            "reconstruct_force": reconstruct_force,
+        }
+        page = inner.page(texts)
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(page)
+        return page
+
+    @property
+    def _page(self) -> str:
+        return self._written()
+
+    @property
+    def _record(self) -> str:
+        """First record, whose head may say more; empty without one."""
+        told = self._told
+        tests = told.get("records") or told.get("tests") or [told]
+        return str(tests[0].get("file", ""))
+
+
+class Shaped(Reported):
+    """A result with modes, whose shapes can be drawn on a geometry and written."""
+
+    def report(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        title: str | None = None,
+        about: Mapping[str, str] | None = None,
+        geometry: str | os.PathLike[str] | None = None,
+    ) -> str:
+        """Return one HTML page with everything that the result has to show, and write it.
+
+        Parameters
+        ----------
+        path, title, about : optional
+            As of the other results: where the page goes, its heading, and further lines.
+        geometry : path, optional
+            Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and
+            82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``. A row or a grid by the
+            names of the channels, without.
+
+        Raises
+        ------
+        MechidError
+            If the result cannot be drawn, or a channel has no point in the geometry.
+        """
+        if geometry is not None:
+            self._universal_file(geometry)
+        return self._written(path, title=title, about=about, geometry=geometry)
+
+    def write_shapes(
+        self, path: str | os.PathLike[str], *, geometry: str | os.PathLike[str] | None = None
+    ) -> None:
+        """Write geometry and complex mode shapes into a universal file (datasets 164, 15, 82, 55; SI units).
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        geometry : path, optional
+            As in `report`.
+
+        Raises
+        ------
+        MechidError
+            If no mode oscillates, there are fewer than two channels, or a channel has no point.
+        """
+        text = self._universal_file(geometry)
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+
+    def _universal_file(self, geometry: str | os.PathLike[str] | None) -> str:
+        text = _mechid.shapes_file(self.to_json(), None if geometry is None else os.fspath(geometry))
+        if text is None:
+            raise MechidError(
+                "no mode shapes: they need modes that oscillate, two channels or more, and a point of "
+                "`geometry` for each channel",
+                "Settings",
+            )
+        return text
 
 
 @final
@@ -457,11 +658,13 @@ class Estimated(Drawn):
 
 
 @final
-class Identified(Estimated):
+class Identified(Shaped, Estimated):
     """A machine identified from records.
 
     ``print`` shows it as the program does; `to_json` is the JSON of the program.
     """
+
+    _usual = ("restoring-force", "receptance", "fit")
 
     def __init__(self, inner: _mechid.Identified) -> None:
         self.__dict__["_inner"] = inner
@@ -553,6 +756,8 @@ class Identified(Estimated):
         path: str | os.PathLike[str] | None = None,
         *,
         title: str | None = None,
+        about: Mapping[str, str] | None = None,
+        geometry: str | os.PathLike[str] | None = None,
         reconstruct_force: bool = False,
     ) -> str:
         """Return one HTML page with everything the identification has to show, and write it.
@@ -563,19 +768,27 @@ class Identified(Estimated):
             Where the page goes, too.
         title : str, optional
             Heading; the name of the record, without.
+        about : mapping of str to str, optional
+            Further lines of the page, such as sensors, operator, date, place and comment. What the head of
+            the record states is shown, too.
+        geometry : path, optional
+            Places of the channels, to draw the mode shapes on: a universal file (datasets 15 or 2411, and
+            82), or a table with rows ``name,x,y,z`` in m and ``line,name,name``. A row or a grid by the
+            names of the channels, without.
         reconstruct_force : bool
             Whether to reconstruct the force with the identified machine and compare it.
 
         Raises
         ------
         MechidError
-            If a record cannot be read again, or the force cannot be reconstructed.
+            If a record cannot be read again, the force cannot be reconstructed, or a channel has no point
+            in the geometry.
         """
-        page = self._inner.page(title, reconstruct_force)
-        if path is not None:
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(page)
-        return page
+        if geometry is not None:
+            self._universal_file(geometry)
+        return self._written(
+            path, title=title, about=about, geometry=geometry, reconstruct_force=reconstruct_force
+        )
 
     def to_xarray(self) -> Dataset:
         """Return measured, predicted and residual responses, receptances, and M, C and K with their covariance, as an xarray dataset with units.
@@ -704,7 +917,39 @@ class IdentifiedBearing(Drawn):
 
 
 @final
-class Machine(Bare, Drawn):
+class BearingTable(Bare, Drawn):
+    """The coefficients of a bearing at several speeds and loads."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def rotation_hz(self) -> NDArray[np.float64]:
+        """Speed of each row in Hz, rising; 0 at rest."""
+        return np.array([row["rotation_hz"] or 0.0 for row in self._told["rows"]], dtype=np.float64)
+
+    @property
+    def load(self) -> NDArray[np.float64]:
+        """Static load of each row in N; NaN where it is not stated."""
+        loads = [row["load"] for row in self._told["rows"]]
+        return np.array([np.nan if load is None else load for load in loads], dtype=np.float64)
+
+    @property
+    def rows(self) -> tuple[Mapping[str, Uncertain], ...]:
+        """Coefficients of each row by name, ``"kxx"`` to ``"myy"``, in N/m, N·s/m and kg."""
+        return tuple(
+            MappingProxyType({one["name"]: _uncertain(one) for one in row["coefficients"]})
+            for row in self._told["rows"]
+        )
+
+    def __repr__(self) -> str:
+        return f"<BearingTable: {len(self.rows)} speeds and loads>"
+
+
+@final
+class Machine(Bare, Shaped):
     """M, C and K, with the covariance of those of their entries that were identified.
 
     Parameters
@@ -1026,7 +1271,7 @@ class Inspected(Drawn):
 
 
 @final
-class Decayed(Drawn):
+class Decayed(Shaped):
     """Modes of a free response."""
 
     _inner: _mechid.Answer
@@ -1070,7 +1315,7 @@ class Decayed(Drawn):
 
 
 @final
-class Modes(Drawn):
+class Modes(Shaped):
     """Modes of a test with forces, or of an ambient record."""
 
     _inner: _mechid.Answer
@@ -1178,7 +1423,7 @@ class Modes(Drawn):
 
 
 @final
-class IdentifiedElements(Drawn):
+class IdentifiedElements(Reported):
     """Identified coefficients of a machine of named elements."""
 
     _inner: _mechid.IdentifiedElements
@@ -1255,7 +1500,10 @@ class IdentifiedElements(Drawn):
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={p.value:.6g}" for name, p in self.parameters.items())
         return f"<IdentifiedElements: {values}>"
-class ModeComparison(Bare):
+
+
+@final
+class ModeComparison(Bare, Plotted):
     """Two sets of modes side by side."""
 
     _found: tuple[str, str]
@@ -1287,6 +1535,12 @@ class ModeComparison(Bare):
     def mac(self) -> NDArray[np.float64]:
         """Modal assurance criterion of the modes of the first set (rows) with those of the second."""
         return np.array(self._told["mac"], dtype=np.float64)
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """The modal assurance criterion, ``"assurance"``, to draw with Matplotlib."""
+        caption = "Likeness of the mode shapes: rows are the modes of the first set, columns those of the second."
+        return MappingProxyType({"assurance": MatrixFigure("assurance", caption, ("",), self.mac)})
 
     def to_json(self) -> str:
         """Return the comparison as ``mechid modes --compare FILE --json`` prints it."""

@@ -21,14 +21,16 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_complete
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from . import _mechid
 from ._errors import MechidError, careful
+from ._figures import Figure, read_page
 from ._records import no_column
-from ._results import description_of
+from ._results import Plotted, description_of, framed
 
 if TYPE_CHECKING:
     import pyarrow
@@ -76,11 +78,12 @@ class Summary:
 
 
 @dataclass(frozen=True)
-class Trends:
+class Trends(Plotted):
     """The results of many records side by side; ``str`` tells them as the program does.
 
     ``fields`` is what ``mechid trends --json`` prints: ``series`` with ``name``, ``unit``, ``median``,
-    ``spread``, ``standard_error`` and ``points``, ``failures`` and counts. ``page`` is the report, HTML.
+    ``spread``, ``standard_error`` and ``points``, ``failures`` and counts. ``page`` is the report, HTML;
+    ``figures`` are its figures by the names of the quantities.
     """
 
     fields: Mapping[str, Any]
@@ -90,8 +93,14 @@ class Trends:
     def __str__(self) -> str:
         return self.text
 
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """Figures of the page by the names of the quantities, to draw with Matplotlib."""
+        names = (series["name"] for series in self.fields["series"])
+        return MappingProxyType(dict(zip(names, read_page(self.page).values(), strict=True)))
+
     def _repr_html_(self) -> str:
-        return self.page
+        return framed(self.page, self.text)
 
 
 @careful

@@ -1,14 +1,21 @@
 """Plots of results with Matplotlib, each into the axes given or into new ones.
 
-Matplotlib is imported when a function is called: ``pip install "mechid[plot]"`` brings it.
+Every figure of a page is one of ``result.figures``, and ``result.plot`` draws it. The functions here draw
+one panel of the most frequent ones, and what no page has. Matplotlib is imported when a function is
+called: ``pip install "mechid[plot]"`` brings it.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._figures import Chart, Figure, MatrixFigure, Phase, Quantity, Scale, ShapeFigure
+from ._figures import assurance as _assurance
+from ._figures import read_page as _read_page
 from ._results import (
     Decayed,
     FrequencyResponses,
@@ -24,23 +31,86 @@ from ._results import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+__all__ = [
+    "Chart",
+    "MatrixFigure",
+    "ShapeFigure",
+    "assurance",
+    "coherence",
+    "dynamic_stiffness",
+    "figures",
+    "force",
+    "frf",
+    "modes",
+    "receptance",
+    "response",
+    "shape",
+    "stabilisation",
+    "sweep",
+]
+
 Shaped = Machine | Modes | Decayed | Identified | IdentifiedResponses
 
 
+def figures(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
+    """Return the figures of a page by their names, to draw with Matplotlib.
+
+    Pages are those of ``report`` and ``to_html`` and those that the program writes.
+
+    Parameters
+    ----------
+    page : str or path
+        HTML of a page, or the path of its file.
+
+    Returns
+    -------
+    mapping of str to Chart, ShapeFigure or MatrixFigure
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> import mechid
+    >>> from mechid import plotting
+    >>> found = mechid.identify("examples/machine.csv", force="force", displacement="displacement",
+    ...                         period=256)
+    >>> drawn = plotting.figures(found.report(reconstruct_force=True))
+    >>> print(", ".join(drawn))
+    force, motion, receptance, fit, residual-spectrum, correlations, reconstructed-force
+    >>> [panel.y.caption for panel in drawn["receptance"].panels(quantity="accelerance")]
+    ['Accelerance (m/(s²·N))', 'Phase (°)']
+    """
+    return _read_page(page)
+
+
 def receptance(
-    found: Identified, motion: int = 1, force: int = 1, *, phase: bool = False, ax: Axes | None = None
+    found: Identified,
+    motion: int = 1,
+    force: int = 1,
+    *,
+    phase: bool = False,
+    quantity: Quantity | None = None,
+    scale: Scale | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
-    """Plot measured and identified receptance of a pair of degrees of freedom, counted from 1.
+    """Plot measured and identified response per unit force of a pair of degrees of freedom.
 
     Parameters
     ----------
     found : Identified
         An identification.
     motion, force : int
-        Degree of freedom that moves and the one that is driven. Measured points are shown on lines
-        where no other force acts.
+        Degree of freedom that moves and the one that is driven, counted from 1. Measured points are
+        shown on lines where no other force acts, and where several records separate the forces.
     phase : bool
-        Whether to plot the phase in degrees instead of the magnitude in m/N.
+        Whether to plot the phase in degrees instead of the magnitude.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        Response per unit force; that of the measured quantity, without.
+    scale : {"log", "linear", "decibel"}, optional
+        Scale of the magnitude.
     ax : matplotlib.axes.Axes, optional
         Axes to plot into.
 
@@ -52,21 +122,19 @@ def receptance(
     ------
     MechidError
         If the records show no receptance.
+    KeyError
+        If they show none of this pair.
     """
-    table = found.frf
-    frequency, measured = table.frequency_hz, table.measured[:, motion - 1, force - 1]
-    fine = np.linspace(frequency.min(), frequency.max(), 801)
-    model = found.machine().receptance(fine)[:, motion - 1, force - 1]
-    shown = _degrees if phase else np.abs
-    axes = _axes(ax)
-    axes.plot(fine, shown(model), label="identified")
-    axes.plot(frequency, shown(measured), ".", label="measured")
-    axes.set_xlabel("Frequency (Hz)")
-    axes.set_ylabel("Phase (°)" if phase else "Receptance (m/N)")
-    if not phase:
-        axes.set_yscale("log")
-    axes.legend()
-    return axes
+    drawn = found.figures.get("receptance")
+    if drawn is None or drawn.members == ("",):
+        # Says why there is none.
+        _ = found.frf
+    driven = _channel(found, "force", force)
+    pairs = (f"{_channel(found, kind, motion)} / {driven}" for kind in ("displacement", "velocity", "acceleration"))
+    known = () if drawn is None else drawn.members
+    pair = next((pair for pair in pairs if pair in known), f"{motion} / {force}")
+    panel = 2 if phase else 1
+    return found.plot("receptance", pair, panel=panel, quantity=quantity, scale=scale, ax=ax)[0]
 
 
 def response(found: Identified, dof: int = 1, *, ax: Axes | None = None) -> Axes:
@@ -88,24 +156,25 @@ def response(found: Identified, dof: int = 1, *, ax: Axes | None = None) -> Axes
     Raises
     ------
     MechidError
-        If the identified system is unstable.
+        If a record cannot be read again.
+    KeyError
+        If there is no such degree of freedom, or the identified system is unstable.
     """
-    (kind, (measured, predicted)) = next(iter(found.compared.items()))
-    axes = _axes(ax)
-    time = np.arange(len(measured)) / found.to_dict()["window"]["sample_rate_hz"]
-    axes.plot(time, measured[:, dof - 1], label="measured")
-    axes.plot(time, predicted[:, dof - 1], "--", label="predicted")
-    units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²"}
-    axes.set_xlabel("Time (s)")
-    axes.set_ylabel(f"{kind.capitalize()} ({units[kind]})")
-    axes.legend()
-    return axes
+    return found.plot("fit", dof, panel=1, ax=ax)[0]
 
 
 def frf(
-    found: FrequencyResponses, motion: int = 1, force: int = 1, *, ax: Axes | None = None
+    found: FrequencyResponses,
+    motion: int = 1,
+    force: int = 1,
+    *,
+    panel: str | int = 1,
+    quantity: Quantity | None = None,
+    scale: Scale | None = None,
+    phase: Phase = "wrapped",
+    ax: Axes | None = None,
 ) -> Axes:
-    """Plot the magnitude of a frequency response.
+    """Plot a frequency response with twice its standard error, the magnitude without a choice.
 
     Parameters
     ----------
@@ -113,6 +182,14 @@ def frf(
         Frequency responses.
     motion, force : int
         Degree of freedom that moves and the one that is driven, counted from 1.
+    panel : str or int
+        Number or quantity of the panel: 1 is the magnitude, ``"Phase"`` the phase.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        Response per unit force; that of the measured quantity, without.
+    scale : {"log", "linear", "decibel"}, optional
+        Scale of the magnitude.
+    phase : {"wrapped", "continuous"}
+        Whether the phase stays between −180° and 180°.
     ax : matplotlib.axes.Axes, optional
         Axes to plot into.
 
@@ -125,12 +202,8 @@ def frf(
     KeyError
         If there is no such pair.
     """
-    axes = _axes(ax)
-    axes.plot(found.frequency_hz, np.abs(found.response(motion, force)))
-    axes.set_yscale("log")
-    axes.set_xlabel("Frequency (Hz)")
-    axes.set_ylabel(f"Magnitude ({found.unit})")
-    return axes
+    pair = _member(found, (motion, force))
+    return found.plot("figure", pair, panel=panel, quantity=quantity, scale=scale, phase=phase, ax=ax)[0]
 
 
 def coherence(found: FrequencyResponses, motion: int = 1, *, ax: Axes | None = None) -> Axes:
@@ -141,12 +214,8 @@ def coherence(found: FrequencyResponses, motion: int = 1, *, ax: Axes | None = N
     KeyError
         If there is no such degree of freedom.
     """
-    axes = _axes(ax)
-    axes.plot(found.frequency_hz, found.coherence(motion))
-    axes.set_xlabel("Frequency (Hz)")
-    axes.set_ylabel("Coherence")
-    axes.set_ylim(0, 1.05)
-    return axes
+    force = next((force for moved, force in found.pairs if moved == motion), 1)
+    return found.plot("figure", _member(found, (motion, force)), panel="Coherence", ax=ax)[0]
 
 
 def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes:
@@ -164,30 +233,28 @@ def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes
     Returns
     -------
     matplotlib.axes.Axes
+
+    Raises
+    ------
+    KeyError
+        If no force was sought there.
     """
-    axes = _axes(ax)
-    values, error = found.force[:, dof - 1], found.std_error
-    axes.plot(found.time, values)
-    if error is not None:
-        width = 2 * error[:, dof - 1]
-        axes.fill_between(found.time, values - width, values + width, alpha=0.3)
-    axes.set_xlabel("Time (s)")
-    axes.set_ylabel("Force (N)")
-    return axes
+    label = "Force" if (found.force.shape[1], dof) == (1, 1) else f"Force_{dof}"
+    figure = found.figures["figure"]
+    for member in range(1, len(figure.members) + 1):
+        if isinstance(figure, Chart) and label in (panel.y.label for panel in figure.panels(member)):
+            return figure.plot(member, panel=label, ax=ax)[0]
+    raise KeyError(f"no force was sought at degree of freedom {dof}")
 
 
 def sweep(found: Sweep, *, ax: Axes | None = None) -> Axes:
     """Plot the error over the settings of a sweep, both logarithmic."""
-    axes = _axes(ax)
-    axes.loglog(found.values, found.error)
-    axes.set_xlabel({"npi": "NPI", "rate_hz": "Rate (Hz)"}.get(found.settings["kind"], "Decimation"))
-    axes.set_ylabel("Relative error")
-    return axes
+    return found.plot(ax=ax)[0]
 
 
 def modes(machine: Shaped, *, ax: Axes | None = None) -> Axes:
     """Plot the eigenvalues of a machine in the complex plane, in rad/s."""
-    axes = _axes(ax)
+    axes = _new_axes(ax)
     values = np.array([mode.eigenvalue for mode in machine.modes])
     axes.plot(values.real, values.imag, "x")
     axes.axvline(0.0, color="0.7", linewidth=0.8)
@@ -219,7 +286,7 @@ def shape(machine: Shaped, mode: int = 1, *, ax: Axes | None = None) -> Axes:
     """
     if mode < 1:
         raise IndexError(f"modes are counted from 1, not {mode}")
-    axes = _axes(ax)
+    axes = _new_axes(ax)
     values = np.asarray(machine.modes[mode - 1].shape)
     places = np.arange(1, len(values) + 1)
     axes.axhline(0.0, color="0.7", linewidth=0.8)
@@ -234,20 +301,9 @@ def shape(machine: Shaped, mode: int = 1, *, ax: Axes | None = None) -> Axes:
 
 def assurance(machine: Shaped, *, ax: Axes | None = None) -> Axes:
     """Plot the modal assurance criterion of each pair of modes as squares with numbers."""
-    axes = _axes(ax)
-    shapes = np.array([mode.shape for mode in machine.modes])
-    power = np.sum(np.abs(shapes) ** 2, axis=1)
-    values = np.abs(shapes.conj() @ shapes.T) ** 2 / np.outer(power, power)
-    numbers = np.arange(1, len(shapes) + 1)
-    axes.imshow(values, vmin=0, vmax=1, cmap="Blues", extent=(0.5, len(shapes) + 0.5, len(shapes) + 0.5, 0.5))
-    for row, column in np.ndindex(values.shape):
-        value = values[row, column]
-        axes.text(column + 1, row + 1, f"{value:.2f}", ha="center", va="center", color="w" if value > 0.6 else "k")
-    axes.set_xticks(numbers)
-    axes.set_yticks(numbers)
-    axes.set_xlabel("Mode")
-    axes.set_ylabel("Mode")
-    return axes
+    from ._drawing import draw_matrix
+
+    return draw_matrix(_assurance(np.array([mode.shape for mode in machine.modes])), ax)
 
 
 def stabilisation(found: Modes, *, ax: Axes | None = None) -> Axes:
@@ -272,7 +328,7 @@ def stabilisation(found: Modes, *, ax: Axes | None = None) -> Axes:
     diagrams = found.diagrams
     if diagrams is None:
         raise ValueError("the result has no diagrams: find the modes with diagrams=True")
-    axes = _axes(ax)
+    axes = _new_axes(ax)
     poles, indicator = diagrams["stabilisation"], diagrams.get("mode_indicator")
     order, frequency = np.array(poles["order"]), np.array(poles["frequency_hz"])
     stable = np.array(poles["is_stable"], dtype=bool)
@@ -324,7 +380,7 @@ def dynamic_stiffness(
         "real": found.stiffness[entry] - omega**2 * found.mass[entry],
         "imaginary": omega * found.damping[entry],
     }
-    axes = _axes(ax)
+    axes = _new_axes(ax)
     for (part, line), marker in zip(model.items(), "os", strict=True):
         values = np.array([row[part][place] for row in rows])
         errors = [row.get(f"standard_error_{part}") for row in rows]
@@ -338,20 +394,21 @@ def dynamic_stiffness(
     return axes
 
 
-def _degrees(values: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> np.ndarray[
-    tuple[int], np.dtype[np.float64]
-]:
-    return np.angle(values, deg=True)
+def _channel(found: Identified, quantity: str, dof: int) -> str:
+    """Return the name of a channel as the page writes it."""
+    columns = found.to_dict()["channels"][quantity]
+    name = columns[dof - 1] if 1 <= dof <= len(columns) else "0"
+    return f"{quantity} {dof}" if name == "0" else str(name)
 
 
-def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise ImportError(
-            "this needs matplotlib, which is not installed: pip install matplotlib"
-        ) from None
+def _member(found: FrequencyResponses, pair: tuple[int, int]) -> int:
+    """Return the number of a pair among the figures of the page, from 1."""
+    if pair not in found.pairs:
+        raise KeyError(pair)
+    return found.pairs.index(pair) + 1
 
-    return pyplot.subplots()[1]
+
+def _new_axes(ax: Axes | None) -> Axes:
+    from ._drawing import new_axes
+
+    return new_axes(ax)

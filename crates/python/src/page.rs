@@ -1,0 +1,81 @@
+//! Reports of results, and files of their mode shapes.
+
+use std::path::PathBuf;
+
+use mechid::analysis::modes::SavedModes;
+use mechid::io::{Geometry, record_details};
+use mechid::plot::Figure;
+use mechid::report::{ModeShapes, PageSettings, ReportError, modes_page};
+use pyo3::prelude::*;
+use serde::Serialize;
+
+use crate::{failure, work};
+
+/// Texts of a report.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct PageTexts {
+    title: Option<String>,
+    /// Names and values of further information.
+    about: Vec<(String, String)>,
+    /// File of the record, whose head may state more; empty if there is none.
+    record: PathBuf,
+    /// File of the points of the channels.
+    geometry: Option<PathBuf>,
+    /// Whether to reconstruct the force.
+    reconstruct_force: bool,
+}
+
+impl PageTexts {
+    /// Returns the settings of the page, with the details that the record states under other names.
+    ///
+    /// # Errors
+    /// `MechidError` if the geometry cannot be read.
+    pub fn settings(self, py: Python<'_>) -> PyResult<PageSettings> {
+        let Self { title, mut about, record, geometry, reconstruct_force } = self;
+        let geometry = geometry.map(|path| work::brief(py, || Geometry::read(path))).transpose()?;
+        for (name, value) in record_details(record) {
+            if about.iter().all(|(other, _)| !other.eq_ignore_ascii_case(&name)) {
+                about.push((name, value));
+            }
+        }
+        Ok(PageSettings { title, about, geometry, reconstruct_force, command: None })
+    }
+}
+
+/// Returns the page of a result with modes.
+///
+/// # Errors
+/// [`ReportError::Analysis`] without modes, [`ReportError::Plot`].
+pub fn of_modes(
+    result: &impl Serialize,
+    figure: Option<Figure>,
+    settings: &PageSettings,
+) -> Result<String, ReportError> {
+    let modes = SavedModes::from_result(result)?;
+    let shapes = shapes(&modes, settings.geometry.as_ref());
+    modes_page(&modes, figure, shapes.as_ref(), settings)
+}
+
+/// Returns geometry and shapes of a result with modes (its JSON) as a universal file; `None` if no
+/// mode oscillates, there are fewer than two channels, or a channel has no point.
+#[pyfunction]
+#[pyo3(signature = (result, geometry))]
+pub fn shapes_file(
+    py: Python<'_>,
+    result: &str,
+    geometry: Option<PathBuf>,
+) -> PyResult<Option<String>> {
+    let result: serde_json::Value = failure::settings(py, result)?;
+    let modes = work::brief(py, || SavedModes::from_json("the result", result))?;
+    let geometry = geometry.map(|path| work::brief(py, || Geometry::read(path))).transpose()?;
+    let shapes = shapes(&modes, geometry.as_ref());
+    Ok(shapes.map(|shapes| shapes.geometry.universal_file(&shapes.modes)))
+}
+
+/// Returns the shapes at the places of the responses, or at their columns if these have the points.
+fn shapes(modes: &SavedModes, geometry: Option<&Geometry>) -> Option<ModeShapes> {
+    let (shaped, places) = modes.shapes();
+    let at = |names: &[String]| ModeShapes::from_modes(&shaped, names, geometry);
+    at(&places).or_else(|| at(&modes.columns()))
+}
