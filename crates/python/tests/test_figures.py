@@ -305,6 +305,11 @@ def test_axes_and_panels_are_those_that_were_asked_for(results: Pages) -> None:
         found.plot("fit", quantity="mobility")
 
 
+def test_curves_that_were_not_gathered_are_asked_for() -> None:
+    with pytest.raises(mechid.MechidError, match="`curves`"):
+        mechid.inspect(FILE).plot()
+
+
 def test_functions_draw_the_quantity_that_was_measured(results: Pages) -> None:
     hammer: mechid.Identified = results["hammer"][0]
     for motion in (1, 2):
@@ -344,7 +349,8 @@ def test_reports_have_a_geometry_and_further_lines(tmp_path: Path) -> None:
     assert "&lt;rig&gt;" in page and "M. &amp; C." in page
     shapes = plotting.figures(page)["shapes"]
     assert isinstance(shapes, plotting.ShapeFigure)
-    assert shapes.points["a2"].tolist() == [0.0, 0.0, 2.0] and shapes.lines == ((0, 1),)
+    assert shapes.points == ("a1", "a2") and shapes.lines == ((0, 1),)
+    assert shapes.positions.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]
     rest, turned = (shapes.plot(1, phase_deg=at)[0].lines[-1].get_ydata() for at in (90.0, 0.0))
     assert not np.allclose(rest, turned, atol=0.01)
     modes.write_shapes(tmp_path / "modes.unv", geometry=frame)

@@ -950,7 +950,7 @@ def inspect(
     columns : sequence of str
         Columns to show, by name or number; every column that holds numbers only, without.
     curves : bool
-        Whether to gather the curves that `Inspected.to_svg` draws.
+        Whether to gather the curves that `plot` and `to_svg` of the result draw.
     fs, time, skip_lines, detrend, record_column, record_id, memory_gb, **window
         As in `Measurement.open`.
 
@@ -966,7 +966,7 @@ def inspect(
     reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id, memory_gb)
     plan = json.dumps(plan_of(path, {}, reading, window))
     settings = json.dumps({"columns": list(columns), "curves": curves})
-    return Inspected(_mechid.inspect(plan, settings))
+    return Inspected(_mechid.inspect(plan, settings), curves)
 
 
 @careful

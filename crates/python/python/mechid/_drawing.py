@@ -40,8 +40,8 @@ def draw_panels(
         raise ValueError(f"the figure has {len(panels)} panels, got {len(axes)} axes; `panel` chooses one")
     for panel, into in zip(panels, axes, strict=True):
         _draw_panel(panel, into)
-        place = into.get_subplotspec()
-        if ax is None and shares_x and place is not None and not place.is_last_row():
+        position = into.get_subplotspec()
+        if ax is None and shares_x and position is not None and not position.is_last_row():
             into.set_xlabel("")
     return axes
 
@@ -52,21 +52,21 @@ def new_axes(ax: Axes | None) -> Axes:
 
 
 def draw_shape(
-    rest: NDArray[np.float64],
-    moved: NDArray[np.float64],
+    projected: tuple[NDArray[np.float64], NDArray[np.float64]],
     lines: Sequence[tuple[int, int]],
     names: Sequence[str],
     title: str,
     ax: Axes | None,
 ) -> Axes:
-    """Draw the lines of a deflected structure over those at rest."""
+    """Draw the lines of a structure at rest and deflected, whose points are projected."""
     axes = new_axes(ax)
-    for places, style in ((rest, {"color": "0.5", "linestyle": "--", "linewidth": 0.8}), (moved, {"color": "#0072b2"})):
-        for first, second in lines:
-            axes.plot(*places[[first, second]].T, **style)
+    rest, moved = projected
+    for first, second in lines:
+        axes.plot(*rest[[first, second]].T, color="0.5", linestyle="--", linewidth=0.8)
+        axes.plot(*moved[[first, second]].T, color="#0072b2")
     axes.plot(*moved.T, "o", color="#d55e00", markersize=4)
-    for name, place in zip(names, moved, strict=True):
-        axes.annotate(name, place, xytext=(5, 4), textcoords="offset points", fontsize="small")
+    for name, point in zip(names, moved, strict=True):
+        axes.annotate(name, point, xytext=(5, 4), textcoords="offset points", fontsize="small")
     axes.set_title(title)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_axis_off()
@@ -108,8 +108,16 @@ def _new_axes(count: int, columns: int, shares_x: bool) -> list[Axes]:
 def _draw_panel(panel: Panel, axes: Axes) -> None:
     # Curves that were drawn before stay in view.
     is_empty = not axes.has_data()
-    for axis, scale in ((panel.x, axes.set_xscale), (panel.y, axes.set_yscale)):
-        scale("log" if axis.is_logarithmic else "linear")
+    for axis, set_scale, scale, name in (
+        (panel.x, axes.set_xscale, axes.get_xscale(), "x"),
+        (panel.y, axes.set_yscale, axes.get_yscale(), "y"),
+    ):
+        wanted = "log" if axis.is_logarithmic else "linear"
+        if scale != wanted:
+            set_scale(wanted)
+        if is_empty and not axis.is_logarithmic:
+            # Long numbers would run into each other.
+            axes.ticklabel_format(axis=name, scilimits=(-2, 5))
     for line in panel.references:
         across = axes.axhline if line.is_horizontal else axes.axvline
         across(line.value, color=line.color, linewidth=0.9, linestyle=_dashes(line.dash), label=line.name or _NO_LEGEND)

@@ -42,6 +42,9 @@ _ORDERS = (("Receptance", "m/N"), ("Mobility", "m/(s·N)"), ("Accelerance", "m/(
 # Bytes of single precision that a list is written with.
 _BYTES = {"h": 2, "m": 3, "f": 4}
 
+# Largest displacement of a drawn mode, relative to the size of the structure, as on the page.
+_DEFLECTION = 0.16
+
 _KINDS = {"l": "line", "k": "marked line", "p": "points", "s": "stems", "b": "band"}
 
 
@@ -154,7 +157,7 @@ class Chart:
         ValueError
             If a choice has no such value, or there are no responses per unit force to convert.
         """
-        drawn = self._drawn[_place(self.members, member, "member")]
+        drawn = self._drawn[_index(self.members, member, "member")]
         _check("show", show, Show)
         _check("phase", phase, Phase)
         view = _View(drawn, show, quantity, scale, phase)
@@ -209,12 +212,12 @@ class Chart:
         """
         from ._drawing import draw_panels
 
-        drawn = self._drawn[_place(self.members, member, "member")]
+        drawn = self._drawn[_index(self.members, member, "member")]
         panels = self.panels(member, show=show, quantity=quantity, scale=scale, phase=phase)
         if panel is None and ax is not None and not isinstance(ax, Sequence | np.ndarray):
             panel = 1
         if panel is not None:
-            panels = (panels[_place([one.y.label for one in panels], panel, "panel")],)
+            panels = (panels[_index([one.y.label for one in panels], panel, "panel")],)
         return draw_panels(panels, ax, drawn.columns, drawn.shares_x)
 
 
@@ -228,10 +231,12 @@ class ShapeFigure:
         Name of the figure, and what the page writes below it.
     members : tuple of str
         The modes with frequency and damping.
-    points : mapping of str to array
-        Place of each point, shape (3,), in the unit of the geometry.
+    points : tuple of str
+        Names of the points.
+    positions : array
+        Their coordinates, shape (points, 3), in the unit of the geometry.
     lines : tuple of pairs of int
-        Points that a line joins, counted from 0 in the order of ``points``.
+        Points that a line joins, counted from 0.
     displacements : tuple of arrays of complex
         Displacement of each mode at the points along x, y and z, shape (points, 3), with four digits;
         the largest is 1.
@@ -240,7 +245,8 @@ class ShapeFigure:
     name: str
     caption: str
     members: tuple[str, ...]
-    points: Mapping[str, Values]
+    points: tuple[str, ...]
+    positions: Values
     lines: tuple[tuple[int, int], ...]
     displacements: tuple[NDArray[np.complex128], ...]
     _view: tuple[float, float] = field(repr=False)
@@ -275,17 +281,16 @@ class ShapeFigure:
         """
         from ._drawing import draw_shape
 
-        at = _place(self.members, member, "mode")
-        rest = np.array(list(self.points.values()))
-        size = float(np.max(np.ptp(rest, axis=0))) or 1.0
+        at = _index(self.members, member, "mode")
+        size = float(np.max(np.ptp(self.positions, axis=0))) or 1.0
         turned = np.real(self.displacements[at] * np.exp(1j * np.radians(phase_deg)))
-        moved = rest + 0.16 * size * amplitude * turned
-        places = [self._projected(each) for each in (rest, moved)]
-        return [draw_shape(places[0], places[1], self.lines, tuple(self.points), self.members[at], ax)]
+        moved = self.positions + _DEFLECTION * size * amplitude * turned
+        ends = self._projected(self.positions), self._projected(moved)
+        return [draw_shape(ends, self.lines, self.points, self.members[at], ax)]
 
-    def _projected(self, places: Values) -> Values:
+    def _projected(self, positions: Values) -> Values:
         turn, tilt = self._view
-        x, y, z = places.T
+        x, y, z = positions.T
         depth = np.sin(turn) * x + np.cos(turn) * y
         return np.stack([np.cos(turn) * x - np.sin(turn) * y, z * np.cos(tilt) + depth * np.sin(tilt)], axis=1)
 
@@ -333,8 +338,8 @@ def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
         caption = html.unescape(_text(_CAPTION, content))
         numbers = _text(_NUMBERS, content)
         if numbers:
-            told = json.loads(html.unescape(numbers))
-            found[name] = _chart(name, caption, told) if "v" in told else _shapes(name, caption, told)
+            data = json.loads(html.unescape(numbers))
+            found[name] = _chart(name, caption, data) if "v" in data else _shapes(name, caption, data)
         else:
             # The matrix of a page of shapes compares these; that of a comparison has its shades alone.
             shapes = next((one for one in found.values() if isinstance(one, ShapeFigure)), None)
@@ -367,7 +372,7 @@ def _text(pattern: re.Pattern[str], content: str) -> str:
     return found.group(1) if found else ""
 
 
-def _place(names: Sequence[str], wanted: str | int, what: str) -> int:
+def _index(names: Sequence[str], wanted: str | int, what: str) -> int:
     """Return the index of a name, or of a number from 1."""
     if isinstance(wanted, str) and wanted in names:
         return list(names).index(wanted)
@@ -398,11 +403,11 @@ def _decoded(text: str) -> Values:
     return float(scale) * single.view("<f4")[:, 0].astype(np.float64)
 
 
-def _chart(name: str, caption: str, told: dict[str, Any]) -> Chart:
-    lists = [_decoded(text) for text in told["a"]]
+def _chart(name: str, caption: str, data: dict[str, Any]) -> Chart:
+    lists = [_decoded(text) for text in data["a"]]
     for values in lists:
         values.flags.writeable = False
-    views = told["v"]
+    views = data["v"]
     members = tuple(
         _Member(
             panels=tuple(_panel(panel, lists) for panel in view["p"]),
@@ -415,50 +420,50 @@ def _chart(name: str, caption: str, told: dict[str, Any]) -> Chart:
     return Chart(name, caption, tuple(view["n"] for view in views), members)
 
 
-def _panel(told: dict[str, Any], lists: Sequence[Values]) -> Panel:
+def _panel(data: dict[str, Any], lists: Sequence[Values]) -> Panel:
     references = tuple(
         Reference(one.get("n", ""), one["v"], one["h"], one["o"], tuple(one.get("d", ())))
-        for one in told.get("f", ())
+        for one in data.get("f", ())
     )
-    curves = tuple(_curve(one, lists) for one in told["c"])
-    return Panel(told["t"], _axis(told["x"]), _axis(told["y"]), curves, references)
+    curves = tuple(_curve(one, lists) for one in data["c"])
+    return Panel(data["t"], _axis(data["x"]), _axis(data["y"]), curves, references)
 
 
-def _axis(told: dict[str, Any]) -> Axis:
-    low, high = told["r"]
-    return Axis(told["l"], told["u"], told["g"], (low, high), told.get("s"))
+def _axis(data: dict[str, Any]) -> Axis:
+    low, high = data["r"]
+    return Axis(data["l"], data["u"], data["g"], (low, high), data.get("s"))
 
 
-def _curve(told: dict[str, Any], lists: Sequence[Values]) -> Curve:
+def _curve(data: dict[str, Any], lists: Sequence[Values]) -> Curve:
     def values(key: str) -> Values | None:
-        return lists[told[key]] if told.get(key) is not None else None
+        return lists[data[key]] if data.get(key) is not None else None
 
     return Curve(
-        name=told.get("n", ""),
-        kind=_KINDS[told["k"]],
-        x=lists[told["x"]],
-        y=lists[told["y"]],
+        name=data.get("n", ""),
+        kind=_KINDS[data["k"]],
+        x=lists[data["x"]],
+        y=lists[data["y"]],
         upper=values("u"),
         phase_deg=values("p"),
         std_error=values("e"),
-        color=told["o"],
-        width=told["w"],
-        dash=tuple(told.get("d", ())),
-        marker=told.get("m"),
+        color=data["o"],
+        width=data["w"],
+        dash=tuple(data.get("d", ())),
+        marker=data.get("m"),
     )
 
 
-def _shapes(name: str, caption: str, told: dict[str, Any]) -> ShapeFigure:
-    places = [np.array(place, dtype=np.float64) for place in told["points"]]
-    parts = [np.array(mode["s"], dtype=np.float64).reshape(-1, 3, 2) for mode in told["modes"]]
+def _shapes(name: str, caption: str, data: dict[str, Any]) -> ShapeFigure:
+    parts = [np.array(mode["s"], dtype=np.float64).reshape(-1, 3, 2) for mode in data["modes"]]
     return ShapeFigure(
         name=name,
         caption=caption,
-        members=tuple(mode["n"] for mode in told["modes"]),
-        points=MappingProxyType(dict(zip(told["names"], places, strict=True))),
-        lines=tuple((first, second) for first, second in told["lines"]),
+        members=tuple(mode["n"] for mode in data["modes"]),
+        points=tuple(data["names"]),
+        positions=np.array(data["points"], dtype=np.float64),
+        lines=tuple((first, second) for first, second in data["lines"]),
         displacements=tuple(part[..., 0] + 1j * part[..., 1] for part in parts),
-        _view=(told["turn"], told["tilt"]),
+        _view=(data["turn"], data["tilt"]),
     )
 
 

@@ -281,7 +281,7 @@ def _text_element(text: str) -> str:
 
 
 class Plotted:
-    """What has figures to draw with Matplotlib."""
+    """A result with figures to draw with Matplotlib."""
 
     # Figures that show a result best, in order.
     _usual: ClassVar[tuple[str, ...]] = ()
@@ -446,9 +446,9 @@ class Reported(Drawn):
     @property
     def _record(self) -> str:
         """First record, whose head may say more; empty without one."""
-        told = self._told
-        tests = told.get("records") or told.get("tests") or [told]
-        return str(tests[0].get("file", ""))
+        fields = self._told
+        records = fields.get("records") or fields.get("tests") or [fields]
+        return str(records[0].get("file", ""))
 
 
 class Shaped(Reported):
@@ -1250,9 +1250,17 @@ class Inspected(Drawn):
     """What is in a record file."""
 
     _inner: _mechid.Answer
+    _has_curves: bool
 
-    def __init__(self, inner: _mechid.Answer) -> None:
+    def __init__(self, inner: _mechid.Answer, has_curves: bool) -> None:
         self.__dict__["_inner"] = inner
+        self.__dict__["_has_curves"] = has_curves
+
+    @property
+    def _page(self) -> str:
+        if not self._has_curves:
+            raise MechidError("the curves were not gathered: inspect with `curves` True", "Settings")
+        return self.to_html()
 
     @property
     def channels(self) -> tuple[Mapping[str, Any], ...]:
