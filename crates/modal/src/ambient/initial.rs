@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Complex, DVector};
 
 use super::likelihood::{noise, positive_factor};
-use super::limits::{COARSE_POOLING, NOISE_TERMS};
+use super::limits::{COARSE_POOLING, MIN_DECAY_TIMES, NOISE_TERMS};
 use super::lines::{BandLines, PooledLines};
 use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::search::{Effort, Fit, search, search_pooled};
@@ -34,23 +34,19 @@ const QUANTITIES: [(Kernel, f64); 5] = [
 /// Returns the maximum of the likelihood for the quantity (displacement, velocity or acceleration,
 /// filtered or not) that explains the lines best; `None` if none has a likelihood.
 ///
-/// A few steps suffice to choose the phase of each kernel. Kernels are compared at their maxima,
-/// because they differ in the tails of the resonances: a wrong kernel biases frequency and damping.
+/// Quantities are compared with the poles of the subspace models: they differ in the tails of the
+/// resonances, and with free poles a wrong one would find a better maximum elsewhere, at damping
+/// ratios of sinusoids.
 pub(super) fn initial_fit(modes: &[Pole], band: &BandLines) -> Option<Fit> {
     let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
     let pooled = band.pooled(&poles, COARSE_POOLING, NOISE_TERMS);
-    let lower = |a: &Fit, b: &Fit| a.cost.total_cmp(&b.cost);
-    let maxima =
-        [Kernel::Static, Kernel::Sampled, Kernel::Vanishing].into_iter().filter_map(|kernel| {
-            let phases = QUANTITIES.iter().filter(|(other, _)| *other == kernel);
-            let rough_fits = phases.filter_map(|&(kernel, phase)| {
-                let initial =
-                    initial_parameters(modes, band.outputs(), &pooled, band, kernel, phase);
-                search(initial, &pooled, band.span, Effort::SHORT)
-            });
-            search_pooled(rough_fits.min_by(lower)?.parameters, band, Effort::TEST)
-        });
-    maxima.min_by(lower)
+    let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
+        let initial = initial_parameters(modes, band.outputs(), &pooled, band, kernel, phase);
+        search(initial, &pooled, band.span, Effort::HELD)
+    });
+    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let rough = search(best.parameters, &pooled, band.span, Effort::SHORT)?;
+    search_pooled(rough.parameters, band, Effort::TEST)
 }
 
 fn initial_parameters(
@@ -75,7 +71,9 @@ fn initial_parameters(
     for (r, mode) in modes.iter().enumerate() {
         let (frequency, damping) = (parameters.layout.frequency(r), parameters.layout.damping(r));
         parameters.values[frequency] = mode.pole.norm().ln();
-        parameters.values[damping] = mode.damping_ratio().max(1e-6).ln();
+        // The search cannot leave a resonance as narrow as a line, which a sinusoid has.
+        let narrowest = MIN_DECAY_TIMES / (mode.pole.norm() * band.span.duration);
+        parameters.values[damping] = mode.damping_ratio().max(narrowest).ln();
         let turn = Complex::cis(phase - mean_phase(&mode.vector));
         parameters.set_shape(r, &(&mode.vector * (turn * -mode.pole.re)));
     }

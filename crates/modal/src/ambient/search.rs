@@ -46,16 +46,22 @@ pub(super) struct Effort {
     pub iterations: usize,
     /// Gain in log-likelihood below which a step is slow; two successive slow steps end the search.
     pub slow: f64,
+    /// If true, frequencies and damping ratios stay as they are.
+    pub holds_poles: bool,
 }
 
 impl Effort {
-    /// Effort to compare initial estimates.
-    pub const SHORT: Self = Self { iterations: 6, slow: 0.5 };
+    /// Effort to compare quantities at initial estimates. Their poles are better than their shapes and
+    /// amplitudes: beside wrong amplitudes a damping ratio would fall to that of a sinusoid, from
+    /// which no search returns.
+    pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true };
+    /// Effort to approach the maximum with coarse lines.
+    pub const SHORT: Self = Self { iterations: 6, slow: 0.5, holds_poles: false };
     /// Effort to test a mode: the penalty is a gain of several tens.
-    pub const TEST: Self = Self { iterations: 40, slow: 0.5 };
+    pub const TEST: Self = Self { iterations: 40, slow: 0.5, holds_poles: false };
     /// Effort of the final search: further steps would move parameters by less than a tenth of
     /// their standard errors.
-    pub const FULL: Self = Self { iterations: 60, slow: 0.005 };
+    pub const FULL: Self = Self { iterations: 60, slow: 0.005, holds_poles: false };
 }
 
 /// Maximum of the likelihood.
@@ -84,7 +90,8 @@ pub(super) fn search(
     let information = information(&start, lines, span)?;
     let slope = gradient(&start, lines, span)?;
     let mut fit = Fit { parameters: start, cost, information };
-    let mut path = Path { lines, span, slope, damping: FIRST_DAMPING, updates: 0 };
+    let held = if effort.holds_poles { 2 * fit.parameters.layout.modes } else { 0 };
+    let mut path = Path { lines, span, held, slope, damping: FIRST_DAMPING, updates: 0 };
     let mut slow = 0;
     for _ in 0..effort.iterations {
         let gain = path.step(&mut fit)?;
@@ -112,6 +119,8 @@ pub(super) fn search(
 struct Path<'a> {
     lines: &'a [PooledLines],
     span: Span,
+    /// Number of parameters, the first ones, that stay as they are.
+    held: usize,
     /// Gradient at the parameters of the fit.
     slope: DVector<f64>,
     damping: f64,
@@ -123,7 +132,7 @@ impl Path<'_> {
     /// Makes one step and returns its gain in log-likelihood, 0 if no step succeeds.
     fn step(&mut self, fit: &mut Fit) -> Option<f64> {
         for _ in 0..TRIALS {
-            if let Some(step) = damped_step(&fit.information, &self.slope, self.damping) {
+            if let Some(step) = self.proposed(&fit.information) {
                 let candidate = moved(&fit.parameters, &step);
                 let next = cost(&candidate, self.lines, self.span);
                 if next < fit.cost {
@@ -147,6 +156,17 @@ impl Path<'_> {
             }
         }
         Some(0.0)
+    }
+
+    /// Returns the step of the parameters that are not held.
+    fn proposed(&self, information: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let (held, free) = (self.held, self.slope.len() - self.held);
+        let information = information.view((held, held), (free, free)).into_owned();
+        let slope = self.slope.rows(held, free).into_owned();
+        let step = damped_step(&information, &slope, self.damping)?;
+        let mut all = DVector::zeros(held + free);
+        all.rows_mut(held, free).copy_from(&step);
+        Some(all)
     }
 
     /// Computes the information at the parameters of the fit, unless it was computed there.

@@ -79,7 +79,7 @@ fn mast() -> Structure {
 }
 
 /// Judge: the truth behind twelve records; of 72 intervals of 95 % at least 61 hold, four standard
-/// deviations below the expectation. The long study is `examples/ambient_study.rs`.
+/// deviations below the expectation. The long study is `examples/ambient_study`.
 #[test]
 fn intervals_hold_the_truth() {
     let truth = mast();
@@ -116,6 +116,23 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
         .collect();
     // The sum of four errors has a standard deviation of 2.
     assert!(errors.iter().sum::<f64>().abs() < 6.0, "{errors:?}");
+}
+
+/// Two records of which a wrong quantity has the larger maximum of the likelihood, at damping ratios
+/// a thirtieth of the true ones.
+#[test]
+fn no_resonance_becomes_a_sinusoid() {
+    let truth = tower();
+    for seed in [1029, 1079] {
+        let record = truth.record(Quantity::Velocity, 25.0, 7500, 0.05, seed);
+        let estimate = identified(&record, AmbientSettings::default());
+        assert_eq!(estimate.modes.len(), 4, "{seed}");
+        for (mode, exact) in estimate.modes.iter().zip(&truth.dampings) {
+            let ratio = mode.damping_ratio.value / exact;
+            let error = mode.damping_ratio.standard_error().unwrap() / mode.damping_ratio.value;
+            assert!(ratio.ln().abs() < 4.0 * error, "{seed}: {ratio} ± {error}");
+        }
+    }
 }
 
 fn with_sinusoid(record: &Record, frequency_hz: f64, amplitude: f64) -> Record {

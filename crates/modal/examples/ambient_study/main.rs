@@ -1,13 +1,17 @@
 //! Coverage and errors of modes from responses alone, beside covariance-driven subspace models
 //! (SSI-cov) at the order that is best with the truth in hand.
 //!
-//! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE]`
+//! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE [FOLDER]]`; with a
+//! FOLDER the records and the modes of both truth and estimates are written there instead, for
+//! `pyoma2_ssi.py`.
 
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
-#[path = "../tests/suite/ambient_generator.rs"]
+#[path = "../../tests/suite/ambient_generator.rs"]
 mod ambient_generator;
 
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ambient_generator::{Quantity, Structure};
@@ -91,14 +95,44 @@ struct Tally {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).map(|a| a.parse::<usize>());
-    let seeds = arguments.next().and_then(Result::ok).unwrap_or(4) as u64;
-    let chosen = arguments.next().and_then(Result::ok);
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |k: usize| arguments.get(k).and_then(|text| text.parse::<usize>().ok());
+    let seeds = number(0).unwrap_or(4) as u64;
+    let chosen = number(1);
+    let folder = arguments.get(2).map(PathBuf::from);
     for (index, case) in cases().iter().enumerate() {
-        if chosen.is_none_or(|chosen| chosen == index) {
-            study(case, seeds);
+        if chosen.is_some_and(|chosen| chosen != index) {
+            continue;
+        }
+        match &folder {
+            None => study(case, seeds),
+            Some(folder) => write(case, seeds, folder).unwrap(),
         }
     }
+}
+
+/// Writes the records of a case, and its modes: true ones and estimates.
+fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
+    let name = case.name.replace(',', "").replace(' ', "-");
+    let mut modes = format!("seed,frequency_hz,damping_ratio\nrate,{},\n", case.rate_hz);
+    for (hz, zeta) in case.structure.frequencies_hz.iter().zip(&case.structure.dampings) {
+        modes += &format!("true,{hz},{zeta}\n");
+    }
+    for seed in 0..seeds {
+        let record = case.record(1000 + seed);
+        let mut text = String::new();
+        for row in record.data().row_iter() {
+            text += &row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            text.push('\n');
+        }
+        fs::write(folder.join(format!("{name}-{seed}.csv")), text)?;
+        let Ok(estimate) = identify_ambient(&record, &AmbientSettings::default()) else { continue };
+        for mode in estimate.modes {
+            let (f, zeta) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
+            modes += &format!("{seed},{f},{zeta}\n");
+        }
+    }
+    fs::write(folder.join(format!("{name}.modes.csv")), modes)
 }
 
 fn study(case: &Case, seeds: u64) {
@@ -248,17 +282,23 @@ impl SubspaceErrors {
     /// Adds for each true mode the pole of each order that is nearest to it.
     fn add(&mut self, row: usize, models: &Stabilisation, truth: &Structure) {
         self.records += usize::from(row == 0);
-        for (r, exact) in truth.poles().into_iter().enumerate() {
+        let all = truth.poles();
+        for (r, exact) in all.iter().copied().enumerate() {
             for half in 0..HALF_ORDERS {
                 let poles = models.poles().iter().filter(|p| p.order == 2 * half + 2);
                 let distance = |p: Complex<f64>| (p - exact).norm();
                 let nearest = poles
                     .map(|p| &p.pole)
                     .min_by(|a, b| distance(a.pole).total_cmp(&distance(b.pole)));
-                // A pole further away, or of another shape, is no estimate of this mode.
+                // A pole further away, nearer to another mode or of another shape is no estimate of
+                // this mode: below the true order one pole stands for two modes.
                 let shape = truth.shapes.column(r).into_owned();
-                let is_mode =
-                    |p: &&Pole| distance(p.pole) < 3.0 * -exact.re && mac(&p.vector, &shape) > 0.9;
+                let is_mode = |p: &&Pole| {
+                    let gap = distance(p.pole);
+                    gap < 3.0 * -exact.re
+                        && all.iter().all(|other| (p.pole - other).norm() >= gap)
+                        && mac(&p.vector, &shape) > 0.9
+                };
                 let Some(pole) = nearest.filter(is_mode) else { continue };
                 let sums = &mut self.sums[r][row][half];
                 sums[0] += (pole.pole.norm() / exact.norm() - 1.0).powi(2);
