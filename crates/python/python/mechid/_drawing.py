@@ -108,16 +108,16 @@ def _new_axes(count: int, columns: int, shares_x: bool) -> list[Axes]:
 def _draw_panel(panel: Panel, axes: Axes) -> None:
     # Curves that were drawn before stay in view.
     is_empty = not axes.has_data()
-    for axis, set_scale, scale, name in (
-        (panel.x, axes.set_xscale, axes.get_xscale(), "x"),
-        (panel.y, axes.set_yscale, axes.get_yscale(), "y"),
+    for axis, set_scale, scale in (
+        (panel.x, axes.set_xscale, axes.get_xscale()),
+        (panel.y, axes.set_yscale, axes.get_yscale()),
     ):
         wanted = "log" if axis.is_logarithmic else "linear"
         if scale != wanted:
             set_scale(wanted)
         if is_empty and not axis.is_logarithmic:
             # Long numbers would run into each other.
-            axes.ticklabel_format(axis=name, scilimits=(-2, 5))
+            axes.ticklabel_format(axis="x" if axis is panel.x else "y", scilimits=(-2, 5))
     for line in panel.references:
         across = axes.axhline if line.is_horizontal else axes.axvline
         across(line.value, color=line.color, linewidth=0.9, linestyle=_dashes(line.dash), label=line.name or _NO_LEGEND)
