@@ -94,6 +94,11 @@ impl Figure {
         &self.panels
     }
 
+    /// Returns the number of rows of panels.
+    pub fn rows(&self) -> usize {
+        self.panels.len().div_ceil(self.columns)
+    }
+
     /// Checks that every panel has curves, and that every coordinate can be shown on its axis.
     pub(crate) fn validate(&self) -> Result<(), PlotError> {
         if self.panels.is_empty() {

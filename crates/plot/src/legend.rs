@@ -62,17 +62,26 @@ impl Entry {
     }
 }
 
-/// Returns the entries of a panel: its labelled curves, then its labelled reference lines.
+/// Label of the bands around curves with standard errors; the script has the same.
+const BAND: &str = "± 2 standard errors";
+
+/// Returns the entries of a panel: its labelled curves, the bands around them, then its labelled
+/// reference lines.
 pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
     let curves = panel.curves.iter().zip(panel.styles()).map(|(curve, style)| Entry {
         label: curve.label.clone(),
         sample: Sample::Curve(curve.kind, style),
     });
+    let banded = panel.curves.iter().zip(panel.styles()).find(|(curve, _)| !curve.error.is_empty());
+    let band = banded.map(|(_, style)| Entry {
+        label: BAND.to_owned(),
+        sample: Sample::Curve(Kind::Band, style),
+    });
     let references = panel.references.iter().map(|reference| Entry {
         label: reference.label.clone(),
         sample: Sample::Line(reference_stroke(reference)),
     });
-    curves.chain(references).filter(|entry| !entry.label.is_empty()).collect()
+    curves.chain(band).chain(references).filter(|entry| !entry.label.is_empty()).collect()
 }
 
 /// Returns the entries of several panels, each label once.

@@ -202,30 +202,35 @@ impl View {
 /// fit.
 const NUMBERED: usize = 20;
 
-/// Draws a square matrix of pure numbers from 0 to 1, row by row, as squares with their numbers;
-/// larger numbers are darker.
+/// Draws a matrix of pure numbers from 0 to 1, row by row, as squares with their numbers; larger
+/// numbers are darker.
 pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     const EDGE: f64 = 34.0;
-    let side = (440.0 / values.len().max(1) as f64).clamp(14.0, 46.0);
+    let (rows, columns) = (values.len(), values.iter().map(Vec::len).max().unwrap_or(0));
+    let longest = rows.max(columns);
+    let side = (440.0 / longest.max(1) as f64).clamp(14.0, 46.0);
     let at = |k: usize| EDGE + side * k as f64;
-    let (width, height) = (at(values.len()) + 8.0, at(values.len()) + 8.0);
+    let (width, height) = (at(columns) + 8.0, at(rows) + 8.0);
     let mut sheet = Canvas::new(width.max(160.0), height);
     let words = TextStyle::new(11.5);
     let every = (18.0 / side).ceil().max(1.0) as usize;
-    for column in (0..values.len()).step_by(every) {
+    for column in (0..columns).step_by(every) {
         let middle = at(column) + side / 2.0;
         sheet.text((middle, EDGE - 7.0), &(column + 1).to_string(), &words);
-        sheet.text((EDGE - 14.0, middle + 4.0), &(column + 1).to_string(), &words);
     }
-    for row in 0..values.len() {
-        for column in 0..values.len() {
+    for row in (0..rows).step_by(every) {
+        let middle = at(row) + side / 2.0;
+        sheet.text((EDGE - 14.0, middle + 4.0), &(row + 1).to_string(), &words);
+    }
+    for row in 0..rows {
+        for column in 0..columns {
             let value = values[row].get(column).copied().unwrap_or(0.0);
             // The colour stays light enough for dark digits.
             sheet.open_faded(0.06 + 0.4 * value);
             let corner = (at(column) + 1.0, at(row) + 1.0);
             sheet.rect(corner, (side - 2.0, side - 2.0), Some(Color::BLUE), None);
             sheet.close_group();
-            if values.len() <= NUMBERED {
+            if longest <= NUMBERED {
                 let style = TextStyle::new(if side > 30.0 { 11.5 } else { 9.0 });
                 let (x, y) = (at(column) + side / 2.0, at(row) + side / 2.0 + 4.0);
                 let digits = if side > 30.0 { 2 } else { 1 };

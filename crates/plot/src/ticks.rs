@@ -148,8 +148,11 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         major.extend(labelled.iter().map(|value| (*value, label(*value))));
         return Ticks { major, minor, factor: None };
     }
+    // One tick does not show the scale.
+    let is_multiple = |n: &&i32| n.rem_euclid(stride) == 0;
+    let origin = if decades.iter().filter(is_multiple).count() < 2 { decades[0] } else { 0 };
     for &n in &decades {
-        if n.rem_euclid(stride) == 0 {
+        if (n - origin).rem_euclid(stride) == 0 {
             major.push((10f64.powi(n), label(n)));
         } else {
             minor.push(10f64.powi(n));

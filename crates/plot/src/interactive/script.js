@@ -12,6 +12,7 @@ const put_in = (parent, made, attributes, text) => { parent?.append(made); retur
 const draw = (parent, name, attributes, text) => put_in(parent, document.createElementNS("http://www.w3.org/2000/svg", name), attributes, text);
 const add = (parent, name, attributes, text) => put_in(parent, document.createElement(name), attributes, text);
 const on = (target, handlers) => { for (const name in handlers) target.addEventListener(name, handlers[name]); };
+const next_frame = requestAnimationFrame;
 const press = (button, is) => put(button, {"aria-pressed": is});
 const minus = text => text.replace(/-/g, "−");
 const raised = n => "×10" + [...String(n)].map(c => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("");
@@ -32,21 +33,24 @@ const decode = text => {
 const ticks = ({g, s}, [low, high], wanted) => {
     const major = [], minor = [];
     if (g) {
-        const span = log10(high / low), stride = ceil(span / wanted), marks = 2 * span <= wanted ? [1, 2, 5] : [1];
-        for (let n = floor(log10(low)); n <= log10(high); n++)
-            for (let m = 1; m < 10; m++) {
-                const v = m * 10 ** n;
-                if (v < low * 0.999999 || v > high * 1.000001) continue;
-                if (!marks.includes(m) || n % stride) minor.push(v);
-                else major.push([v, low >= 1e-3 && high < 1e6 ? String(+v.toPrecision(1)) : m > 1 ? m + raised(n) : raised(n).slice(1)]);
-            }
-        if (major.length > 2 || span > 1 && major.length) return {major, minor: stride > 1 ? [] : minor, factor: ""};
+        const span = log10(high / low), stride = ceil(span / wanted);
+        // One tick does not show the scale.
+        for (const marks of 2 * span <= wanted ? [[1, 2, 5]] : [[1], [1, 2, 5]]) {
+            major.length = minor.length = 0;
+            for (let n = floor(log10(low)); n <= log10(high); n++)
+                for (let m = 1; m < 10; m++) {
+                    const v = m * 10 ** n;
+                    if (v < low * 0.999999 || v > high * 1.000001) continue;
+                    if (!marks.includes(m) || n % stride) minor.push(v);
+                    else major.push([v, low >= 1e-3 && high < 1e6 ? String(+v.toPrecision(1)) : m > 1 ? m + raised(n) : raised(n).slice(1)]);
+                }
+            if (major.length > 2 || span > 1 && major.length > 1) return {major, minor: stride > 1 ? [] : minor, factor: ""};
+        }
         major.length = 0;
     }
     const nice = v => { const decade = 10 ** floor(log10(v)); return decade * ([1, 2, 5].find(m => v / decade <= m * 1.000001) ?? 10); };
     const fixed = [s, 2 * s, 4 * s].find(v => within((high - low) / v, 2, 1.6 * wanted) === (high - low) / v);
     let step = fixed ?? nice((high - low) / wanted);
-    // One tick does not show the scale.
     for (let n = 0; n < 2 && floor(high / step + 1e-9) - ceil(low / step - 1e-9) < 1; n++) step = nice(step / 2.6);
     let power = floor(log10(max(abs(low), abs(high))));
     power = power >= -2 && power < 5 ? 0 : 3 * floor(power / 3);
@@ -70,10 +74,10 @@ const nearest = (X, x) => {
     while (high - low > 1) { const mid = (low + high) >> 1; if (X[mid] <= x) low = mid; else high = mid; }
     return x - X[low] <= X[high] - x ? low : high;
 };
-// A line between its points; anything else at its nearest point.
+// Lines and bands between their points; anything else at its nearest point.
 const at = (curve, x, Y = curve.Y) => {
     const {X} = curve, k = nearest(X, x), j = X[k] < x ? k + 1 : k - 1;
-    return curve.k !== "l" || X[k] === x || !(j in X) || X[j] === X[k] ? Y[k] : Y[k] + (Y[j] - Y[k]) * (x - X[k]) / (X[j] - X[k]);
+    return "ps".includes(curve.k) || !rises(X) || X[k] === x || !(j in X) || X[j] === X[k] ? Y[k] : Y[k] + (Y[j] - Y[k]) * (x - X[k]) / (X[j] - X[k]);
 };
 const SHAPES = {s: "m-3-3h6v6h-6z", t: "m0-4l4 7h-8z", v: "m0 4l4-7h-8z", d: "m0-4l4 4-4 4-4-4z", x: "m-3-3l6 6m0-6l-6 6", p: "m-4 0h8m-4-4v8"};
 const markers = (parent, points, {m, o}) => {
@@ -92,7 +96,11 @@ const button = (parent, text, onclick) => Object.assign(add(parent, "button", {t
 // The small drawings choose what the large one shows.
 const map = (figure, change) => pick(figure, ".map button").forEach((one, k, buttons) => {
     press(one, !k);
-    one.onclick = () => { buttons.forEach(other => press(other, other === one)); change(k); };
+    one.onclick = () => {
+        buttons.forEach(other => press(other, other === one));
+        change(k);
+        figure.firstChild.scrollIntoView({block: "nearest"});
+    };
 });
 const begin = svg => {
     const tools = add(null, "div", {class: "tools"}), out = add(null, "output", {class: "values"});
@@ -107,6 +115,8 @@ const clear = (svg, width, height) => {
 };
 
 const ORDERS = [["Receptance", "m/N"], ["Mobility", "m/(s·N)"], ["Accelerance", "m/(s²·N)"]];
+// Name of the bands around curves with standard errors; a relative error times NEPER is one in dB.
+const BAND = "± 2 standard errors", NEPER = 20 * Math.LOG10E;
 let clips = 0, printing = false;
 const redraws = [];
 
@@ -122,10 +132,12 @@ const plot = svg => {
     const response = (p, phase) => {
         const {scale, show, order, log} = state, turn = order - measured, w = p.x.u === "rad/s" ? 1 : 2 * PI, [name, unit] = ORDERS[order] ?? [p.y.l, p.y.u.replace("dB re 1 ", "")];
         const curves = p.c.map(c => {
-            const X = list(c.x), gain = X.map(x => turn ? (w * x) ** turn : 1);
-            return {...c, X, M: list(c.y).map((m, k) => (given === "db" ? 10 ** (m / 20) : m) * gain[k]), P: list(c.p).map(v => v + 90 * turn), E: undefined, e: given === "db" ? undefined : list(c.e)?.map((e, k) => e * gain[k])};
+            const X = list(c.x), inDb = given === "db", gain = X.map(x => turn ? (w * x) ** turn : 1), M = list(c.y).map((m, k) => (inDb ? 10 ** (m / 20) : m) * gain[k]);
+            return {...c, X, M, P: list(c.p).map(v => v + 90 * turn), E: list(c.e)?.map((e, k) => inDb ? e * M[k] / NEPER : e * gain[k])};
         });
         const part = of => curves.map(c => ({...c, Y: c.M.map((m, k) => m * of(c.P[k] * DEG))}));
+        // The error relative to the magnitude, times a factor.
+        const share = (c, factor) => c.E?.map((e, k) => e / c.M[k] * factor);
         const x = {...p.x, g: log, r: log === first.x.g ? p.x.r : undefined};
         const panel = (l, u, c, more) => ({h: p.h, x, f: p.f ?? [], c, y: {l, u}, ...more});
         if (show === "reim") return [panel("Real part", unit, part(cos), {t: p.t}), panel("Imaginary part", unit, part(sin))];
@@ -137,6 +149,7 @@ const plot = svg => {
         let line;
         const near = (v, other) => v - 360 * round((v - other) / 360);
         const angles = curves.map(c => {
+            c = {...c, E: share(c, 1 / DEG)};
             if (state.phase === "wrapped") return {...c, Y: c.P.map(v => near(v, 0)), wrap: true};
             let last = 0;
             const turned = {...c, Y: c.P.map(v => last = near(v, last))};
@@ -144,7 +157,7 @@ const plot = svg => {
             return turned;
         });
         if (line) for (const c of angles) if (c.k !== "l") c.Y = c.Y.map((v, k) => near(v, at(line, c.X[k])));
-        return [panel(name, (db ? "dB re 1 " : "") + unit, curves.map(c => db ? {...c, Y: c.M.map(m => 20 * log10(m))} : {...c, Y: c.M, E: c.e}), {t: p.t, y: {l: name, u: (db ? "dB re 1 " : "") + unit, g: scale === "log", r: usual ? p.y.r : undefined}}),
+        return [panel("", "", curves.map(c => db ? {...c, Y: c.M.map(m => 20 * log10(m)), E: share(c, NEPER), isDb: true} : {...c, Y: c.M}), {t: p.t, y: {l: name, u: (db ? "dB re 1 " : "") + unit, g: scale === "log", r: usual ? p.y.r : undefined}}),
             panel("Phase", "°", angles, {h: phase?.h ?? p.h, y: {l: "Phase", u: "°", s: 45, r: line ? undefined : [-190, 190], fixed: !line}})];
     };
     const panels = () => data.v[state.view].p.flatMap((p, k, of) => p.q === "m" ? response(p, of[k + 1]) : p.q === "p" ? [] :
@@ -168,8 +181,11 @@ const plot = svg => {
     };
 
     const render = () => {
-        const width = printing ? data.w : max(280, round(svg.getBoundingClientRect().width));
-        const view = data.v[state.view], all = panels(), columns = within(min(view.c, floor(width / 300)), 1, all.length);
+        // On paper three figures share a row.
+        const view = data.v[state.view], width = printing ? max(data.w < 500 && pick(figure.parentNode, ":scope > :not(.wide)").length === 3 ? 360 : data.w, 300 * view.c) : max(280, round(svg.getBoundingClientRect().width));
+        const all = panels(), columns = within(min(view.c, floor(width / 300)), 1, all.length), rows = ceil(all.length / columns);
+        // A page of paper holds all panels; on a screen a wide panel is not flat.
+        for (const p of all) p.h = printing ? min(0.88 * p.h, max(60, (data.v[1] ? 300 : 1.15 * width) / rows - 50)) : within(0.22 * width / columns, p.h, 2.2 * p.h);
         const fit = (low, high, step) => within((high - low) / step, 2, 9);
         const ranges = all.map((p, n) => {
             const zoomed = state.x[key(p.x)], x = zoomed ?? p.x.r ?? extent(p, 1);
@@ -179,7 +195,7 @@ const plot = svg => {
         frames = [];
         let top = 6;
         for (let row = 0; row < all.length; row += columns) {
-            const some = all.slice(row, row + columns), last = row + columns >= all.length || !view.s;
+            const some = all.slice(row, row + columns), below = all[row + columns], last = !below || !view.s || key(below.x) !== key(some[0].x);
             const head = some.some(p => p.t) ? 22 : 16, height = max(...some.map(p => p.h)), bottom = top + head + height;
             some.forEach((p, column) => {
                 const n = row + column, room = width / columns;
@@ -220,13 +236,15 @@ const plot = svg => {
             end = X(v) + half;
             label(group, X(v), bottom + 16, text);
         }
-        for (const [v, text] of yt.major) label(group, left - 6, Y(v) + 4, text, {"text-anchor": "end"});
+        end = bottom + 99;
+        for (const [v, text] of yt.major) if (end - Y(v) > 13) label(group, left - 6, (end = Y(v)) + 4, text, {"text-anchor": "end"});
         const caption = ({l, u}) => u ? `${l} (${u})` : l, big = {"font-size": 13};
         if (last) label(group, (left + right) / 2, bottom + 34, caption(p.x) + (xt.factor && ", " + xt.factor), big);
         label(group, left, top - 5, yt.factor, {"text-anchor": "start"});
         if (p.t) label(group, (left + right) / 2, top - 7, p.t, {...big, "font-weight": "bold"});
-        const x = left - labels - 16, y = (top + bottom) / 2, room = floor((bottom - top + 20) / 6.8), text = caption(p.y);
-        draw(label(group, x, y, text.length > room ? text.slice(0, room - 1) + "…" : text, {...big, transform: `rotate(-90 ${x} ${y})`}), "title", {}, text);
+        const x = left - labels - 16, y = (top + bottom) / 2, room = floor((bottom - top + 20) / 6.8), text = caption(p.y), {l, u} = p.y;
+        // The unit stays whole.
+        draw(label(group, x, y, text.length > room ? caption({l: l.slice(0, max(2, room - u.length - 4)) + "…", u}) : text, {...big, transform: `rotate(-90 ${x} ${y})`}), "title", {}, text);
     };
     const curve = (parent, {X, Y, left, right, top, bottom, xs, ys, p}, c) => {
         const group = draw(parent, "g", {class: "curve", "data-name": c.n ?? ""}), sorted = rises(c.X);
@@ -251,7 +269,17 @@ const plot = svg => {
         const chain = points => points.map(([x, y], k) => `${!k || (c.wrap && abs(y - points[k - 1][1]) > half) ? "M" : "L"}${px(x)} ${px(y)}`).join("");
         const band = (lower, upper) => draw(group, "path", {d: chain([...trace(lower), ...trace(upper).reverse()]) + "Z", fill: c.o, opacity: 0.22});
         if (c.k === "b") return band(k => c.Y[k], k => c.U[k]);
-        if (c.E) band(k => max(p.y.g ? ys[0] / 10 : -Infinity, c.Y[k] - 2 * c.E[k]), k => c.Y[k] + 2 * c.E[k]);
+        const edge = sign => k => c.Y[k] + (c.isDb ? NEPER * Math.log(1 + sign * c.E[k] / NEPER) : sign * c.E[k]);
+        if (c.E && !state.off.has(BAND)) {
+            let d = "";
+            // Circles in a plane, bars where the curve may jump.
+            if (c.F || c.wrap) for (let k = low; k < high; k++) {
+                const x = px(X(c.X[k])), y = px(Y(edge(2)(k))), tall = px(Y(edge(-2)(k)) - y);
+                if (isFinite(x + tall)) d += `M${x} ${y}` + (c.F ? `a.1.1 0 1 0 0 ${tall}a.1.1 0 1 0 0 ${-tall}` : `v${tall}`);
+            }
+            if (d) draw(group, "path", {d, opacity: 0.22, ...c.F ? {fill: c.o} : {stroke: c.o, "stroke-width": max(1.5, (right - left) / (high - low))}});
+            else band(edge(-2), edge(2));
+        }
         const points = trace(k => c.Y[k]);
         if (c.k === "s") {
             const foot = px(Y(p.y.g ? ys[0] : within(0, ...ys)));
@@ -262,7 +290,9 @@ const plot = svg => {
     };
 
     const keys = () => {
-        const known = new Map(frames.flatMap(({p}) => [...p.f, ...p.c]).filter(c => c.n).map(c => [c.n, c])), names = [...known.keys(), ...state.off].join("\n");
+        const all = frames.flatMap(({p}) => [...p.f, ...p.c]), banded = all.find(c => c.E);
+        if (banded) all.push({...banded, n: BAND, k: "b"});
+        const known = new Map(all.filter(c => c.n).map(c => [c.n, c])), names = [...known.keys(), ...state.off].join("\n");
         if (legend.dataset.names === names) return;
         legend.dataset.names = names;
         legend.replaceChildren();
@@ -290,7 +320,7 @@ const plot = svg => {
         };
         cursor.replaceChildren();
         out.replaceChildren();
-        seen_at = undefined;
+        seen_at = 0;
         const show = (c, k) => { line("", p.x.l, digits(c.X[k], 8) + " " + p.x.u); line("", p.y.l, digits(c.Y[k]) + " " + p.y.u); };
         if (p.c.some(c => c.F || c.i)) {
             let least = 600, best;
@@ -314,9 +344,11 @@ const plot = svg => {
             if (key(f.p.x) !== name || cx < f.left - 1 || cx > f.right + 1) continue;
             draw(cursor, "path", {d: `M${cx} ${f.top}V${f.bottom}`, stroke: INK});
             for (const c of shown(f.p)) {
-                const v = at(c, value), cy = f.Y(v), of = c.of ? ` (extremes of ${c.of} points)` : "";
+                const near = c.X[nearest(c.X, value)], v = at(c, value), cy = f.Y(v), of = c.of ? ` (extremes of ${c.of} points)` : "";
+                // A point elsewhere has no value here, nor has a line beyond its ends.
+                if (abs(f.X(near) - cx) > 4 && ("ps".includes(c.k) || near === c.X[0] && near > value || near === c.X.at(-1) && near < value)) continue;
                 if (isFinite(cy)) draw(cursor, "circle", {cx, cy, r: 3.5, fill: c.o});
-                line(c.o, [f.p.t, l, c.n].filter(Boolean).join(", "), digits(v) + (c.U ? " to " + digits(at(c, value, c.U)) : "") + " " + u + (c.E ? " ± " + digits(at(c, value, c.E), 2) : "") + of);
+                line(c.o, [f.p.t, l, c.n].filter(Boolean).join(", "), digits(v) + (c.U ? " to " + digits(at(c, value, c.U)) : "") + " " + u + (c.E ? ` (${BAND}: ${digits(2 * at(c, value, c.E), 2)})` : "") + of);
             }
         }
     };
@@ -343,7 +375,7 @@ const plot = svg => {
         },
         pointermove: event => {
             const [x, y] = place(event);
-            waiting ??= requestAnimationFrame(() => {
+            waiting ??= next_frame(() => {
                 waiting = undefined;
                 const frame = start ? start.frame : inside(x, y);
                 if (!start) { if (frame) point(frame, x, y); return; }
@@ -367,11 +399,11 @@ const plot = svg => {
                     select("x", key(frame.p.x), x, x + width, frame.X);
                     if (flat) delete state.y[frame.n]; else select("y", frame.n, y + height, y, frame.Y);
                     render();
-                }
+                } else point(frame, ...place(event));
             }
-            start = undefined;
+            start = 0;
         },
-        pointercancel: () => { start = undefined; },
+        pointercancel: () => { start = 0; },
         dblclick: reset,
         keydown: event => {
             const frame = frames.find(f => f.n === seen_at?.[0]) ?? frames[0], step = {ArrowLeft: -1, ArrowRight: 1}[event.key], by = {"+": 0.5, "-": 2}[event.key], c = main(frame.p);
@@ -390,14 +422,14 @@ const plot = svg => {
     button(tools, "Reset", reset);
     const pan = press(button(tools, "Pan", () => press(pan, state.pan = !state.pan)), false);
     if (first) {
-        const set = (name, label, options) => choice(tools, label, options, state[name], value => { state[name] = name === "order" ? +value : name === "log" ? value === "true" : value; seen_at = undefined; reset(); });
+        const set = (name, label, options) => choice(tools, label, options, state[name], value => { state[name] = name === "order" ? +value : name === "log" ? value === "true" : value; seen_at = 0; reset(); });
         set("show", "Show", [["bode", "magnitude, phase"], ["reim", "real, imaginary"], ["nyquist", "Nyquist"]]);
         set("scale", "Scale", [["log", "log"], ["lin", "linear"], ["db", "dB"]]);
         set("phase", "Phase", [["wrapped", "±180°"], ["continuous", "continuous"]]);
         if (measured >= 0) set("order", "As", ORDERS.map(([name], k) => [k, name.toLowerCase()]));
         set("log", "Frequency", [[false, "linear"], [true, "log"]]);
     }
-    map(figure, k => { state.view = k; state.y = {}; out.replaceChildren(); seen_at = undefined; render(); });
+    map(figure, k => { state.view = k; state.y = {}; out.replaceChildren(); seen_at = 0; render(); });
     return render;
 };
 
@@ -432,12 +464,12 @@ const shapes = svg => {
         state.phase = (state.phase + (now - (last ?? now)) * 0.0038) % (2 * PI);
         last = now;
         render();
-        requestAnimationFrame(frame);
+        next_frame(frame);
     };
     const play = button(tools, "Play", () => {
         put(play, {}, (state.running = !state.running) ? "Pause" : "Play");
         last = undefined;
-        requestAnimationFrame(frame);
+        next_frame(frame);
     });
     const slider = (label, to, value, change) => {
         const box = add(add(tools, "label", {}, label + " "), "input", {type: "range", min: 0, max: to, step: "any", value});
@@ -448,7 +480,7 @@ const shapes = svg => {
     slider("Amplitude", 3, 1, v => { state.amplitude = v; });
     on(svg, {
         pointerdown: event => { from = event; svg.setPointerCapture(event.pointerId); },
-        pointerup: () => { from = undefined; },
+        pointerup: () => { from = 0; },
         pointermove: event => {
             if (!from) return;
             state.turn += (event.clientX - from.clientX) / 150;

@@ -2,115 +2,142 @@
 
 /// Names defined by the script that are shortened. None is a name of the browser, a key of the
 /// data, or part of a text of the script.
-const LONG: [&str; 105] = [
+const LONG: [&str; 124] = [
+    "table",
+    "section",
+    "next_frame",
+    "single",
+    "ticks",
+    "stride",
+    "fixed",
+    "rises",
+    "turned",
+    "scaled",
+    "rows",
+    "zoomed",
+    "room",
+    "trace",
+    "slider",
+    "sortable",
+    "part",
+    "panelOf",
+    "half",
+    "edge",
     "frame",
     "state",
-    "name",
     "high",
-    "text",
-    "low",
-    "draw",
-    "event",
-    "start",
+    "bottom",
+    "name",
     "render",
-    "unit",
-    "line",
+    "event",
+    "attributes",
+    "text",
+    "start",
+    "right",
     "parent",
+    "within",
+    "draw",
     "group",
+    "seen_at",
     "panel",
     "major",
-    "tools",
-    "label",
-    "pick",
-    "last",
-    "within",
-    "least",
     "frames",
-    "attributes",
-    "column",
-    "seen_at",
-    "head",
-    "digits",
+    "low",
+    "label",
+    "tools",
     "button",
-    "most",
-    "other",
-    "list",
-    "nearest",
-    "legend",
-    "power",
-    "point",
-    "minor",
+    "column",
     "factor",
-    "shown",
-    "best",
-    "curve",
-    "inside",
-    "cursor",
-    "figure",
-    "middle",
-    "change",
-    "press",
-    "room",
-    "flat",
-    "curves",
-    "given",
+    "least",
+    "unit",
     "columns",
-    "labels",
-    "reset",
-    "wanted",
+    "nearest",
+    "svg",
+    "digits",
+    "legend",
+    "line",
+    "printing",
+    "figure",
+    "first",
+    "other",
+    "last",
+    "pick",
+    "change",
+    "cursor",
+    "inside",
     "measured",
+    "middle",
+    "minor",
+    "power",
+    "amplitude",
+    "shape",
+    "shown",
+    "box",
+    "caption",
+    "head",
+    "labels",
+    "near",
+    "options",
+    "running",
+    "wanted",
+    "curve",
+    "flat",
+    "handlers",
+    "list",
+    "most",
+    "press",
+    "ORDERS",
+    "all",
+    "curves",
+    "raised",
+    "redraw",
     "rising",
     "sample",
-    "trace",
-    "place",
-    "spot",
-    "running",
-    "ticks",
-    "printing",
-    "raised",
-    "options",
-    "back",
-    "redraws",
-    "choice",
-    "rises",
-    "markers",
-    "flush",
+    "sorted",
+    "view",
+    "NEPER",
     "crowded",
-    "chain",
-    "band",
-    "caption",
-    "boxed",
-    "waiting",
+    "isShape",
+    "markers",
+    "place",
+    "point",
     "project",
-    "words",
-    "amplitude",
-    "scaled",
+    "redraws",
+    "reset",
+    "waiting",
+    "best",
+    "made",
+    "tall",
+    "row",
+    "across",
     "angles",
-    "turned",
-    "zoomed",
-    "handlers",
-    "known",
-    "extent",
-    "minus",
-    "put_in",
-    "main",
-    "stride",
-    "count",
-    "panels",
-    "panelOf",
-    "response",
-    "memory",
-    "shapes",
-    "moved",
-    "sortable",
-    "filtered",
-    "padded",
-    "decode",
-    "drawn",
+    "banded",
+    "bytes",
+    "choice",
+    "data",
+    "decade",
     "decimals",
+    "down",
+    "extent",
+    "filled",
+    "filtered",
+    "given",
+    "more",
+    "put_in",
+    "range",
+    "ranges",
+    "response",
 ];
 
-/// Returns an equivalent script with fewer characters.
+/// Letters of the short names, after a sign.
+const LETTERS: &[u8; 62] = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
+
+/// Words of the language with a shorter equivalent.
+const LITERALS: [(&str, &str); 4] =
+    [("const", "let"), ("undefined", "void 0"), ("true", "!0"), ("false", "!1")];
+
+/// Returns an equivalent script with fewer characters, if the script compares only values of equal
+/// types and has no empty statement.
 pub(super) fn squeeze(script: &str) -> String {
     let lines = script.lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
@@ -147,7 +174,12 @@ pub(super) fn squeeze(script: &str) -> String {
                     '}' => drop(open.pop()),
                     _ => {}
                 }
-                if !(c.is_whitespace() && is_idle(c, out.chars().last(), text.get(at + 1).copied()))
+                let mut following = text[at + 1..].iter().filter(|c| !c.is_whitespace());
+                let is_last = c == ';' && following.next() == Some(&'}');
+                let next = text.get(at + 1).copied();
+                let is_equality = out.ends_with("==") || out.ends_with("!=");
+                if !(is_last || c == '=' && is_equality)
+                    && !(c.is_whitespace() && is_idle(c, out.chars().last(), next))
                 {
                     out.push(c);
                 }
@@ -178,15 +210,14 @@ fn is_idle(blank: char, before: Option<char>, after: Option<char>) -> bool {
 fn short(word: &str) -> String {
     match LONG.iter().position(|long| *long == word) {
         Some(at) => {
-            let letter = |n: usize| char::from(b'a' + n as u8);
-            if at < 26 {
-                format!("${}", letter(at))
-            } else {
-                format!("${}{}", letter(at / 26), letter(at % 26))
-            }
+            let letter = char::from(LETTERS[at % LETTERS.len()]);
+            format!("{}{letter}", ["$", "_"][at / LETTERS.len()])
         }
-        None if word == "const" => "let".to_owned(),
-        None => word.to_owned(),
+        None => LITERALS
+            .iter()
+            .find(|(long, _)| *long == word)
+            .map_or(word, |(_, short)| short)
+            .to_owned(),
     }
 }
 
@@ -196,11 +227,13 @@ mod tests {
 
     #[test]
     fn strings_and_templates_stay_and_words_are_not_joined() {
-        let script = "// A comment.\nconst frame = {a: \"frame = a\"};\n  return frame + +1, `frame ${frame.x + 1} {` in b;\n";
+        let script = "// A comment.\nconst frame = {a: \"frame === a;}\"};\n  if (a === b) {\n b = true;\n}\n  return frame + +1, `frame ${frame.x + 1} {` in b;\n";
         let f = short("frame");
         assert_eq!(
             squeeze(script),
-            format!("let {f}={{a:\"frame = a\"}};return {f}+ +1,`frame ${{{f}.x+1}} {{`in b;")
+            format!(
+                "let {f}={{a:\"frame === a;}}\"}};if(a==b){{b=!0}}\nreturn {f}+ +1,`frame ${{{f}.x+1}} {{`in b;"
+            )
         );
     }
 }

@@ -1,14 +1,18 @@
-//! Small drawings without text, for the choice of a figure.
+//! Small drawings for the choice of a figure; the style sheet shows their numbers in print only.
 
 use crate::axis::Mapping;
-use crate::canvas::{Canvas, Stroke};
+use crate::canvas::{Anchor, Canvas, Stroke, TextStyle};
 use crate::curve::Kind;
 use crate::figure::Figure;
-use crate::layout::Layout;
+use crate::layout::{Layout, PanelLayout};
+use crate::ticks::Ticks;
 use crate::trace::{self, Mappings};
 
 /// Size of a small drawing, px.
 const SIZE: (f64, f64) = (120.0, 54.0);
+
+/// Font size of the numbers beside a small drawing, px.
+const NUMBERS: f64 = 9.0;
 
 /// Draws the curves of the first panel.
 pub(super) fn svg(figure: &Figure, layout: &Layout) -> String {
@@ -34,6 +38,24 @@ pub(super) fn svg(figure: &Figure, layout: &Layout) -> String {
                 }
             }
         }
+        numbers(&mut sheet, layout, maps);
     }
     sheet.finish("")
+}
+
+/// Writes the first and the last number of each axis beside the drawing.
+fn numbers(sheet: &mut Canvas, layout: &PanelLayout, maps: Mappings) {
+    let ends = |ticks: &Ticks| {
+        let factor = ticks.factor.clone().unwrap_or_default();
+        let ends = [ticks.major.first(), ticks.major.last()];
+        ends.map(|end| end.map(|(value, label)| (*value, format!("{label}{factor}"))))
+    };
+    let below = TextStyle::new(NUMBERS);
+    for (value, label) in ends(&layout.x_ticks).into_iter().flatten() {
+        sheet.text((maps.x.pixel(value), SIZE.1 + NUMBERS), &label, &below);
+    }
+    let beside = TextStyle::new(NUMBERS).anchored(Anchor::End);
+    for (value, label) in ends(&layout.y_ticks).into_iter().flatten() {
+        sheet.text((-2.0, maps.y.pixel(value) + 0.36 * NUMBERS), &label, &beside);
+    }
 }
