@@ -8,6 +8,8 @@ import argparse
 import json
 import os
 import re
+import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -39,6 +41,11 @@ OVERLAPS = """
 BEYOND = """
 [...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1
     && !e.closest('.scroll > *, svg *')).map(e => e.tagName + '.' + e.className)
+"""
+
+# Panels whose ordinate has fewer than two numbers, which do not show a scale.
+LONELY = """
+[...document.querySelectorAll('figure > svg g.panel')].filter(g => g.querySelectorAll('text[text-anchor=end]').length < 2).length
 """
 
 # Texts whose contrast is below that of WCAG AA: 4.5, of large ones 3.
@@ -126,11 +133,6 @@ class Tests:
             self.failures.append(what)
             print("FAILED", what, flush=True)
 
-    def goal(self, is_reached, what):
-        """Tell of a goal that is not reached; what must not grow beyond today's figure is a check of its own."""
-        if not is_reached:
-            print("GOAL MISSED", what, flush=True)
-
     def page(self, name, width=1280, **more):
         return Page(self.browser, width, **more).open(self.folder / f"{name}.html")
 
@@ -211,8 +213,7 @@ class Tests:
         page = self.page("matrix")
         page.settle()
         paint = page.run("performance.getEntriesByType('paint')[0]?.startTime ?? NaN")
-        self.check(paint is not None, "no first paint")
-        self.goal(paint is None or paint <= 1000, f"28 × 2 responses: first picture after {paint} ms")
+        self.check(paint is not None and paint <= 1000, f"28 × 2 responses: first picture after {paint} ms")
         self.numbers["28 × 2 × 4096: first paint, ms"] = paint and round(paint)
         page.everything()
         count = page.run("document.querySelectorAll('.map button').length")
@@ -238,7 +239,8 @@ class Tests:
             }})()"""
         )
         self.numbers["cursor: ms a frame, median and 95 %"] = [round(v, 1) for v in spent]
-        self.goal(spent[0] <= 1000 / 60 + 1, f"cursor: {spent[0]} ms a frame")
+        # Sixty frames a second take 17 ms each; the rest is for a machine that does other work.
+        self.check(spent[0] <= 30, f"cursor: {spent[0]} ms a frame")
         self.close(page, "matrix")
 
     def shapes(self):
@@ -338,18 +340,91 @@ class Tests:
         self.check("<script>alert(1)</script>" in text, f"about: {text}")
         self.check(page.run("document.scripts.length") == 1, "one script")
 
+    def cursor_values(self):
+        """A band holds the curve in it at every place; a point elsewhere, and a touch, have their own values."""
+        page = self.page("nonlinear")
+        page.everything()
+        figure = "#figure-restoring-force"
+        left, top, right, bottom = box(page, figure, 1)
+        for part in (0.23, 0.51, 0.77):
+            page.mouse("mouseMoved", left + part * (right - left), (top + bottom) / 2)
+            seen = " ".join(values(page, figure))
+            number = r"(-?[\d.]+(?:e-?\d+)?)"
+            band = re.search(f"95 % interval {number} to {number}", seen)
+            value = re.search(f"identified {number} N", seen)
+            self.check(band and value, f"nonlinear: the cursor shows {seen}")
+            if band and value:
+                low, high, value = float(band[1]), float(band[2]), float(value[1])
+                self.check(low - 1e-5 * abs(low) <= value <= high + 1e-5 * abs(high), f"{value} in {low} to {high}")
+        self.close(page, "nonlinear")
+        page = self.page("modes")
+        page.everything()
+        poles = page.run(
+            "JSON.parse(document.querySelector('#figure-result metadata').textContent).v[0].p[1].c"
+            ".filter(c => c.i).flatMap(c => c.i).map(text => +text.match(/: ([\\d.]+) Hz/)[1]).sort((a, b) => a - b)"
+        )
+        gap, start = max((b - a, a) for a, b in zip(poles, poles[1:]))
+        left, top, right, bottom = box(page, "#figure-result")
+        page.mouse("mouseMoved", along(page, "#figure-result", start + gap / 2), (top + bottom) / 2)
+        seen = values(page, "#figure-result")
+        self.check(seen and not any("pole" in row for row in seen), f"modes: {gap} Hz from a pole the cursor shows {seen}")
+        page = self.page("response", 390)
+        page.everything()
+        page.call("Emulation.setTouchEmulationEnabled", enabled=True)
+        left, top, right, bottom = box(page, "figure")
+        point = {"x": (left + right) / 2, "y": (top + bottom) / 2}
+        page.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[point])
+        page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        page.settle()
+        self.check(any("measured" in row for row in values(page, "figure")), "a touch shows the values")
+
+    def axes(self):
+        """In the plane the abscissa has its numbers and its name, with another panel below, too; a band is in every display."""
+        page = self.page("response")
+        page.everything()
+        choose = lambda value: page.run(
+            f"(() => {{ const s = document.querySelector('.tools select'); s.value = '{value}'; s.onchange(); }})()"
+        )
+        for display in ("nyquist", "reim", "bode"):
+            choose(display)
+            page.settle()
+            texts = page.run("[...document.querySelectorAll('figure > svg g.panel:first-of-type text')].map(t => t.textContent)")
+            if display == "nyquist":
+                self.check(any(text.startswith("Real part") for text in texts), f"Nyquist: {texts}")
+            bands = page.run("document.querySelectorAll('figure > svg .curve path[opacity]').length")
+            self.check(bands > 0, f"{display}: {bands} bands")
+
     def print(self):
-        # Three degrees of freedom: one record, and three records.
-        for name, goal, most in (("single", 6, 6), ("three", 6, 6), ("one", 6, 6), ("matrix", 3, 3), ("modes", 4, 4)):
+        """Figures are whole, no page is empty, no heading ends a page. 3-DOF identifications have at most six pages."""
+        most = {"single": 6, "three": 6, "one": 6, "matrix": 3, "modes": 4}
+        has_text = shutil.which("pdftotext")
+        self.check(has_text or not os.environ.get("CI"), "no pdftotext")
+        for name in PAGES:
             page = self.page(name)
             page.everything()
+            headings = page.run("[...document.querySelectorAll('h2, h3, caption')].map(e => e.textContent.trim())")
             pdf = page.print()
             pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
             self.numbers[f"{name}: printed pages"] = pages
-            self.goal(pages <= goal, f"{name}: {pages} printed pages")
-            self.check(0 < pages <= most, f"{name}: {pages} printed pages")
+            self.check(0 < pages <= most.get(name, 4), f"{name}: {pages} printed pages")
             if self.pictures:
                 (self.pictures / f"{name}.pdf").write_bytes(pdf)
+            if has_text:
+                done = subprocess.run(["pdftotext", "-layout", "-", "-"], input=pdf, capture_output=True, check=True)
+                for number, text in enumerate(done.stdout.decode().split("\f")[:pages], 1):
+                    lines = [line.strip() for line in text.splitlines() if line.strip()]
+                    self.check(len(lines) > 4, f"{name}: page {number} of {pages} has only {lines}")
+                    # The last line is the number of the page.
+                    self.check(not lines[-2:-1] or lines[-2] not in headings, f"{name}: page {number} ends with {lines[-2:]}")
+            page.resize(718)
+            page.call("Emulation.setEmulatedMedia", media="print")
+            page.run("dispatchEvent(new Event('beforeprint'))")
+            split = page.run(
+                "[...document.querySelectorAll('figure > svg')].filter(e => e.getBoundingClientRect().height > 940"
+                " || getComputedStyle(e).breakInside !== 'avoid').map(e => e.closest('figure').id)"
+            )
+            self.check(not split, f"{name}: figures that a page does not hold: {split}")
+            self.browser.call("Target.closeTarget", targetId=page.target)
 
     def widths(self):
         for name in PAGES:
@@ -362,6 +437,8 @@ class Tests:
                     self.check(seen <= width, f"{what}: {seen} px wide, {page.run(BEYOND)[:5]}")
                     overlaps = page.run(OVERLAPS)
                     self.check(not overlaps, f"{what}: texts overlap: {overlaps[:4]}")
+                    lonely = page.run(LONELY)
+                    self.check(lonely == 0, f"{what}: {lonely} ordinates with fewer than two numbers")
                     faint = page.run(FAINT)
                     self.check(not faint, f"{what}: faint: {faint[:4]}")
                     if self.pictures:
@@ -371,7 +448,7 @@ class Tests:
 
     def run(self):
         for test in (self.cursor_and_zoom, self.quantities, self.matrix, self.shapes, self.tables,
-                     self.modes, self.backbone,
+                     self.modes, self.backbone, self.cursor_values, self.axes,
                      self.names_stay_text, self.print, self.widths):
             start = time.monotonic()
             try:

@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use mechid::io::{
     BegunFile, OutputFile, escaped, is_standard_output, refuse_replaced_inputs, write_all,
 };
-use mechid::plot::Figure;
+use mechid::plot::{Figure, svg_to_png};
 use mechid::report::{FigureStyle, ToFigure, figure_page};
 use serde::Serialize;
 
-use crate::args::{PlotArgs, ReportArgs};
+use crate::args::{FigureArgs, PlotArgs, ReportArgs};
 use crate::error::CliError;
+use crate::options;
 
 /// Number of pixels of a PNG file per px of the drawing.
 const PNG_SCALE: f64 = 2.0;
@@ -122,13 +123,40 @@ impl Outcome {
     ) -> Result<Self, CliError> {
         let Some(path) = &plot.plot else { return Ok(self) };
         let figure = figure()?;
+        self.with_drawing(path, &figure.to_svg()?, || page(figure))
+    }
+
+    /// Adds a drawing in the format that the ending of the file names, or its page.
+    pub fn with_drawing(
+        self,
+        path: &Path,
+        svg: &str,
+        page: impl FnOnce() -> Result<String, CliError>,
+    ) -> Result<Self, CliError> {
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
         let content = match ending.as_deref().and_then(|ending| ending.to_str()) {
-            Some("png") => figure.to_png(PNG_SCALE)?,
-            Some("html") => page(figure)?.into_bytes(),
-            _ => figure.to_svg()?.into_bytes(),
+            Some("png") => svg_to_png(svg, PNG_SCALE)?,
+            Some("html") => options::spelled(&page()?).into_bytes(),
+            _ => svg.as_bytes().to_vec(),
         };
         Ok(self.with_file(path, content))
+    }
+
+    /// Adds the figure of a result for `--plot`, or its page with the details of its record.
+    pub fn with_result_page(
+        self,
+        page: &FigureArgs,
+        record: &Path,
+        result: &impl ToFigure,
+        style: FigureStyle,
+    ) -> Result<Self, CliError> {
+        match (&page.plot.plot, page.settings(record)?) {
+            (Some(path), Some(settings)) => {
+                let page = result.page_with(style, &settings)?;
+                Ok(self.with_file(path, options::spelled(&page)))
+            }
+            _ => self.with_plot(&page.plot, || Ok(result.styled_figure(style)?)),
+        }
     }
 
     /// Adds the figure or page of a result for `--plot`.

@@ -67,7 +67,7 @@ fn response(i: usize, j: usize) -> (String, Figure) {
     let coherence: Vec<f64> =
         (0..LINES).map(|k| 0.98 + 0.02 * ((k * 13 + i) as f64).sin()).collect();
     let panel =
-        Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Coherence", "").range(0.0, 1.0));
+        Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Coherence", "").range(0.0, 1.05));
     let name = format!("a{} / F{}", i + 1, j + 1);
     (
         name,

@@ -27,5 +27,7 @@ pub use figures::shapes::ModeShapes;
 pub use figures::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle, ToFigure};
 #[cfg(feature = "parquet")]
 pub use page::trends_page;
-pub use page::{PageSettings, elements_page, figure_page, modes_page, page};
+pub use page::{
+    PageSettings, comparison_page, comparison_svg, elements_page, figure_page, modes_page, page,
+};
 pub use spectrum_csv::spectrum_csv;

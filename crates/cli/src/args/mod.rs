@@ -13,7 +13,7 @@ use clap::Args;
 use mechid::analysis::modal::ShapedMode;
 use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
 use mechid::io::{Geometry, input_name, record_details};
-use mechid::report::ModeShapes;
+use mechid::report::{ModeShapes, PageSettings};
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
 pub use self::style::StyleArgs;
@@ -149,6 +149,40 @@ impl AboutArgs {
             }
         }
         Ok(about)
+    }
+}
+
+/// Picture or page of a result, with the heading and the details of a page.
+#[derive(Debug, Default, Args)]
+pub struct FigureArgs {
+    #[command(flatten)]
+    pub plot: PlotArgs,
+    #[command(flatten)]
+    about: AboutArgs,
+}
+
+impl FigureArgs {
+    /// Adds the files that the arguments name.
+    pub fn add_files<'a>(&'a self, files: Files<'a>) -> Files<'a> {
+        files.reads(&self.about.about).writes(&self.plot.plot)
+    }
+
+    /// Returns heading and details of the page of a record; `None` without a page.
+    ///
+    /// # Errors
+    /// [`CliError::MisplacedOption`] if they are given without a page.
+    pub fn settings(&self, record: &Path) -> Result<Option<PageSettings>, CliError> {
+        if self.plot.is_page() {
+            let (title, about) = (self.about.title.clone(), self.about.details(record)?);
+            return Ok(Some(PageSettings { title, about, ..PageSettings::default() }));
+        }
+        match self.about.given() {
+            Some(option) => {
+                let why = "belongs to a page, --plot FILE.html";
+                Err(CliError::MisplacedOption { option, why })
+            }
+            None => Ok(None),
+        }
     }
 }
 

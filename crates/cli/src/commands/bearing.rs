@@ -11,7 +11,7 @@ use mechid::{BearingData, identify_bearing};
 
 use crate::args::fit::LineArgs;
 use crate::args::word::word;
-use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, at_least_one};
+use crate::args::{ChannelArgs, FigureArgs, RecordArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -83,7 +83,7 @@ pub struct BearingArgs {
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     ross: Option<PathBuf>,
     #[command(flatten)]
-    plot: PlotArgs,
+    page: FigureArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -128,9 +128,9 @@ struct SizeArgs {
 impl BearingArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        let outputs = [&self.output, &self.ross, &self.plot.plot].into_iter().flatten();
+        let outputs = [&self.output, &self.ross].into_iter().flatten();
         let inputs = [&self.input.record].into_iter().chain(&self.more).chain(&self.baseline);
-        Files::default().reads(inputs).writes(outputs)
+        self.page.add_files(Files::default().reads(inputs).writes(outputs))
     }
 
     /// Reads, identifies, and reports.
@@ -138,8 +138,9 @@ impl BearingArgs {
         if self.campaign {
             let plan: BearingPlan = mechid::io::read_json(&self.input.record)?;
             let speeds = plan.run()?;
-            let outcome = Outcome::new(speeds.to_string(), &speeds)?.with_result_plot(
-                &self.plot,
+            let outcome = Outcome::new(speeds.to_string(), &speeds)?.with_result_page(
+                &self.page,
+                &self.input.record,
                 &speeds,
                 FigureStyle::default(),
             )?;
@@ -163,8 +164,9 @@ impl BearingArgs {
         let baseline =
             if self.baseline.is_empty() { None } else { Some(data(&mut self.baseline.iter())?) };
         let identified = identify_bearing(&tests, baseline.as_ref(), &how)?;
-        let outcome = Outcome::new(identified.to_string(), &identified)?.with_result_plot(
-            &self.plot,
+        let outcome = Outcome::new(identified.to_string(), &identified)?.with_result_page(
+            &self.page,
+            &self.input.record,
             &identified,
             FigureStyle::default(),
         )?;

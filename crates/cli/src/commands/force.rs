@@ -14,7 +14,7 @@ use mechid::report::{FigureStyle, spectrum_csv};
 use mechid::{Reconstruct, Reconstructed};
 
 use crate::args::word::{one_of, word};
-use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
+use crate::args::{FigureArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -91,7 +91,7 @@ pub struct ForceArgs {
     #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
     spectrum: Option<PathBuf>,
     #[command(flatten)]
-    plot: PlotArgs,
+    page: FigureArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -99,8 +99,9 @@ pub struct ForceArgs {
 impl ForceArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        let outputs = [&self.output, &self.spectrum, &self.plot.plot].into_iter().flatten();
-        Files::default().reads([&self.input.record, &self.system]).writes(outputs)
+        let outputs = [&self.output, &self.spectrum].into_iter().flatten();
+        let files = Files::default().reads([&self.input.record, &self.system]);
+        self.page.add_files(files.writes(outputs))
     }
 
     /// Reads, reconstructs, and reports.
@@ -116,7 +117,7 @@ impl ForceArgs {
         }
         let machine = Machine::read(&self.system)?;
         let run = self.input.open(&self.responses.channels())?;
-        if self.spectrum.is_none() && self.plot.plot.is_none() {
+        if self.spectrum.is_none() && self.page.plot.plot.is_none() {
             let summary = reconstruct_in_chunks(&run, &machine, &how, &mut take)?;
             return rows.deliver(Outcome::new(summary.to_string(), &summary)?);
         }
@@ -138,7 +139,12 @@ impl ForceArgs {
             }
             outcome = outcome.with_begun(file);
         }
-        outcome.with_result_plot(&self.plot, reconstructed, FigureStyle::default())
+        outcome.with_result_page(
+            &self.page,
+            &self.input.record,
+            reconstructed,
+            FigureStyle::default(),
+        )
     }
 
     /// Returns the settings of the reconstruction.

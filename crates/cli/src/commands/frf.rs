@@ -9,7 +9,7 @@ use mechid::analysis::frf::Estimator;
 use crate::args::fit::{LineArgs, SegmentArgs};
 use crate::args::hits::HitArgs;
 use crate::args::word::word;
-use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, StyleArgs};
+use crate::args::{ChannelArgs, FigureArgs, RecordArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -71,7 +71,7 @@ pub struct FrfArgs {
     )]
     points: Vec<String>,
     #[command(flatten)]
-    plot: PlotArgs,
+    page: FigureArgs,
     #[command(flatten)]
     style: StyleArgs,
     #[command(flatten)]
@@ -81,8 +81,8 @@ pub struct FrfArgs {
 impl FrfArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        let outputs = [&self.output, &self.plot.plot].into_iter().flatten();
-        Files::default().reads([&self.input.record]).reads(&self.more).writes(outputs)
+        let files = Files::default().reads([&self.input.record]).reads(&self.more);
+        self.page.add_files(files.writes(&self.output))
     }
 
     /// Reads, averages, and reports.
@@ -105,8 +105,9 @@ impl FrfArgs {
             records.push(self.input.open_other(record, channels, self.input.window())?);
         }
         let table = mechid::frf_of_records(&records, &how)?;
-        let mut outcome = Outcome::new(table.to_string(), &table)?.with_result_plot(
-            &self.plot,
+        let mut outcome = Outcome::new(table.to_string(), &table)?.with_result_page(
+            &self.page,
+            &self.input.record,
             &table,
             self.style.style(),
         )?;

@@ -4,7 +4,7 @@ use clap::Args;
 
 use crate::args::elements::ElementArgs;
 use crate::args::fit::{FitArgs, TableArgs};
-use crate::args::{PlotArgs, ReportArgs, StyleArgs};
+use crate::args::{FigureArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -51,7 +51,7 @@ pub struct IdentifyArgs {
     #[command(flatten)]
     elements: ElementArgs,
     #[command(flatten)]
-    plot: PlotArgs,
+    page: FigureArgs,
     #[command(flatten)]
     style: StyleArgs,
     #[command(flatten)]
@@ -61,29 +61,32 @@ pub struct IdentifyArgs {
 impl IdentifyArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        self.fit.files().reads(self.elements.inputs()).writes(&self.plot.plot)
+        self.page.add_files(self.fit.files().reads(self.elements.inputs()))
     }
 
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         if let Some(identified) = self.fit.identify_elements(&self.table, &self.elements)? {
             let text = self.fit.text_of_elements(&identified);
-            return Outcome::new(text, &identified)?.with_result_plot(
-                &self.plot,
+            return Outcome::new(text, &identified)?.with_result_page(
+                &self.page,
+                self.fit.record(),
                 &identified,
                 self.style.style(),
             );
         }
         if let Some(identified) = self.fit.identify_tables(&self.table)? {
-            return Outcome::new(identified.to_string(), &identified)?.with_result_plot(
-                &self.plot,
+            return Outcome::new(identified.to_string(), &identified)?.with_result_page(
+                &self.page,
+                self.fit.record(),
                 &identified,
                 self.style.style(),
             );
         }
         let identified = self.fit.identify()?;
-        Outcome::new(self.fit.text(&identified), &identified)?.with_result_plot(
-            &self.plot,
+        Outcome::new(self.fit.text(&identified), &identified)?.with_result_page(
+            &self.page,
+            self.fit.record(),
             &identified,
             self.style.style(),
         )

@@ -4,7 +4,7 @@ use clap::Args;
 use mechid::analysis::InspectSettings;
 use mechid::report::FigureStyle;
 
-use crate::args::{PlotArgs, RecordArgs, ReportArgs};
+use crate::args::{FigureArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -32,7 +32,7 @@ pub struct InfoArgs {
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     columns: Vec<String>,
     #[command(flatten)]
-    plot: PlotArgs,
+    page: FigureArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -40,17 +40,20 @@ pub struct InfoArgs {
 impl InfoArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        Files::default().reads([&self.input.record]).writes(&self.plot.plot)
+        self.page.add_files(Files::default().reads([&self.input.record]))
     }
 
     /// Reads the record and measures each of its columns.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let how =
-            InspectSettings { columns: self.columns.clone(), curves: self.plot.plot.is_some() };
+        let how = InspectSettings {
+            columns: self.columns.clone(),
+            curves: self.page.plot.plot.is_some(),
+        };
         let (reading, window) = (self.input.reading(), self.input.window());
         let inspected = mechid::inspect(&self.input.record, &reading, &window, &how)?;
-        Outcome::new(inspected.to_string(), &inspected)?.with_result_plot(
-            &self.plot,
+        Outcome::new(inspected.to_string(), &inspected)?.with_result_page(
+            &self.page,
+            &self.input.record,
             &inspected,
             FigureStyle::default(),
         )

@@ -11,7 +11,7 @@ use mechid::analysis::modes::{ModalTest, ModesSettings, Places, SavedModes};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary, ResponseQuantity};
 use mechid::integrate::ModeSearch;
 use mechid::io::{FrequencyResponses, IoError, input_name, read_sparse_system};
-use mechid::report::{PageSettings, ToFigure, modes_page};
+use mechid::report::{PageSettings, ToFigure, comparison_page, comparison_svg, modes_page};
 use mechid::selected_modes::SelectedModes;
 use mechid::{DecaySettings, ModeSet, Modes};
 use serde::Serialize;
@@ -103,7 +103,7 @@ pub struct ModesArgs {
     unmeasured: UnmeasuredArgs,
     /// Compare with these modes: a result of `mechid modes --json`, a machine, or a universal file
     /// with datasets 55
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["plot", "shapes", "geometry", "synthesis"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["shapes", "geometry", "synthesis"])]
     compare: Option<PathBuf>,
     /// Add the stabilisation diagram and the mode indicator to the JSON
     #[arg(long, help_heading = "Output")]
@@ -176,7 +176,7 @@ impl ModesArgs {
                 path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
             if is_json || path == Path::new("-") {
                 return match &self.compare {
-                    Some(_) => self.compared(&ModeSet::read(path)?),
+                    Some(_) => self.compared(&ModeSet::read(path)?, words),
                     None => self.machine_modes(path, words),
                 };
             }
@@ -190,7 +190,8 @@ impl ModesArgs {
             let modes: Vec<ShapedMode> = summary.modes.iter().map(|m| m.mode.clone()).collect();
             let names: Vec<String> = summary.channels.iter().map(|c| c.column.clone()).collect();
             if self.compare.is_some() {
-                return self.compared(&ModeSet::from_shaped(&summary.file, names, &modes)?);
+                let set = ModeSet::from_shaped(&summary.file, names, &modes)?;
+                return self.compared(&set, words);
             }
             let outcome = Outcome::new(decayed.to_string(), &decayed)?;
             let drawn = (&decayed, decayed.summary());
@@ -229,7 +230,7 @@ impl ModesArgs {
     /// Reports the modes of a test, or compares them.
     fn test_outcome(&self, mut modes: Modes, words: &[OsString]) -> Result<Outcome, CliError> {
         if self.compare.is_some() {
-            return self.compared(&ModeSet::from_summary(modes.summary())?);
+            return self.compared(&ModeSet::from_summary(modes.summary())?, words);
         }
         if self.diagrams {
             modes.add_diagrams()?;
@@ -249,12 +250,25 @@ impl ModesArgs {
         self.drawn((outcome, words), (&modes, modes.summary()), &shaped, &names)
     }
 
-    /// Compares modes with `--compare`.
-    fn compared(&self, first: &ModeSet) -> Result<Outcome, CliError> {
+    /// Compares modes with `--compare`, and draws the modal assurance criterion for `--plot`.
+    fn compared(&self, first: &ModeSet, words: &[OsString]) -> Result<Outcome, CliError> {
         let second = self.compare.as_ref().map(ModeSet::read).transpose()?;
         let second = second.as_ref().unwrap_or(first);
         let comparison = mechid::compare_modes(first, second)?;
-        Outcome::new(comparison.to_string(), &comparison)
+        let outcome = Outcome::new(comparison.to_string(), &comparison)?;
+        let Some(path) = &self.plot.plot else { return Ok(outcome) };
+        let page = || Ok(comparison_page(&comparison, &self.page_settings(words)?));
+        outcome.with_drawing(path, &comparison_svg(&comparison), page)
+    }
+
+    /// Returns heading, details and command of the page.
+    fn page_settings(&self, words: &[OsString]) -> Result<PageSettings, CliError> {
+        Ok(PageSettings {
+            title: self.about.title.clone(),
+            command: Some(repeat::command(words)),
+            about: self.about.details(&self.input.record)?,
+            ..PageSettings::default()
+        })
     }
 
     /// Adds the requested pictures and files of shapes.
@@ -275,12 +289,7 @@ impl ModesArgs {
         let Some(path) = self.plot.plot.as_ref().filter(|_| self.plot.is_page()) else {
             return outcome.with_plot(&self.plot, || Ok(result.styled_figure(style)?));
         };
-        let settings = PageSettings {
-            title: self.about.title.clone(),
-            command: Some(repeat::command(words)),
-            about: self.about.details(&self.input.record)?,
-            ..PageSettings::default()
-        };
+        let settings = self.page_settings(words)?;
         let figure = result.styled_figure(style)?;
         let page = modes_page(&saved, Some(figure), shapes.as_ref(), &settings)?;
         Ok(outcome.with_file(path, options::spelled(&page)))

@@ -61,7 +61,7 @@ impl TrendsArgs {
         let trends = Trends::read(&self.results, self.over)?;
         let mut outcome = Outcome::new(trends.to_string(), &trends)?;
         if let Some(file) = &self.output {
-            let of_folder = || format!("Results in {}", self.results.display());
+            let of_folder = || format!("Trends of {}", self.results.display());
             let title = self.title.clone().unwrap_or_else(of_folder);
             outcome = outcome.with_file(file, trends_page(&trends, &title)?);
         }

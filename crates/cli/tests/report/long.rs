@@ -98,7 +98,7 @@ fn line(period: &[f64], n: usize) -> (f64, f64) {
 }
 
 fn near(cell: &str, expected: f64, digits: i32) {
-    let got: f64 = cell.trim_end_matches(" %").parse().unwrap();
+    let got: f64 = cell.trim_end_matches(" %").replace('−', "-").parse().unwrap();
     // Half a unit of the last of so many digits, at worst of the number 1.
     let within = 0.51 * 10f64.powi(1 - digits) * expected.abs();
     assert!((got - expected).abs() <= within, "{got} is not {expected}");

@@ -5,8 +5,13 @@ use std::f64::consts::TAU;
 use mechid_analysis::bearing::{BearingSummary, BearingTable};
 use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
 
+use crate::page::short_names;
+
 /// Half-width of a 95 % interval, in standard errors.
 const NORMAL: f64 = 1.96;
+
+/// Name of the bands.
+const INTERVAL: &str = "95 % interval";
 
 /// Number of N/m in 1 MN/m.
 const MEGA: f64 = 1e6;
@@ -49,7 +54,8 @@ pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
                     let edge = |sign: f64| -> Vec<f64> {
                         y.iter().zip(&errors).map(|(y, error)| y + sign * error).collect()
                     };
-                    panel = panel.curve(Curve::band("", &x, &edge(-1.0), &edge(1.0)).slot(slot));
+                    let label = if slot == 0 { INTERVAL } else { "" };
+                    panel = panel.curve(Curve::band(label, &x, &edge(-1.0), &edge(1.0)).slot(slot));
                 }
                 let fit: Vec<f64> = omega
                     .iter()
@@ -70,7 +76,7 @@ pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
             panels.push(panel);
         }
     }
-    let title = format!("Dynamic stiffness: {}", bearing.tests.join(", "));
+    let title = format!("Dynamic stiffness: {}", short_names(&bearing.tests));
     panels.into_iter().fold(Figure::new(title).columns(2), Figure::panel)
 }
 
@@ -97,7 +103,8 @@ pub fn over_speed(table: &BearingTable) -> Figure {
                 rows.iter().map(|row| row.estimate.interval).collect();
             if let Some(ends) = ends {
                 let edge = |at: usize| -> Vec<f64> { ends.iter().map(|e| e[at] / scale).collect() };
-                panel = panel.curve(Curve::band("", &x, &edge(0), &edge(1)).slot(entry));
+                let label = if entry == 0 { INTERVAL } else { "" };
+                panel = panel.curve(Curve::band(label, &x, &edge(0), &edge(1)).slot(entry));
             }
             panel = panel.curve(Curve::marked_line(label, &x, &y).slot(entry));
         }

@@ -10,10 +10,12 @@ use nalgebra::Complex;
 
 use super::style::{FigureStyle, FrequencyScale, derivative, per_force};
 use super::trace::Trace;
+use crate::page::short_names;
 
 /// Returns the title of the figure.
 pub fn title(report: &FrfTable) -> String {
-    format!("{}, {}", report.file, report.estimator)
+    let files: Vec<String> = report.records.iter().map(|record| record.file.clone()).collect();
+    format!("{}, {}", short_names(&files), report.estimator)
 }
 
 /// Returns magnitude above phase above coherence, with one curve for every pair of response and
@@ -92,7 +94,7 @@ fn chart(report: &FrfTable, title: &str, traces: &[Trace], style: FigureStyle) -
 
 fn coherence_panel(style: FigureStyle) -> Panel {
     let frequency = style.frequency_axis(FrequencyScale::Linear);
-    Panel::new(frequency, Axis::linear("Coherence", "").range(0.0, 1.0))
+    Panel::new(frequency, Axis::linear("Coherence", "").range(0.0, 1.05))
 }
 
 fn coherence_curve(report: &FrfTable, coherence: &Coherence, name: String) -> Curve {

@@ -34,7 +34,8 @@ use serde::Serialize;
 use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
-use crate::page::{PageSettings, figure_page, modes_page};
+use crate::page::results::{self as words, result_page};
+use crate::page::{PageSettings, elements_page, figure_page, modes_page};
 
 /// A result that can be drawn.
 pub trait ToFigure {
@@ -59,8 +60,21 @@ pub trait ToFigure {
     /// # Errors
     /// As [`ToFigure::figure`].
     fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
+        self.page_with(style, &PageSettings::default())
+    }
+
+    /// Returns the page of [`ToFigure::styled_page`] with the heading and the details of the
+    /// settings.
+    ///
+    /// # Errors
+    /// As [`ToFigure::figure`].
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
         let figure = self.styled_figure(style)?;
-        let title = figure.name().to_owned();
+        let title = settings.title.clone().unwrap_or_else(|| figure.name().to_owned());
         figure_page(&title, vec![(String::new(), figure)], None)
     }
 }
@@ -70,12 +84,32 @@ fn modes_of_result(
     summary: &impl Serialize,
     result: &impl ToFigure,
     style: FigureStyle,
+    settings: &PageSettings,
 ) -> Result<String, ReportError> {
     let modes = SavedModes::from_result(summary)?;
     let (shaped, points) = modes.shapes();
-    let shapes = shapes::ModeShapes::from_modes(&shaped, &points, None);
+    let shapes = shapes::ModeShapes::from_modes(&shaped, &points, settings.geometry.as_ref());
     let figure = result.styled_figure(style)?;
-    modes_page(&modes, Some(figure), shapes.as_ref(), &PageSettings::default())
+    modes_page(&modes, Some(figure), shapes.as_ref(), settings)
+}
+
+/// Returns measured and identified responses per unit force, a figure for each pair; `None` for
+/// another kind of figure, or if no line separates the forces.
+fn pairs(
+    identified: &Identified,
+    style: FigureStyle,
+) -> Result<Option<Vec<(String, Figure)>>, ReportError> {
+    let Some(data) = identified.drawn_spectra() else { return Ok(None) };
+    if restoring::whole_periods(identified).is_some() {
+        return Ok(None);
+    }
+    let channels = identified.names();
+    let system = identified.estimate().system().map_err(AnalysisError::from)?;
+    let names = Names {
+        displacement: &|dof| motion_name(channels, data.measured(), dof, style.quantity),
+        force: &|dof| channels.force_name(dof),
+    };
+    receptance::receptance_set(data, &system, names, style, identified.coherence()?.as_ref())
 }
 
 fn receptance_or_responses(
@@ -161,6 +195,18 @@ impl ToFigure for Identified {
             None => Ok(motion::motion(&title, &self.compared()?[0], "predicted")),
         }
     }
+
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        let figures = match pairs(self, style)? {
+            Some(pairs) => pairs,
+            None => vec![(String::new(), self.styled_figure(style)?)],
+        };
+        result_page(&words::of_identified(self), figures, settings)
+    }
 }
 
 impl ToFigure for IdentifiedResponses {
@@ -173,6 +219,21 @@ impl ToFigure for IdentifiedResponses {
         let names = Names { displacement: &point, force: &point };
         receptance_or_responses(&title, self.data(), &system, names, style)
     }
+
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        let system = self.fitted().system().map_err(AnalysisError::from)?;
+        let point = |dof: usize| self.summary().points[dof].clone();
+        let names = Names { displacement: &point, force: &point };
+        let figures = match receptance::receptance_set(self.data(), &system, names, style, None)? {
+            Some(pairs) => pairs,
+            None => vec![(String::new(), self.styled_figure(style)?)],
+        };
+        result_page(&words::of_tables(self), figures, settings)
+    }
 }
 
 impl ToFigure for IdentifiedBearing {
@@ -180,12 +241,30 @@ impl ToFigure for IdentifiedBearing {
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(bearing::dynamic_stiffness(self.summary()))
     }
+
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        let figures = vec![(String::new(), self.styled_figure(style)?)];
+        result_page(&words::of_bearing(self.summary()), figures, settings)
+    }
 }
 
 impl ToFigure for BearingTable {
     /// Draws the coefficients over speed.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(bearing::over_speed(self))
+    }
+
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        let figures = vec![(String::new(), self.styled_figure(style)?)];
+        result_page(&words::of_speeds(self), figures, settings)
     }
 }
 
@@ -195,8 +274,12 @@ impl ToFigure for FrfTable {
         Ok(frf::figure(self, style))
     }
 
-    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
-        figure_page(&frf::title(self), frf::figures(self, style), None)
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        result_page(&words::of_responses(self), frf::figures(self, style), settings)
     }
 }
 
@@ -207,8 +290,12 @@ impl ToFigure for Decayed {
         Ok(motion::motion(&title, self.compared(), "fitted"))
     }
 
-    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
-        modes_of_result(self.summary(), self, style)
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        modes_of_result(self.summary(), self, style, settings)
     }
 }
 
@@ -219,8 +306,12 @@ impl ToFigure for Modes {
         modes::figure(self)
     }
 
-    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
-        modes_of_result(self.summary(), self, style)
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        modes_of_result(self.summary(), self, style, settings)
     }
 }
 
@@ -230,12 +321,20 @@ impl ToFigure for IdentifiedElements {
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(elements::figure(self))
     }
+
+    fn page_with(&self, _: FigureStyle, settings: &PageSettings) -> Result<String, ReportError> {
+        elements_page(self, settings)
+    }
 }
 
 impl ToFigure for Reconstructed {
     /// Draws each force over time with twice its standard error, and its spectrum.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(force::figure(self))
+    }
+
+    fn page_with(&self, _: FigureStyle, settings: &PageSettings) -> Result<String, ReportError> {
+        result_page(&words::of_force(self.summary()), force::figures(self), settings)
     }
 }
 
@@ -250,6 +349,10 @@ impl ToFigure for Inspected {
     /// Draws columns over time, with their spectra.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         record::figure(self)
+    }
+
+    fn page_with(&self, _: FigureStyle, settings: &PageSettings) -> Result<String, ReportError> {
+        result_page(&words::of_record(self), record::figures(self)?, settings)
     }
 }
 
@@ -292,7 +395,11 @@ impl ToFigure for Machine {
         modal::figure(&self.name, self.system(), names, &resonances, style)
     }
 
-    fn styled_page(&self, style: FigureStyle) -> Result<String, ReportError> {
-        modes_of_result(&ModalSummary::from_machine(self)?, self, style)
+    fn page_with(
+        &self,
+        style: FigureStyle,
+        settings: &PageSettings,
+    ) -> Result<String, ReportError> {
+        modes_of_result(&ModalSummary::from_machine(self)?, self, style, settings)
     }
 }

@@ -34,10 +34,17 @@ pub fn figure(modes: &Modes) -> Result<Figure, ReportError> {
 }
 
 /// Draws the stabilisation diagram and the mode indicator of a saved result; `None` without poles
-/// and indicator.
+/// and indicator. Behind the poles is the sum of the responses, if the indicator was saved.
 pub fn diagrams(title: &str, diagrams: &Diagrams) -> Option<Figure> {
+    // The squares of the singular values have the sum of the squares of all responses.
+    let sum = |indicator: &ModeIndicator| -> Vec<f64> {
+        let square = |at: usize| indicator.singular_values.iter().map(move |v| v[at].powi(2));
+        (0..indicator.frequency_hz.len()).map(|at| square(at).sum::<f64>().sqrt()).collect()
+    };
+    let sum = diagrams.mode_indicator.as_ref().map(|one| (one.frequency_hz.as_slice(), sum(one)));
+    let sum = sum.as_ref().map_or((&[][..], &[][..]), |(hz, values)| (*hz, values.as_slice()));
     let panels = [
-        stabilisation(&diagrams.stabilisation, (&[], &[])),
+        stabilisation(&diagrams.stabilisation, sum),
         diagrams.mode_indicator.as_ref().map(indicator),
     ];
     let figure = panels.into_iter().flatten().fold(Figure::new(title), Figure::panel);

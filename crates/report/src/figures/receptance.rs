@@ -265,7 +265,7 @@ pub fn coherence(
     style: FigureStyle,
 ) -> Panel {
     let axis = style.frequency_axis(FrequencyScale::Linear);
-    let mut panel = Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0));
+    let mut panel = Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.05));
     // A logarithmic axis cannot show 0 Hz.
     let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
     let motions = measured.values.ncols();
@@ -283,7 +283,7 @@ fn coherence_of(measured: &ResponseCoherence, motion: usize, style: FigureStyle)
     let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
     let at = motion.min(measured.values.ncols().saturating_sub(1));
     let values: Vec<f64> = measured.values.column(at).iter().skip(hidden).copied().collect();
-    Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0)).curve(Curve::line(
+    Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.05)).curve(Curve::line(
         "",
         &measured.frequency_hz[hidden..],
         &values,

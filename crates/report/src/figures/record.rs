@@ -35,6 +35,22 @@ pub fn figure(inspected: &Inspected) -> Result<Figure, ReportError> {
     Ok(rows.fold(Figure::new(title), Figure::panel).columns(2).share_x())
 }
 
+/// Returns a separate figure for each column, by its name: its history above its spectrum.
+///
+/// # Errors
+/// As [`figure`].
+pub fn figures(inspected: &Inspected) -> Result<Vec<(String, Figure)>, ReportError> {
+    if inspected.drawn().is_empty() {
+        return Err(ReportError::NoColumnToDraw { file: inspected.summary().file.clone() });
+    }
+    let dt = inspected.dt();
+    let of_column = |column: &Drawn| {
+        let figure = Figure::new("").panel(history(column, dt).title(""));
+        (shortened(&column.name), figure.panel(spectrum(column, dt)))
+    };
+    Ok(inspected.drawn().iter().map(of_column).collect())
+}
+
 fn history(column: &Drawn, dt: Option<f64>) -> Panel {
     let points = column.extremes.points();
     let (axis, (x, y)): (_, (Vec<f64>, Vec<f64>)) = match dt {

@@ -30,15 +30,9 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
         let notes = points.iter().map(|point| note(series, point)).collect();
         Curve::points(name, &x, &y).slot(slot).notes(notes)
     };
-    let ends = usual.iter().map(|point| Some((point.at, point.interval?)));
     let mut panel =
         Panel::new(Axis::linear(x, ""), Axis::linear(series.name.as_str(), &series.unit));
-    if let Some(ends) = ends.collect::<Option<Vec<_>>>().filter(|ends| !ends.is_empty()) {
-        let x: Vec<f64> = ends.iter().map(|(at, _)| *at).collect();
-        let edge =
-            |which: usize| -> Vec<f64> { ends.iter().map(|(_, ends)| ends[which]).collect() };
-        panel = panel.curve(Curve::band("", &x, &edge(0), &edge(1)).slot(0));
-    }
+    panel = panel.curves(bands(series, &usual));
     if !usual.is_empty() {
         panel = panel.curve(curve("value", &usual, 0));
     }
@@ -69,6 +63,24 @@ pub fn panel(series: &TrendSeries, over: TrendAxis) -> Panel {
     panel = panel.reference(Reference::horizontal("median", series.median));
     let axis = Axis::linear(series.name.as_str(), &series.unit).range(low, high);
     panel.y(axis)
+}
+
+/// Returns the 95 % intervals as bands, which a step interrupts.
+fn bands(series: &TrendSeries, usual: &[&TrendPoint]) -> Vec<Curve> {
+    let is_same = |a: &&TrendPoint, b: &&TrendPoint| {
+        series.changes.iter().all(|change| (a.at < change.at) == (b.at < change.at))
+    };
+    let mut bands: Vec<Curve> = Vec::new();
+    for run in usual.chunk_by(is_same) {
+        let Some(ends) = run.iter().map(|point| point.interval).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
+        let x: Vec<f64> = run.iter().map(|point| point.at).collect();
+        let edge = |which: usize| -> Vec<f64> { ends.iter().map(|ends| ends[which]).collect() };
+        let label = if bands.is_empty() { "95 % interval" } else { "" };
+        bands.push(Curve::band(label, &x, &edge(0), &edge(1)).slot(0));
+    }
+    bands
 }
 
 /// Distance from the edge of the axis at which outliers beyond it are drawn, as a fraction of the

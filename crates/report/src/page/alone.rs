@@ -3,7 +3,7 @@
 use maud::{DOCTYPE, html};
 use mechid_plot::{Figure, matrix_of_squares};
 
-use super::figures::{Drawn, drawn_set};
+use super::figures::{Drawn, drawn_large};
 use super::{figure, figure_script, head};
 use crate::ReportError;
 use crate::figures::shapes::ModeShapes;
@@ -27,7 +27,7 @@ pub fn figure_page(
     shapes: Option<&ModeShapes>,
 ) -> Result<String, ReportError> {
     let figures = figures.into_iter().map(|(name, figure)| (name, figure.titled(""))).collect();
-    let mut drawn = vec![drawn_set("figure".into(), figures, title.into())?];
+    let mut drawn = vec![drawn_large("figure".into(), figures, String::new())?];
     if let Some(shapes) = shapes {
         drawn.extend(shape_figures(shapes));
     }
@@ -53,7 +53,19 @@ pub(super) fn shape_figures(shapes: &ModeShapes) -> [Drawn; 2] {
     let drawn = shapes.draw(SHAPES);
     let matrix = matrix_of_squares(&shapes.assurance(), LIKENESS);
     [
-        Drawn { id: "shapes".into(), svg: drawn.svg, map: drawn.map, caption: SHAPES.into() },
-        Drawn { id: "assurance".into(), svg: matrix, map: Vec::new(), caption: LIKENESS.into() },
+        Drawn {
+            id: "shapes".into(),
+            svg: drawn.svg,
+            map: drawn.map,
+            caption: SHAPES.into(),
+            is_wide: false,
+        },
+        Drawn {
+            id: "assurance".into(),
+            svg: matrix,
+            map: Vec::new(),
+            caption: LIKENESS.into(),
+            is_wide: false,
+        },
     ]
 }

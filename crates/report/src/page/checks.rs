@@ -3,6 +3,28 @@
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::{CheckRow, When};
 
+/// Returns the checks that speak against the numbers, a sentence each.
+pub fn conspicuous(checks: &[CheckRow]) -> Vec<String> {
+    let doubtful = checks.iter().filter(|check| check.is_conspicuous());
+    doubtful.map(|check| format!("{}: {}", check.subject, check.sentence())).collect()
+}
+
+/// Returns how many checks are good, and their subjects.
+pub fn merits(checks: &[CheckRow]) -> Vec<String> {
+    let good = checks.iter().filter(|check| !check.is_conspicuous());
+    let (count, all) = (good.clone().count(), checks.len());
+    let mut subjects: Vec<String> = Vec::new();
+    for subject in good.map(|check| check.subject.to_string()) {
+        if !subjects.contains(&subject) {
+            subjects.push(subject);
+        }
+    }
+    if count == 0 {
+        return Vec::new();
+    }
+    vec![format!("{count} of {all} checks of data and fit are good: {}", subjects.join(", "))]
+}
+
 /// Returns the checks before or after the fit, with their verdicts.
 pub fn list(checks: &[CheckRow], when: When) -> Markup {
     let checks: Vec<&CheckRow> = checks.iter().filter(|check| check.when == when).collect();

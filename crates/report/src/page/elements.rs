@@ -3,13 +3,16 @@
 use maud::{Markup, html};
 use mechid_analysis::IdentifiedElements;
 use mechid_analysis::elements::{CandidateRow, ElementSummary};
-use mechid_analysis::identify::checks::{CheckRow, When};
+use mechid_analysis::identify::checks::When;
 use mechid_analysis::text::{compact, significant};
 use mechid_signal::message;
 
 use super::sections::{pair, percent};
 use super::tables::Table;
-use super::{PageSettings, about, checks, document, figure, figures, modes_found, remarks};
+use super::{
+    PageSettings, about, checks, document, figure, figures, modes_found, names_of, remarks,
+    short_names,
+};
 use crate::ReportError;
 use crate::figures::elements as sensors;
 
@@ -23,18 +26,17 @@ pub fn elements_page(
     settings: &PageSettings,
 ) -> Result<String, ReportError> {
     let summary = identified.summary();
-    let files: Vec<&str> = summary.tests.iter().map(|test| test.file.as_str()).collect();
-    let name = files.first().map_or("", |file| file.rsplit(['/', '\\']).next().unwrap_or(file));
-    let default_title = || format!("Identification of {name}");
+    let files: Vec<String> = summary.tests.iter().map(|test| test.file.clone()).collect();
+    let default_title = || format!("Identification of {}", short_names(&files));
     let title = settings.title.clone().unwrap_or_else(default_title);
-    let mut doubts = conspicuous(summary);
+    let mut doubts = checks::conspicuous(&summary.checks);
     doubts.extend(summary.combinations.iter().map(|row| row.text.clone()));
     let heading = html! {
         header {
             h1 { (title) }
-            p.subtitle { (files.join(", ")) " · maximum likelihood" }
+            p.subtitle { (names_of(&files)) " · maximum likelihood" }
             (about(&settings.about))
-            (remarks(&doubts, &merits(summary)))
+            (remarks(&doubts, &checks::merits(&summary.checks)))
             (modes_found(&summary.modes))
         }
     };
@@ -45,26 +47,6 @@ pub fn elements_page(
         ("residual", "Residual", residual(summary)),
     ];
     Ok(document(&title, &heading, &sections, settings.command.as_deref()))
-}
-
-/// Returns the checks that speak against the numbers, a sentence each.
-fn conspicuous(found: &ElementSummary) -> Vec<String> {
-    let doubtful = found.checks.iter().filter(|check| check.is_conspicuous());
-    doubtful.map(|check| format!("{}: {}", check.subject, check.sentence())).collect()
-}
-
-fn merits(found: &ElementSummary) -> Vec<String> {
-    let good: Vec<&CheckRow> = found.checks.iter().filter(|c| !c.is_conspicuous()).collect();
-    let mut subjects: Vec<String> = good.iter().map(|check| check.subject.to_string()).collect();
-    subjects.dedup();
-    let (count, all) = (good.len(), found.checks.len());
-    match count {
-        0 => Vec::new(),
-        _ => vec![format!(
-            "{count} of {all} checks of data and fit are good: {}",
-            subjects.join(", ")
-        )],
-    }
 }
 
 fn data(found: &ElementSummary) -> Markup {

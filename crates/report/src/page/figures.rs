@@ -35,7 +35,7 @@ const PANEL: [f64; 2] = [190.0, 150.0];
 const WIDE_PANEL: [f64; 2] = [300.0, 180.0];
 
 /// Maximum number of figures of a set that is drawn at the smaller width.
-pub(super) const BESIDE: usize = 4;
+const BESIDE: usize = 4;
 
 /// Figure with its caption.
 pub(crate) struct Drawn {
@@ -44,6 +44,8 @@ pub(crate) struct Drawn {
     /// Name and small drawing of each figure, to choose one; empty for a single figure.
     pub map: Vec<(String, String)>,
     pub caption: String,
+    /// `true` if it fills a row.
+    pub is_wide: bool,
 }
 
 pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, ReportError> {
@@ -57,6 +59,24 @@ pub(super) fn drawn_set(
     caption: String,
 ) -> Result<Drawn, ReportError> {
     let width = if members.len() > BESIDE { WIDE } else { WIDTH };
+    drawn_at(width, id, members, caption)
+}
+
+/// Draws a set that fills a row.
+pub(super) fn drawn_large(
+    id: String,
+    members: Vec<(String, Figure)>,
+    caption: String,
+) -> Result<Drawn, ReportError> {
+    drawn_at(WIDE, id, members, caption)
+}
+
+fn drawn_at(
+    width: f64,
+    id: String,
+    members: Vec<(String, Figure)>,
+    caption: String,
+) -> Result<Drawn, ReportError> {
     let is_alone = members.len() == 1;
     let sized = members.into_iter().map(|(name, figure)| {
         let title = if is_alone { "" } else { name.as_str() };
@@ -64,18 +84,7 @@ pub(super) fn drawn_set(
         (name, figure)
     });
     let drawn = FigureSet::new(sized).draw(&id, &caption)?;
-    Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption })
-}
-
-/// Draws a figure that fills a row.
-pub(super) fn drawn_wide(
-    id: String,
-    figure: Figure,
-    caption: String,
-) -> Result<Drawn, ReportError> {
-    let figure = sized(figure.titled(""), WIDE);
-    let drawn = FigureSet::new([(String::new(), figure)]).draw(&id, &caption)?;
-    Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption })
+    Ok(Drawn { id, svg: drawn.svg, map: drawn.map, caption, is_wide: width == WIDE })
 }
 
 /// Returns the figure in its size at this width, px.
@@ -84,7 +93,7 @@ fn sized(figure: Figure, width: f64) -> Figure {
     // The legend of many curves needs several rows.
     let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
     let [first, other] = if width > WIDTH { WIDE_PANEL } else { PANEL };
-    let height = first + other * (panels.len() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
+    let height = first + other * (figure.rows() as f64 - 1.0).max(0.5) + 12.0 * curves as f64;
     figure.size(width, height)
 }
 

@@ -5,12 +5,11 @@ mod checks;
 mod elements;
 mod figures;
 mod modes;
+pub(crate) mod results;
 mod sections;
 mod tables;
 #[cfg(feature = "parquet")]
 mod trends;
-
-use std::path::PathBuf;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mechid_io::Geometry;
@@ -26,6 +25,7 @@ pub use self::alone::figure_page;
 pub use self::elements::elements_page;
 use self::figures::Drawn;
 pub use self::modes::modes_page;
+pub use self::results::{comparison_page, comparison_svg};
 use self::tables::Table;
 #[cfg(feature = "parquet")]
 pub use self::trends::trends_page;
@@ -100,10 +100,13 @@ struct Contents<'a> {
 /// [`ReportError::Plot`].
 pub fn page(identified: &Identified, settings: &PageSettings) -> Result<String, ReportError> {
     let review = Review::new(identified, settings.reconstruct_force)?;
-    let name = PathBuf::from(&identified.summary().file);
-    let name = name.file_name().unwrap_or_default().to_string_lossy();
+    let default_title = || {
+        let records = identified.summary().records.iter();
+        let files: Vec<String> = records.map(|record| record.file.clone()).collect();
+        format!("Identification of {}", short_names(&files))
+    };
     html(&Contents {
-        title: settings.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
+        title: settings.title.clone().unwrap_or_else(default_title),
         review: &review,
         command: settings.command.as_deref(),
         about: &settings.about,
@@ -200,10 +203,39 @@ fn document(
     page.into_string() + "\n"
 }
 
+/// Returns the name of a file without its folder.
+fn base_name(file: &str) -> &str {
+    file.rsplit(['/', '\\']).next().unwrap_or(file)
+}
+
+/// Returns the names of files without their folders.
+fn names_of(files: &[String]) -> String {
+    files.iter().map(|file| base_name(file)).collect::<Vec<_>>().join(", ")
+}
+
+/// Returns the name of the first file without its folder, and how many more there are.
+pub(crate) fn short_names(files: &[String]) -> String {
+    let name = files.first().map_or("", |file| base_name(file));
+    match files.len() {
+        0 | 1 => name.to_owned(),
+        count => format!("{name} and {} more", count - 1),
+    }
+}
+
+/// Returns figures side by side; a figure that fills a row has a block of its own, so that a page
+/// may break after it.
+fn figures_of(all: &[Drawn]) -> Markup {
+    html! {
+        @for block in all.chunk_by(|a, b| !a.is_wide && !b.is_wide) {
+            div.figures { @for one in block { (figure(one)) } }
+        }
+    }
+}
+
 /// Returns a figure with its caption.
 pub(crate) fn figure(drawn: &Drawn) -> Markup {
     html! {
-        figure id={ "figure-" (drawn.id) } class=[(drawn.map.len() > figures::BESIDE).then_some("wide")] {
+        figure id={ "figure-" (drawn.id) } class=[drawn.is_wide.then_some("wide")] {
             // The SVG comes from `mechid-plot`, which escapes the text in it.
             (PreEscaped(&drawn.svg))
             @if !drawn.map.is_empty() {
@@ -213,7 +245,7 @@ pub(crate) fn figure(drawn: &Drawn) -> Markup {
                     }
                 }
             }
-            figcaption { (drawn.caption) }
+            @if !drawn.caption.is_empty() { figcaption { (drawn.caption) } }
         }
     }
 }
@@ -259,7 +291,7 @@ fn mode_remark(mode: &ModeRow) -> Option<String> {
 fn modes_found(modes: &[ModeRow]) -> Markup {
     let row = |(number, mode): (usize, &ModeRow)| {
         let [frequency, error, _] = mode.natural_frequency_hz.cells();
-        let [ratio, ratio_error, _] = mode.damping_ratio.cells();
+        let [ratio, ratio_error, _] = mode.damping_ratio.percent().cells();
         let is_pair = mode.oscillates || mode.is_rigid_body || mode.partner.is_some();
         let dash = |text: String| if is_pair { text } else { "–".into() };
         vec![
@@ -272,7 +304,7 @@ fn modes_found(modes: &[ModeRow]) -> Markup {
         ]
     };
     let rows: Vec<Vec<String>> = (1..).zip(modes).map(row).collect();
-    let header = ["mode", "natural frequency, Hz", "±", "damping ratio", "±", "remark"];
+    let header = ["mode", "natural frequency, Hz", "±", "damping ratio, %", "±", "remark"];
     let has_remarks = rows.iter().any(|row| !row[5].is_empty());
     let columns = if has_remarks { 6 } else { 5 };
     let rows: Vec<Vec<String>> = rows.into_iter().map(|row| row[..columns].to_vec()).collect();
@@ -285,8 +317,8 @@ fn modes_found(modes: &[ModeRow]) -> Markup {
 }
 
 fn files(contents: &Contents<'_>) -> String {
-    let names: Vec<&str> = contents.review.records.iter().map(|r| r.held().file.as_str()).collect();
-    names.join(", ")
+    let records = contents.review.records.iter();
+    names_of(&records.map(|record| record.held().file.clone()).collect::<Vec<_>>())
 }
 
 /// Returns the section of warnings, and of the information that supports the numbers.

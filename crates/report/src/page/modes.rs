@@ -10,10 +10,12 @@ use mechid_plot::Figure;
 use mechid_signal::message;
 
 use super::alone::shape_figures;
-use super::figures::{drawn, drawn_wide};
-use super::sections::{pair, percent};
+use super::figures::{drawn, drawn_large};
+use super::sections::{pair, percent, polar};
 use super::tables::Table;
-use super::{PageSettings, about, document, figure, mode_remark, remarks};
+use super::{
+    PageSettings, about, base_name, document, figure, figures_of, mode_remark, remarks, short_names,
+};
 use crate::ReportError;
 use crate::figures::backbone;
 use crate::figures::modes::diagrams;
@@ -58,17 +60,13 @@ pub fn modes_page(
 
 /// Returns a title with the name of the first file, without its folder.
 fn default_title(modes: &SavedModes) -> String {
-    let files = modes.records.iter().map(|record| record.file.as_str());
-    let first = files.clone().next().unwrap_or(&modes.name);
-    let name = first.rsplit(['/', '\\']).next().unwrap_or(first);
-    match files.count() {
-        0 | 1 => format!("Modes of {name}"),
-        count => format!("Modes of {name} and {} more", count - 1),
-    }
+    let files: Vec<String> = modes.records.iter().map(|record| record.file.clone()).collect();
+    let files = if files.is_empty() { vec![modes.name.clone()] } else { files };
+    format!("Modes of {}", short_names(&files))
 }
 
 fn subtitle(modes: &SavedModes) -> String {
-    let mut parts = vec![modes.name.clone()];
+    let mut parts = vec![modes.name.split(", ").map(base_name).collect::<Vec<_>>().join(", ")];
     if !modes.inputs.is_empty() {
         parts.push(message::count(modes.inputs.len(), "force"));
     }
@@ -138,8 +136,8 @@ fn fit(modes: &SavedModes, result: Option<Figure>) -> Result<Option<Markup>, Rep
     } else {
         "measured and fitted responses, and their difference"
     };
-    let caption = format!("{}: {what}.", result.name());
-    let drawn = drawn_wide("result".into(), result, caption)?;
+    let caption = format!("{}.", what.replacen(|_: char| true, &what[..1].to_uppercase(), 1));
+    let drawn = drawn_large("result".into(), vec![(String::new(), result)], caption)?;
     Ok(Some(html! { div.figures { (figure(&drawn)) } }))
 }
 
@@ -160,7 +158,7 @@ fn shape(modes: &SavedModes, shapes: Option<&ModeShapes>) -> Option<Markup> {
     let row = |(at, point): (usize, &String)| {
         let cell = |(_, mode): &(usize, &ShapedMode)| {
             let [re, im] = mode.shape.get(at).map_or([f64::NAN; 2], |entry| entry.value);
-            format!("{} ∠ {:.1}°", significant(re.hypot(im), 4), im.atan2(re).to_degrees())
+            polar(re, im)
         };
         std::iter::once(point.clone()).chain(oscillating.iter().map(cell)).collect()
     };
@@ -169,7 +167,7 @@ fn shape(modes: &SavedModes, shapes: Option<&ModeShapes>) -> Option<Markup> {
     let table = Table { caption, header: &header, numbers_from: 1, rows };
     let drawn = shapes.map(shape_figures);
     Some(html! {
-        @if let Some(drawn) = &drawn { div.figures { @for one in drawn { (figure(one)) } } }
+        @if let Some(drawn) = &drawn { (figures_of(drawn)) }
         (table.html())
     })
 }

@@ -19,7 +19,7 @@ use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
 use super::tables::Table;
-use super::{Captions as _, Contents, checks, figure, figures};
+use super::{Captions as _, Contents, Drawn, checks, figure, figures, figures_of};
 use crate::ReportError;
 
 pub fn percent(share: f64) -> String {
@@ -28,6 +28,13 @@ pub fn percent(share: f64) -> String {
 
 fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "–".into())
+}
+
+/// Returns modulus and phase, from −179.9° to 180.0°.
+pub fn polar(re: f64, im: f64) -> String {
+    let tenths = (10.0 * im.atan2(re).to_degrees()).round();
+    let tenths = if tenths == -1800.0 { 1800.0 } else { tenths + 0.0 };
+    format!("{} ∠ {:.1}°", significant(re.hypot(im), 4), tenths / 10.0)
 }
 
 pub fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
@@ -62,7 +69,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
             }
             @for remark in &part.held().unit_remarks { p.note { (remark) "." } }
             @if let Some(note) = part_held(part) { p.note { (note) } }
-            div.figures { @for drawn in &drawn { (figure(drawn)) } }
+            (figures_of(&drawn))
         })
     })?;
     Ok(html! {
@@ -177,7 +184,7 @@ pub fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
 pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let report = contents.review.identified.summary();
     let interval = format!("{} % interval", compact(100.0 * report.confidence, 3));
-    let header = |what| [what, "value", "standard error", &interval, "unit"];
+    let header = |what| [what, "value", "±", &interval, "unit"];
     let linear = report.parameters.iter();
     let terms = report.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
     let parameters = linear
@@ -194,6 +201,8 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let kind = names.first_response().unwrap_or(ResponseQuantity::Displacement);
     let shapes = shapes(&report.modes, |dof| names.response_name(kind, dof));
     let shapes_drawn = figures::shapes(contents, kind);
+    let drawn: Vec<Drawn> =
+        restoring.into_iter().chain(shapes_drawn.into_iter().flatten()).collect();
     let numbered: Vec<String> = (1..=dofs).map(|dof| dof.to_string()).collect();
     let columns: Vec<&str> =
         std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
@@ -214,11 +223,8 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
             }
         }
         @if let Some(unscaled) = &report.unscaled { p.note { (unscaled) "." } }
-        @if restoring.is_some() || shapes_drawn.is_some() {
-            div.figures {
-                @if let Some(drawn) = &restoring { (figure(drawn)) }
-                @for drawn in shapes_drawn.iter().flatten() { (figure(drawn)) }
-            }
+        @if !drawn.is_empty() {
+            (figures_of(&drawn))
         }
         @for remark in &contents.review.identified.fitted().remarks { p.note { "How it was done: " (remark) "." } }
     })
@@ -257,7 +263,7 @@ fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
     let row = |dof: usize| -> Vec<String> {
         let cells = modes.iter().map(|mode| {
             let [re, im] = mode.shape[dof].value;
-            format!("{} ∠ {:.1}°", significant(re.hypot(im), 4), im.atan2(re).to_degrees())
+            polar(re, im)
         });
         std::iter::once(channel(dof)).chain(cells).collect()
     };
@@ -282,7 +288,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
         rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
     }
     if let Some(misfit) = &contents.review.identified.fitted().misfit {
-        let what = format!("Power of the residual over what {} explains", misfit.noise);
+        let what = format!("Power of the residual over that of the noise ({})", misfit.noise);
         rows.push(pair(&what, significant(misfit.ratio, 4)));
     }
     rows.push(pair("Condition number", significant(fit.condition_number, 3)));
@@ -293,22 +299,20 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
 
 /// Returns the section about the frequency response, and the response over time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let receptance = match &contents.review.receptance {
-        Err(reason) => Err(reason.as_str()),
-        Ok(measured) => Ok(figures::receptance(contents.review.identified, measured)?),
-    };
-    let mut fits = Vec::new();
+    let mut drawn = Vec::new();
+    let mut reason = None;
+    match &contents.review.receptance {
+        Err(why) => reason = Some(why),
+        Ok(measured) => drawn.push(figures::receptance(contents.review.identified, measured)?),
+    }
     for part in &contents.review.records {
         if let Ok(residual) = &part.residual {
-            fits.push(figures::fit(part, &residual.compared[0])?);
+            drawn.push(figures::fit(part, &residual.compared[0])?);
         }
     }
     Ok(html! {
-        @if let Err(reason) = &receptance { p.note { "No receptance: " (reason) "." } }
-        div.figures {
-            @if let Ok(drawn) = &receptance { (figure(drawn)) }
-            @for drawn in &fits { (figure(drawn)) }
-        }
+        @if let Some(reason) = reason { p.note { "No receptance: " (reason) "." } }
+        (figures_of(&drawn))
     })
 }
 
@@ -352,7 +356,7 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
     }
     Ok(html! {
         (Table { caption: &part.buffered_caption("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
-        div.figures { @for drawn in &drawn { (figure(drawn)) } }
+        (figures_of(&drawn))
     })
 }
 

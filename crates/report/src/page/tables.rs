@@ -13,6 +13,18 @@ pub struct Table<'a> {
     pub rows: Vec<Vec<String>>,
 }
 
+/// Returns numbers with the sign − instead of a hyphen.
+fn minus(cell: &str) -> String {
+    let mut text = String::with_capacity(cell.len());
+    let mut characters = cell.chars().peekable();
+    while let Some(c) = characters.next() {
+        let is_sign = text.chars().last().is_none_or(|before| " e".contains(before))
+            && characters.peek().is_some_and(char::is_ascii_digit);
+        text.push(if c == '-' && is_sign { '−' } else { c });
+    }
+    text
+}
+
 impl Table<'_> {
     pub fn html(&self) -> Markup {
         self.html_with_class(self.header.is_empty().then_some("facts"), &[])
@@ -45,7 +57,8 @@ impl Table<'_> {
                         @for (at, row) in self.rows.iter().enumerate() { tr data-category=[categories.get(at)] {
                             @for (column, cell) in row.iter().enumerate() {
                                 @if column == 0 { th scope="row" { (cell) } }
-                                @else { td class=[class(column)] { (cell) } }
+                                @else if column >= self.numbers_from { td.number { (minus(cell)) } }
+                                @else { td { (cell) } }
                             }
                         } }
                     }
