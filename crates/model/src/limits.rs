@@ -54,6 +54,7 @@ pub(crate) const HIGHEST_EXPONENT: u32 = 9;
 // Machines of named elements
 
 /// Maximum order of a matrix of an element: all entries are stored, 0.8 GB for this order.
+#[cfg(feature = "serde")]
 pub(crate) const MAX_MATRIX_ORDER: usize = 10_000;
 
 /// Maximum number of names in a message; more would hide the wrong one.
