@@ -222,9 +222,9 @@ pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
         let middle = at(row) + side / 2.0;
         sheet.text((EDGE - 14.0, middle + 4.0), &(row + 1).to_string(), &words);
     }
-    for row in 0..rows {
+    for (row, entries) in values.iter().enumerate() {
         for column in 0..columns {
-            let value = values[row].get(column).copied().unwrap_or(0.0);
+            let value = entries.get(column).copied().unwrap_or(0.0);
             // The colour stays light enough for dark digits.
             sheet.open_faded(0.06 + 0.4 * value);
             let corner = (at(column) + 1.0, at(row) + 1.0);

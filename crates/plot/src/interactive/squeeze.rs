@@ -178,9 +178,8 @@ pub(super) fn squeeze(script: &str) -> String {
                 let is_last = c == ';' && following.next() == Some(&'}');
                 let next = text.get(at + 1).copied();
                 let is_equality = out.ends_with("==") || out.ends_with("!=");
-                if !(is_last || c == '=' && is_equality)
-                    && !(c.is_whitespace() && is_idle(c, out.chars().last(), next))
-                {
+                let is_blank = c.is_whitespace() && is_idle(c, out.chars().last(), next);
+                if !(is_last || is_blank || c == '=' && is_equality) {
                     out.push(c);
                 }
                 at += 1;
