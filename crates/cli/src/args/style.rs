@@ -17,7 +17,7 @@ pub struct StyleArgs {
     /// Magnitude axis of the picture
     #[arg(long, value_name = "SCALE", value_enum, default_value_t, requires = "plot")]
     plot_magnitude: PlotMagnitude,
-    /// Response per unit force in the picture [default: as measured; receptance for mechid modal]
+    /// Response per unit force in the picture [default: as measured; receptance for a machine]
     #[arg(long, value_name = "QUANTITY", value_enum, requires = "plot")]
     plot_quantity: Option<PlotQuantity>,
 }
