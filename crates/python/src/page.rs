@@ -22,7 +22,7 @@ pub struct PageTexts {
     record: PathBuf,
     /// File of the points of the channels.
     geometry: Option<PathBuf>,
-    /// Whether to reconstruct the force.
+    /// If true, the force is reconstructed, too.
     reconstruct_force: bool,
 }
 

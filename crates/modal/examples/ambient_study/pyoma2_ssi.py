@@ -31,7 +31,9 @@ def nearest(frequencies, dampings, errors, true):
         distance = np.abs(frequencies - hz)
         if np.isfinite(distance).any():
             at = np.nanargmin(distance)
-            if distance[at] < 5 * zeta * hz:
+            # A pole counts for one mode only: below the true order one pole stands for two modes.
+            own = np.argmin(np.abs(frequencies[at] - true[:, 0])) == k
+            if own and distance[at] < 5 * zeta * hz:
                 result[k] = frequencies[at] - hz, dampings[at] - zeta, *errors[:, at]
     return result
 

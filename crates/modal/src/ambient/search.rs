@@ -51,9 +51,9 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Effort to compare quantities at initial estimates. Their poles are better than their shapes and
-    /// amplitudes: beside wrong amplitudes a damping ratio would fall to that of a sinusoid, from
-    /// which no search returns.
+    /// Effort to compare quantities at initial estimates. Their poles are better than their
+    /// amplitudes: beside wrong amplitudes a damping ratio would fall to that of a sinusoid, and no
+    /// search returns from there.
     pub const HELD: Self = Self { iterations: 20, slow: 0.5, holds_poles: true };
     /// Effort to approach the maximum with coarse lines.
     pub const SHORT: Self = Self { iterations: 6, slow: 0.5, holds_poles: false };

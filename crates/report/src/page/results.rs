@@ -21,7 +21,7 @@ use super::{
 };
 use crate::ReportError;
 
-/// What a page says beside its figures.
+/// Words and tables of a page beside its figures.
 pub struct Words {
     /// Heading without the name of the record.
     pub what: &'static str,
