@@ -34,7 +34,7 @@ use serde::Serialize;
 use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
-use crate::page::results::{self as words, result_page};
+use crate::page::results::{self, result_page};
 use crate::page::{PageSettings, elements_page, figure_page, modes_page};
 
 /// A result that can be drawn.
@@ -205,7 +205,7 @@ impl ToFigure for Identified {
             Some(pairs) => pairs,
             None => vec![(String::new(), self.styled_figure(style)?)],
         };
-        result_page(&words::of_identified(self), figures, settings)
+        result_page(&results::identified_words(self), figures, settings)
     }
 }
 
@@ -232,7 +232,7 @@ impl ToFigure for IdentifiedResponses {
             Some(pairs) => pairs,
             None => vec![(String::new(), self.styled_figure(style)?)],
         };
-        result_page(&words::of_tables(self), figures, settings)
+        result_page(&results::table_words(self), figures, settings)
     }
 }
 
@@ -248,7 +248,7 @@ impl ToFigure for IdentifiedBearing {
         settings: &PageSettings,
     ) -> Result<String, ReportError> {
         let figures = vec![(String::new(), self.styled_figure(style)?)];
-        result_page(&words::of_bearing(self.summary()), figures, settings)
+        result_page(&results::bearing_words(self.summary()), figures, settings)
     }
 }
 
@@ -264,7 +264,7 @@ impl ToFigure for BearingTable {
         settings: &PageSettings,
     ) -> Result<String, ReportError> {
         let figures = vec![(String::new(), self.styled_figure(style)?)];
-        result_page(&words::of_speeds(self), figures, settings)
+        result_page(&results::campaign_words(self), figures, settings)
     }
 }
 
@@ -279,7 +279,7 @@ impl ToFigure for FrfTable {
         style: FigureStyle,
         settings: &PageSettings,
     ) -> Result<String, ReportError> {
-        result_page(&words::of_responses(self), frf::figures(self, style), settings)
+        result_page(&results::response_words(self), frf::figures(self, style), settings)
     }
 }
 
@@ -334,7 +334,7 @@ impl ToFigure for Reconstructed {
     }
 
     fn page_with(&self, _: FigureStyle, settings: &PageSettings) -> Result<String, ReportError> {
-        result_page(&words::of_force(self.summary()), force::figures(self), settings)
+        result_page(&results::force_words(self.summary()), force::figures(self), settings)
     }
 }
 
@@ -352,7 +352,7 @@ impl ToFigure for Inspected {
     }
 
     fn page_with(&self, _: FigureStyle, settings: &PageSettings) -> Result<String, ReportError> {
-        result_page(&words::of_record(self), record::figures(self)?, settings)
+        result_page(&results::record_words(self), record::figures(self)?, settings)
     }
 }
 

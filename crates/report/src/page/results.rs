@@ -117,7 +117,7 @@ fn as_text(text: &str) -> Markup {
 }
 
 /// Returns the words on a bearing at one speed.
-pub fn of_bearing(found: &BearingSummary) -> Words {
+pub fn bearing_words(found: &BearingSummary) -> Words {
     let (warnings, merits) = verdicts(&found.checks, &found.remarks);
     let mut subtitle = Vec::new();
     if !found.baseline.is_empty() {
@@ -210,7 +210,7 @@ fn fit_of_bearing(found: &BearingSummary) -> Vec<Vec<String>> {
 }
 
 /// Returns the words on a bearing at several speeds and loads.
-pub fn of_speeds(found: &BearingTable) -> Words {
+pub fn campaign_words(found: &BearingTable) -> Words {
     let of_all = found.rows.iter().map(|row| verdicts(&row.checks, &row.remarks).0);
     let files: Vec<String> = found.rows.iter().flat_map(|row| row.tests.iter().cloned()).collect();
     Words {
@@ -225,7 +225,7 @@ pub fn of_speeds(found: &BearingTable) -> Words {
 }
 
 /// Returns the words on a reconstructed force.
-pub fn of_force(found: &ForceSummary) -> Words {
+pub fn force_words(found: &ForceSummary) -> Words {
     let extent = match found.periods {
         None => "open record".to_owned(),
         Some(1) => "one period".into(),
@@ -299,7 +299,7 @@ fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
 }
 
 /// Returns the words on frequency responses.
-pub fn of_responses(found: &FrfTable) -> Words {
+pub fn response_words(found: &FrfTable) -> Words {
     let row = |response: &Response| {
         let largest = response.magnitude.iter().copied().enumerate();
         let larger = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
@@ -358,17 +358,17 @@ pub fn of_responses(found: &FrfTable) -> Words {
 }
 
 /// Returns the words on the contents of a record.
-pub fn of_record(inspected: &Inspected) -> Words {
-    let found = inspected.summary();
+pub fn record_words(inspected: &Inspected) -> Words {
+    let summary = inspected.summary();
     let mut subtitle = vec![
-        found.format.clone(),
-        message::count(found.columns, "column"),
-        message::count(found.samples, "sample"),
+        summary.format.clone(),
+        message::count(summary.columns, "column"),
+        message::count(summary.samples, "sample"),
     ];
-    if let Some(window) = &found.window {
+    if let Some(window) = &summary.window {
         subtitle.push(format!("shown: samples {} to {}", window.first_sample, window.last_sample));
     }
-    subtitle.push(match &found.sampling {
+    subtitle.push(match &summary.sampling {
         Some(s) => format!("{} Hz, {} s long", compact(s.rate_hz, 8), compact(s.duration_s, 6)),
         None => "no time axis: give `time` or `sample_rate`".into(),
     });
@@ -379,16 +379,16 @@ pub fn of_record(inspected: &Inspected) -> Words {
             "column {title} is cut off at {level}: {samples} samples have this value, three or more in a row"
         ))
     };
-    let mut warnings: Vec<String> = found.channels.iter().filter_map(clipped).collect();
-    warnings.extend(found.remarks.iter().cloned());
-    warnings.extend(found.left_out.iter().map(|reason| format!("left out: {reason}")));
+    let mut warnings: Vec<String> = summary.channels.iter().filter_map(clipped).collect();
+    warnings.extend(summary.remarks.iter().cloned());
+    warnings.extend(summary.left_out.iter().map(|reason| format!("left out: {reason}")));
     let spectra = match inspected.spectral_samples() {
         Some((first, last)) => format!(" The spectra are those of samples {first} to {last}."),
         None => String::new(),
     };
     Words {
         what: "Contents",
-        files: vec![found.file.clone()],
+        files: vec![summary.file.clone()],
         subtitle,
         warnings,
         merits: Vec::new(),
@@ -398,7 +398,7 @@ pub fn of_record(inspected: &Inspected) -> Words {
 }
 
 fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
-    let found = inspected.summary();
+    let summary = inspected.summary();
     let levels = |c: &Channel| {
         let mut row = vec![c.title()];
         row.extend([c.mean, c.rms, c.peak].map(|value| significant(value, 5)));
@@ -406,7 +406,7 @@ fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
         row.extend([c.minimum, c.maximum].map(|value| significant(value, 5)));
         row
     };
-    let unit = if found.sampling.is_some() { "Hz" } else { "cycles/sample" };
+    let unit = if summary.sampling.is_some() { "Hz" } else { "cycles/sample" };
     let lines = |c: &Channel| {
         let (period, mismatch) = match &c.period {
             Some(period) => (period.samples.to_string(), percent(period.mismatch)),
@@ -420,16 +420,16 @@ fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
         vec![c.title(), period, mismatch, peaks.join(", ")]
     };
     let header = ["column", "mean", "RMS", "peak", "crest factor", "minimum", "maximum"];
-    let rows = found.channels.iter().map(levels).collect();
+    let rows = summary.channels.iter().map(levels).collect();
     let mut tables =
         vec![Table { caption: "Levels", header: &header, numbers_from: 1, rows }.html()];
-    let rows: Vec<_> = found.channels.iter().filter(|c| c.spectral).map(lines).collect();
+    let rows: Vec<_> = summary.channels.iter().filter(|c| c.spectral).map(lines).collect();
     if !rows.is_empty() {
         let amplitudes = format!("strongest lines, {unit}: amplitude");
         let header = ["column", "period, samples", "mismatch", &amplitudes];
         tables.push(Table { caption: "Lines", header: &header, numbers_from: 1, rows }.html());
     }
-    let scalars = found.scalars.iter().map(|scalar| pair(&scalar.name, scalar.value.to_string()));
+    let scalars = summary.scalars.iter().map(|scalar| pair(&scalar.name, scalar.value.to_string()));
     let rows: Vec<_> = scalars.collect();
     if !rows.is_empty() {
         tables.push(Table { caption: "Single numbers", header: &[], numbers_from: 9, rows }.html());
@@ -438,28 +438,28 @@ fn tables_of_record(inspected: &Inspected) -> Vec<Markup> {
 }
 
 /// Returns the words on an identified machine.
-pub fn of_identified(identified: &Identified) -> Words {
-    let found = identified.summary();
-    let (warnings, merits) = verdicts(&found.checks, &found.remarks);
+pub fn identified_words(identified: &Identified) -> Words {
+    let summary = identified.summary();
+    let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
     Words {
         what: "Identification",
-        files: found.records.iter().map(|record| record.file.clone()).collect(),
-        subtitle: vec![found.estimator.to_owned()],
+        files: summary.records.iter().map(|record| record.file.clone()).collect(),
+        subtitle: vec![summary.estimator.to_owned()],
         warnings,
         merits,
-        tables: vec![as_text(&found.to_string())],
+        tables: vec![as_text(&summary.to_string())],
         caption: "Measured, and computed with the identified machine.".into(),
     }
 }
 
 /// Returns the words on a machine that was identified from tables of responses.
-pub fn of_tables(identified: &IdentifiedResponses) -> Words {
-    let found = identified.summary();
-    let (warnings, merits) = verdicts(&found.checks, &found.remarks);
+pub fn table_words(identified: &IdentifiedResponses) -> Words {
+    let summary = identified.summary();
+    let (warnings, merits) = verdicts(&summary.checks, &summary.remarks);
     Words {
         what: "Identification",
-        files: found.files.clone(),
-        subtitle: vec![found.estimator.to_owned()],
+        files: summary.files.clone(),
+        subtitle: vec![summary.estimator.to_owned()],
         warnings,
         merits,
         tables: vec![as_text(&identified.to_string())],
