@@ -90,8 +90,8 @@ pub(super) fn search(
     let information = information(&start, lines, span)?;
     let slope = gradient(&start, lines, span)?;
     let mut fit = Fit { parameters: start, cost, information };
-    let held = if effort.holds_poles { 2 * fit.parameters.layout.modes } else { 0 };
-    let mut path = Path { lines, span, held, slope, damping: FIRST_DAMPING, updates: 0 };
+    let first_free = if effort.holds_poles { 2 * fit.parameters.layout.modes } else { 0 };
+    let mut path = Path { lines, span, first_free, slope, damping: FIRST_DAMPING, updates: 0 };
     let mut slow = 0;
     for _ in 0..effort.iterations {
         let gain = path.step(&mut fit)?;
@@ -119,8 +119,8 @@ pub(super) fn search(
 struct Path<'a> {
     lines: &'a [PooledLines],
     span: Span,
-    /// Number of parameters, the first ones, that stay as they are.
-    held: usize,
+    /// Index of the first parameter that may move; poles come before all others.
+    first_free: usize,
     /// Gradient at the parameters of the fit.
     slope: DVector<f64>,
     damping: f64,
@@ -158,15 +158,15 @@ impl Path<'_> {
         Some(0.0)
     }
 
-    /// Returns the step of the parameters that are not held.
+    /// Returns the next step, which is zero for the parameters that do not move.
     fn proposed(&self, information: &DMatrix<f64>) -> Option<DVector<f64>> {
-        let (held, free) = (self.held, self.slope.len() - self.held);
-        let information = information.view((held, held), (free, free)).into_owned();
-        let slope = self.slope.rows(held, free).into_owned();
-        let step = damped_step(&information, &slope, self.damping)?;
-        let mut all = DVector::zeros(held + free);
-        all.rows_mut(held, free).copy_from(&step);
-        Some(all)
+        let (first, free) = (self.first_free, self.slope.len() - self.first_free);
+        let information = information.view((first, first), (free, free)).into_owned();
+        let slope = self.slope.rows(first, free).into_owned();
+        let moves = damped_step(&information, &slope, self.damping)?;
+        let mut step = DVector::zeros(self.slope.len());
+        step.rows_mut(first, free).copy_from(&moves);
+        Some(step)
     }
 
     /// Computes the information at the parameters of the fit, unless it was computed there.
