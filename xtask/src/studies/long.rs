@@ -20,40 +20,38 @@ pub(super) struct Study {
     around: [&'static [&'static str]; 2],
     /// Experiments of the first run, by whose time the second is chosen.
     probe: u64,
-    table: Option<Table>,
+    page: Option<Page>,
 }
 
-/// Table of the book that a study writes anew.
-struct Table {
-    page: &'static str,
-    mark: &'static str,
-    /// Experiments that the page states; fewer leave it as it is.
+/// Page of the book whose tables a study writes anew.
+struct Page {
+    path: &'static str,
+    /// Experiments that the page states: no run has more, and fewer leave the page as it is.
     experiments: u64,
 }
 
 const fn study(name: &'static str, example: &'static str) -> Study {
-    Study { name, example, around: [&[], &[]], probe: 2, table: None }
+    Study { name, example, around: [&[], &[]], probe: 2, page: None }
+}
+
+impl Study {
+    const fn on(self, path: &'static str, experiments: u64) -> Self {
+        Self { page: Some(Page { path, experiments }), ..self }
+    }
 }
 
 const STUDIES: [Study; 11] = [
-    Study {
-        table: Some(Table {
-            page: "docs/book/src/studies/checks.md",
-            mark: "checks",
-            experiments: 1000,
-        }),
-        probe: 20,
-        ..study("checks", "checks_study")
-    },
+    Study { probe: 20, ..study("checks", "checks_study") }
+        .on("docs/book/src/studies/checks.md", 1000),
     study("faults", "fault_study"),
     study("parts", "parts_study"),
     study("random tests", "random_study"),
     study("hammer", "hammer_study"),
-    study("bearings", "bearing_study"),
+    study("bearings", "bearing_study").on("docs/book/src/studies/bearing.md", 1000),
     Study { around: [&[], &["auto"]], ..study("coloured noise", "coloured_noise_study") },
-    study("modes", "modal_study"),
-    study("decays", "decay_study"),
-    study("ambient", "ambient_study"),
+    study("modes", "modal_study").on("docs/book/src/studies/modes.md", 200),
+    study("decays", "decay_study").on("docs/book/src/studies/decays.md", 400),
+    study("ambient", "ambient_study").on("docs/book/src/studies/modes.md", 200),
     Study { around: [&["coverage"], &[]], probe: 4, ..study("forces", "noise_study") },
 ];
 
@@ -68,8 +66,8 @@ pub(super) fn chosen(only: &str) -> Result<Vec<&'static Study>, String> {
 }
 
 /// Runs studies in equal shares of the time; writes what each prints as text, the cells of all
-/// tables as Parquet, and the tables of the book that have enough experiments. Gives a line for
-/// each, and those that failed.
+/// tables as Parquet, and the tables of the book that state this number of experiments. Gives a line
+/// for each, and those that failed.
 pub(super) fn run(
     root: &Path,
     out: &Path,
@@ -94,12 +92,13 @@ pub(super) fn run(
         tables.iter().for_each(|table| cells.extend(table.cells(study.name)));
         let _ =
             writeln!(told, "{}: {experiments} experiments, {} tables", study.name, tables.len());
-        if let (Some(place), Some(table)) = (&study.table, tables.first())
+        if let Some(page) = &study.page
             && plan.out.is_none()
-            && experiments >= place.experiments
+            && experiments >= page.experiments
         {
-            page::rewrite(&root.join(place.page), place.mark, &table.text)?;
-            let _ = writeln!(told, "  written into {}", place.page);
+            let texts = tables.iter().map(|table| table.text.as_str());
+            let written = page::rewrite_tables(&root.join(page.path), texts)?;
+            let _ = writeln!(told, "  {written} written into {}", page.path);
         }
     }
     results::write_cells(&out.join("studies.parquet"), &cells)?;
@@ -113,7 +112,8 @@ impl Study {
         let printed = self.printed(program, self.probe, share)?;
         let each = start.elapsed().as_secs_f64() / self.probe as f64;
         let left = share.saturating_sub(start.elapsed());
-        let experiments = (left.as_secs_f64() / each.max(1e-6)) as u64;
+        let most = self.page.as_ref().map_or(u64::MAX, |page| page.experiments);
+        let experiments = ((left.as_secs_f64() / each.max(1e-6)) as u64).min(most);
         if experiments <= self.probe {
             return Ok((self.probe, printed));
         }

@@ -47,8 +47,40 @@ pub(super) fn write(root: &Path, coverages: &[Coverage]) -> Result<(), String> {
     rewrite(&place(root), "power", &power_sentence()?)
 }
 
+/// Replaces the tables of a page that have the header of a new one; returns how many.
+///
+/// # Errors
+/// The message of the file that fails; a page without any of these tables.
+pub(super) fn rewrite_tables<'a>(
+    page: &Path,
+    tables: impl Iterator<Item = &'a str>,
+) -> Result<usize, String> {
+    let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
+    let mut text = std::fs::read_to_string(page).map_err(|e| words(&e))?;
+    let mut written = 0;
+    for table in tables {
+        if let Some(range) = table_like(&text, table) {
+            text.replace_range(range, table);
+            written += 1;
+        }
+    }
+    if written == 0 {
+        return Err(words(&"no table has the header of those of the study"));
+    }
+    std::fs::write(page, text).map_err(|e| words(&e))?;
+    Ok(written)
+}
+
+/// Range of the table of a text that has the header of `table`.
+fn table_like(text: &str, table: &str) -> Option<std::ops::Range<usize>> {
+    let header = format!("\n{}\n", table.lines().next()?);
+    let start = text.find(&header)? + 1;
+    let rows = text[start..].split_inclusive('\n').take_while(|line| line.starts_with('|'));
+    Some(start..start + rows.map(str::len).sum::<usize>())
+}
+
 /// Replaces the text between the marks of a name; without marks the page is an error.
-pub(super) fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), String> {
+fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), String> {
     let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
     let text = std::fs::read_to_string(page).map_err(|e| words(&e))?;
     let marked = marked(&text, name).ok_or_else(|| words(&format!("no mark {name}")))?;
@@ -57,7 +89,7 @@ pub(super) fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), Stri
 }
 
 /// Range between the marks `<!-- NAME -->` and `<!-- end of NAME -->`.
-pub(super) fn marked(text: &str, name: &str) -> Option<std::ops::Range<usize>> {
+fn marked(text: &str, name: &str) -> Option<std::ops::Range<usize>> {
     let begin = format!("<!-- {name} -->");
     let start = text.find(&begin)? + begin.len();
     let end = start + text[start..].find(&format!("<!-- end of {name} -->"))?;
@@ -111,5 +143,18 @@ mod tests {
         let now = std::fs::read_to_string(&page).unwrap();
         assert_eq!(now, text.replace("old", "new"));
         assert!(rewrite(&page, "y", "").unwrap_err().ends_with("no mark y"));
+    }
+
+    #[test]
+    fn a_table_takes_the_place_of_that_with_its_header() {
+        let text = "a\n\n| x | y |\n|---|---|\n| 1 | 2 |\n| 3 | 4 |\n\n| x |\n|---|\n| 5 |\n";
+        let folder = tempfile::tempdir().unwrap();
+        let page = folder.path().join("page.md");
+        std::fs::write(&page, text).unwrap();
+        let new = "| x | y |\n|---|---|\n| 6 | 7 |\n";
+        assert_eq!(rewrite_tables(&page, [new, "| z |\n"].into_iter()), Ok(1));
+        let now = std::fs::read_to_string(&page).unwrap();
+        assert_eq!(now, "a\n\n| x | y |\n|---|---|\n| 6 | 7 |\n\n| x |\n|---|\n| 5 |\n");
+        assert!(rewrite_tables(&page, ["| z |\n"].into_iter()).is_err());
     }
 }

@@ -14,12 +14,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ambient_generator::{Quantity, Structure};
-use mechid_modal::ambient::{AmbientSettings, identify_ambient, ssi_cov};
+use ambient_generator::{Noise, Quantity, Structure};
+use mechid_modal::ambient::{AmbientMode, AmbientSettings, identify_ambient, ssi_cov};
 use mechid_modal::indicators::mac;
 use mechid_modal::stabilisation::{Pole, Stabilisation};
 use mechid_signal::Record;
-use nalgebra::{Complex, dmatrix};
+use nalgebra::{Complex, DVector, dmatrix};
 
 /// Structure, quantity, sampling rate, number of samples and noise of a case.
 struct Case {
@@ -28,7 +28,7 @@ struct Case {
     quantity: Quantity,
     rate_hz: f64,
     len: usize,
-    noise: f64,
+    noise: Noise,
 }
 
 impl Case {
@@ -65,13 +65,17 @@ fn cases() -> Vec<Case> {
         shapes: dmatrix![1.0, 0.8, -0.9].map(Complex::from),
         forces: dmatrix![1.0, 0.3; 2.0, -2.0; -3.0, 6.0],
     };
-    let case = |name, structure: &Structure, quantity, rate_hz, seconds: f64, noise| Case {
+    let case = |name, structure: &Structure, quantity, rate_hz, seconds: f64, level: f64| Case {
         name,
         structure: structure.clone(),
         quantity,
         rate_hz,
         len: (rate_hz * seconds) as usize,
-        noise,
+        noise: level.into(),
+    };
+    let with_pole = |name, pole| {
+        let case = case(name, &tower, Quantity::Acceleration, 20.0, 300.0, 0.1);
+        Case { noise: Noise { pole, ..case.noise }, ..case }
     };
     vec![
         case("tower, velocities", &tower, Quantity::Velocity, 25.0, 300.0, 0.05),
@@ -79,6 +83,9 @@ fn cases() -> Vec<Case> {
         case("complex shapes, displacements", &turned, Quantity::Displacement, 20.0, 400.0, 0.02),
         case("one sensor, velocities", &single, Quantity::Velocity, 30.0, 200.0, 0.05),
         case("tower, ten times as long", &tower, Quantity::Acceleration, 20.0, 3000.0, 0.1),
+        with_pole("tower, white noise", 0.0),
+        with_pole("tower, noise that rises with frequency", -0.5),
+        with_pole("tower, noise that falls steeply", 0.9),
     ]
 }
 
@@ -100,15 +107,25 @@ fn main() {
     let seeds = number(0).unwrap_or(4) as u64;
     let chosen = number(1);
     let folder = arguments.get(2).map(PathBuf::from);
-    for (index, case) in cases().iter().enumerate() {
+    let mut studies = Vec::new();
+    let cases = cases();
+    for (index, case) in cases.iter().enumerate() {
         if chosen.is_some_and(|chosen| chosen != index) {
             continue;
         }
         match &folder {
-            None => study(case, seeds),
+            None => studies.push(Study::new(case, seeds)),
             Some(folder) => write(case, seeds, folder).unwrap(),
         }
     }
+    println!(
+        "| Test | Records | f hold | ζ hold | Shapes hold | f over error | ζ over error | SSI | Modes found | False modes | Failed |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    );
+    studies.iter().for_each(Study::print_row);
+    println!(
+        "\n| Test | f, Hz | ζ | ζωT | f hold | ζ hold | Shapes hold | f over error | ζ over error | f bias | ζ bias | f RMS, % | ζ RMS, % | f of SSI | ζ of SSI | Orders, block rows |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
+    );
+    studies.iter().for_each(Study::print_modes);
 }
 
 /// Writes the records of a case, and its modes: true ones and estimates.
@@ -135,76 +152,145 @@ fn write(case: &Case, seeds: u64, folder: &Path) -> std::io::Result<()> {
     fs::write(folder.join(format!("{name}.modes.csv")), modes)
 }
 
-fn study(case: &Case, seeds: u64) {
-    let truth = &case.structure;
-    let modes = truth.frequencies_hz.len();
-    let mut tallies = vec![Tally::default(); modes];
-    let mut subspace = SubspaceErrors::new(modes);
-    let (mut spurious, mut failed) = (0, 0);
-    let (mut seconds, mut leakage) = (0.0, 0.0);
-    for seed in 0..seeds {
-        let record = case.record(1000 + seed);
-        let clock = Instant::now();
-        let estimate = identify_ambient(&record, &AmbientSettings::default());
-        seconds += clock.elapsed().as_secs_f64();
-        let Ok(estimate) = estimate else {
-            failed += 1;
-            continue;
-        };
-        leakage += estimate.leakage_share / seeds as f64;
-        subspace.add(0, &estimate.stabilisation, truth);
-        for (row, block_rows) in [20, 40, 80].into_iter().enumerate() {
-            let orders: Vec<usize> = (1..=20).map(|half| 2 * half).collect();
-            let samples = record.without_mean().into_data();
-            if let Some(models) = ssi_cov(&samples, 1.0 / case.rate_hz, block_rows, &orders) {
-                subspace.add(row + 1, &models, truth);
-            }
-        }
-        let mut taken = vec![false; estimate.modes.len()];
-        for (r, tally) in tallies.iter_mut().enumerate() {
-            let (f, zeta) = (truth.frequencies_hz[r], truth.dampings[r]);
-            let shape = truth.shapes.column(r).into_owned();
-            let distance = |index: &usize| {
-                let mode = &estimate.modes[*index];
-                let gap = (mode.natural_frequency_hz.value / f - 1.0).abs();
-                gap + 0.02 * (1.0 - mac(mode.shape.shape(), &shape))
-            };
-            let free = (0..taken.len()).filter(|index| !taken[*index]);
-            let Some(best) = free.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
+/// Results of one case.
+struct Study<'a> {
+    case: &'a Case,
+    seeds: u64,
+    modes: Vec<ModeResult>,
+    false_modes: usize,
+    failed: usize,
+}
+
+/// Results of one mode.
+struct ModeResult {
+    decay_times: f64,
+    found: usize,
+    /// Percentages of intervals that hold: f, ζ and shape.
+    held: [f64; 3],
+    /// Scatter over standard error of f and ζ.
+    scatter: [f64; 2],
+    /// Bias over scatter of f and ζ.
+    bias: [f64; 2],
+    /// Relative root-mean-square errors of f and ζ.
+    rms: [f64; 2],
+    subspace: [BestSubspace; 2],
+}
+
+impl<'a> Study<'a> {
+    fn new(case: &'a Case, seeds: u64) -> Self {
+        let truth = &case.structure;
+        let modes = truth.frequencies_hz.len();
+        let mut tallies = vec![Tally::default(); modes];
+        let mut subspace = SubspaceErrors::new(modes);
+        let (mut false_modes, mut failed) = (0, 0);
+        let (mut seconds, mut leakage) = (0.0, 0.0);
+        for seed in 0..seeds {
+            let record = case.record(1000 + seed);
+            let clock = Instant::now();
+            let estimate = identify_ambient(&record, &AmbientSettings::default());
+            seconds += clock.elapsed().as_secs_f64();
+            let Ok(estimate) = estimate else {
+                failed += 1;
                 continue;
             };
-            let mode = &estimate.modes[best];
-            if (mode.natural_frequency_hz.value / f - 1.0).abs() > 2.0 * zeta {
-                continue;
-            }
-            taken[best] = true;
-            tally.add(mode, [f, zeta], &shape);
+            leakage += estimate.leakage_share;
+            subspace.add_all(&record, &estimate.stabilisation, truth);
+            let taken = tally_modes(&mut tallies, &estimate.modes, truth);
+            false_modes += estimate.modes.len() - taken;
         }
-        spurious += taken.iter().filter(|taken| !**taken).count();
-    }
-    let mean = seconds / seeds as f64;
-    println!(
-        "\n{}: {seeds} seeds, {spurious} false modes, {failed} failed, {mean:.2} s each, leakage {leakage:.3}",
-        case.name
-    );
-    println!(
-        "  f Hz    ζ %   ζωT | found  cover f  ζ  shape % | scatter/s.e. f  ζ | bias/s.d. f  ζ | RMS % f  ζ | SSI best order/ours f  ζ (order, rows)"
-    );
-    for (r, tally) in tallies.iter().enumerate() {
+        let (seconds, leakage) = (seconds / seeds as f64, leakage / (seeds - failed) as f64);
+        eprintln!("{}: {seconds:.2} s a record, leakage {leakage:.3}", case.name);
+        let failed = failed as usize;
         let duration = case.len as f64 / case.rate_hz;
-        let decay_times =
-            truth.dampings[r] * truth.frequencies_hz[r] * std::f64::consts::TAU * duration;
-        tally.print([truth.frequencies_hz[r], truth.dampings[r]], decay_times, subspace.best(r));
+        let result = |(r, tally): (usize, &Tally)| {
+            let decay_rate = truth.dampings[r] * truth.frequencies_hz[r] * std::f64::consts::TAU;
+            tally.result(decay_rate * duration, subspace.best(r))
+        };
+        let modes = tallies.iter().enumerate().map(result).collect();
+        Self { case, seeds, modes, false_modes, failed }
+    }
+
+    fn print_row(&self) {
+        let range = |value: &dyn Fn(&ModeResult) -> f64, digits: usize| {
+            let fold = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+            let (low, high) = self.modes.iter().map(value).fold((f64::INFINITY, 0.0), fold);
+            if low > high { "–".to_owned() } else { format!("{low:.digits$} to {high:.digits$}") }
+        };
+        let found: usize = self.modes.iter().map(|mode| mode.found).sum();
+        println!(
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {} | {} |",
+            self.case.name,
+            self.seeds,
+            range(&|mode| mode.held[0], 1),
+            range(&|mode| mode.held[1], 1),
+            range(&|mode| mode.held[2], 1),
+            range(&|mode| mode.scatter[0], 2),
+            range(&|mode| mode.scatter[1], 2),
+            range(&|mode| mode.subspace[1].rms / mode.rms[1], 2),
+            percent(found, self.seeds as usize * self.modes.len()),
+            self.false_modes,
+            self.failed,
+        );
+    }
+
+    fn print_modes(&self) {
+        let truth = &self.case.structure;
+        for (r, mode) in self.modes.iter().enumerate() {
+            let [f, zeta] = &mode.subspace;
+            println!(
+                "| {} | {} | {} | {:.0} | {:.1} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.2} | {:.4} | {:.2} | {:.2} | {:.2} | {}, {}; {}, {} |",
+                self.case.name,
+                truth.frequencies_hz[r],
+                truth.dampings[r],
+                mode.decay_times,
+                mode.held[0],
+                mode.held[1],
+                mode.held[2],
+                mode.scatter[0],
+                mode.scatter[1],
+                mode.bias[0],
+                mode.bias[1],
+                100.0 * mode.rms[0],
+                100.0 * mode.rms[1],
+                f.rms / mode.rms[0],
+                zeta.rms / mode.rms[1],
+                f.order,
+                f.block_rows,
+                zeta.order,
+                zeta.block_rows,
+            );
+        }
     }
 }
 
+/// Adds to each true mode the nearest estimate that no other has; returns how many have one.
+fn tally_modes(tallies: &mut [Tally], modes: &[AmbientMode], truth: &Structure) -> usize {
+    let mut taken = vec![false; modes.len()];
+    for (r, tally) in tallies.iter_mut().enumerate() {
+        let (f, zeta) = (truth.frequencies_hz[r], truth.dampings[r]);
+        let shape = truth.shapes.column(r).into_owned();
+        let distance = |index: &usize| {
+            let mode = &modes[*index];
+            let gap = (mode.natural_frequency_hz.value / f - 1.0).abs();
+            gap + 0.02 * (1.0 - mac(mode.shape.shape(), &shape))
+        };
+        let free = (0..taken.len()).filter(|index| !taken[*index]);
+        let Some(best) = free.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { continue };
+        let mode = &modes[best];
+        if (mode.natural_frequency_hz.value / f - 1.0).abs() <= 2.0 * zeta {
+            taken[best] = true;
+            tally.add(mode, [f, zeta], &shape);
+        }
+    }
+    taken.iter().filter(|taken| **taken).count()
+}
+
+fn percent(count: usize, of: usize) -> f64 {
+    100.0 * count as f64 / of as f64
+}
+
 impl Tally {
-    fn add(
-        &mut self,
-        mode: &mechid_modal::ambient::AmbientMode,
-        truth: [f64; 2],
-        shape: &nalgebra::DVector<Complex<f64>>,
-    ) {
+    fn add(&mut self, mode: &AmbientMode, truth: [f64; 2], shape: &DVector<Complex<f64>>) {
         self.found += 1;
         let values = [mode.natural_frequency_hz, mode.damping_ratio];
         for (k, value) in values.into_iter().enumerate() {
@@ -230,40 +316,32 @@ impl Tally {
         }
     }
 
-    fn print(&self, truth: [f64; 2], decay_times: f64, subspace: [(f64, usize, usize); 2]) {
-        let n = self.found.max(1) as f64;
-        let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+    fn result(&self, decay_times: f64, subspace: [BestSubspace; 2]) -> ModeResult {
+        let n = self.found as f64;
         let mean = self.sums.map(|sum| sum / n);
-        let rms = self.squares.map(|sum| (sum / n).sqrt());
         let scatter = [0, 1].map(|k| (self.squares[k] / n - mean[k] * mean[k]).max(0.0).sqrt());
-        let predicted = self.predicted.map(|sum| (sum / self.intervals.max(1) as f64).sqrt());
-        println!(
-            "{:6.2} {:6.2} {:5.0} | {:4}  {:6.1} {:6.1} {:6.1} | {:6.2} {:6.2} | {:6.2} {:6.2} | {:7.4} {:6.2} | {:5.2} {:5.2} ({}, {}) ({}, {})",
-            truth[0],
-            100.0 * truth[1],
+        let predicted = self.predicted.map(|sum| (sum / self.intervals as f64).sqrt());
+        ModeResult {
             decay_times,
-            self.found,
-            percent(self.covered[0], self.intervals),
-            percent(self.covered[1], self.intervals),
-            percent(self.shapes[0], self.shapes[1]),
-            scatter[0] / predicted[0],
-            scatter[1] / predicted[1],
-            mean[0] / scatter[0],
-            mean[1] / scatter[1],
-            100.0 * rms[0],
-            100.0 * rms[1],
-            subspace[0].0 / rms[0],
-            subspace[1].0 / rms[1],
-            subspace[0].1,
-            subspace[0].2,
-            subspace[1].1,
-            subspace[1].2,
-        );
+            found: self.found,
+            held: [
+                percent(self.covered[0], self.intervals),
+                percent(self.covered[1], self.intervals),
+                percent(self.shapes[0], self.shapes[1]),
+            ],
+            scatter: [0, 1].map(|k| scatter[k] / predicted[k]),
+            bias: [0, 1].map(|k| mean[k] / scatter[k]),
+            rms: self.squares.map(|sum| (sum / n).sqrt()),
+            subspace,
+        }
     }
 }
 
-/// Block rows of the subspace models: those of the estimate, then three others.
-const ROWS: usize = 4;
+/// Block rows of the subspace models beside those of the estimate.
+const BLOCK_ROWS: [usize; 3] = [20, 40, 80];
+
+/// Settings of subspace models: those of the estimate first.
+const ROWS: usize = 1 + BLOCK_ROWS.len();
 
 /// Largest half order of a subspace model.
 const HALF_ORDERS: usize = 24;
@@ -277,6 +355,19 @@ struct SubspaceErrors {
 impl SubspaceErrors {
     fn new(modes: usize) -> Self {
         Self { sums: vec![[[[0.0; 3]; HALF_ORDERS]; ROWS]; modes], records: 0 }
+    }
+
+    /// Adds the subspace models of a record: those of the estimate, and of other block rows.
+    fn add_all(&mut self, record: &Record, of_estimate: &Stabilisation, truth: &Structure) {
+        self.add(0, of_estimate, truth);
+        let orders: Vec<usize> = (1..=20).map(|half| 2 * half).collect();
+        let samples = record.without_mean().into_data();
+        for (row, block_rows) in (1..).zip(BLOCK_ROWS) {
+            let models = ssi_cov(&samples, record.sampling().dt(), block_rows, &orders);
+            if let Some(models) = models {
+                self.add(row, &models, truth);
+            }
+        }
     }
 
     /// Adds for each true mode the pole of each order that is nearest to it.
@@ -308,23 +399,33 @@ impl SubspaceErrors {
         }
     }
 
-    /// Returns the smallest RMS errors of f and ζ of one mode over the orders and settings that see every mode
-    /// in 90 % of the records, with order and block rows (0: those of the estimate).
-    fn best(&self, mode: usize) -> [(f64, usize, usize); 2] {
+    /// Returns the smallest RMS errors of f and ζ of one mode over the orders and settings that see
+    /// every mode in 90 % of the records.
+    fn best(&self, mode: usize) -> [BestSubspace; 2] {
         let seen = |row: usize, half: usize| {
             self.sums.iter().all(|sums| sums[row][half][2] > 0.9 * self.records as f64)
         };
         [0, 1].map(|k| {
-            let mut best = (f64::INFINITY, 0, 0);
+            let mut best = BestSubspace { rms: f64::INFINITY, order: 0, block_rows: 0 };
             for (row, halves) in self.sums[mode].iter().enumerate() {
                 for (half, sums) in halves.iter().enumerate() {
                     let rms = (sums[k] / sums[2]).sqrt();
-                    if seen(row, half) && rms < best.0 {
-                        best = (rms, 2 * half + 2, [0, 20, 40, 80][row]);
+                    if seen(row, half) && rms < best.rms {
+                        let block_rows = row.checked_sub(1).map_or(0, |other| BLOCK_ROWS[other]);
+                        best = BestSubspace { rms, order: 2 * half + 2, block_rows };
                     }
                 }
             }
             best
         })
     }
+}
+
+/// Subspace models with the smallest error.
+#[derive(Clone, Copy)]
+struct BestSubspace {
+    rms: f64,
+    order: usize,
+    /// 0: those of the estimate.
+    block_rows: usize,
 }

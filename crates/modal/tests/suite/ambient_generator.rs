@@ -28,6 +28,21 @@ pub enum Quantity {
     Acceleration,
 }
 
+/// Noise of the sensors: a first-order autoregression.
+#[derive(Clone, Copy)]
+pub struct Noise {
+    /// Root-mean-square over that of each channel.
+    pub level: f64,
+    /// Pole of the autoregression: 0 for white noise, negative for noise that rises with frequency.
+    pub pole: f64,
+}
+
+impl From<f64> for Noise {
+    fn from(level: f64) -> Self {
+        Self { level, pole: 0.5 }
+    }
+}
+
 impl Structure {
     pub fn poles(&self) -> Vec<Complex<f64>> {
         let pole = |(f, z): (&f64, &f64)| Complex::new(-z, (1.0 - z * z).sqrt()) * (f * TAU);
@@ -41,7 +56,7 @@ impl Structure {
         quantity: Quantity,
         rate_hz: f64,
         len: usize,
-        noise: f64,
+        noise: impl Into<Noise>,
         seed: u64,
     ) -> Record {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -79,12 +94,18 @@ impl Structure {
                 state[r] = factors[r] * state[r] + added[r];
             }
         }
-        with_noise(data, rate_hz, noise, seed)
+        with_noise(data, rate_hz, noise.into(), seed)
     }
 
     /// Record of accelerations: a piece of a four times longer steady state under forces that are
     /// white up to 90 % of half the sampling rate.
-    pub fn accelerations(&self, rate_hz: f64, len: usize, noise: f64, seed: u64) -> Record {
+    pub fn accelerations(
+        &self,
+        rate_hz: f64,
+        len: usize,
+        noise: impl Into<Noise>,
+        seed: u64,
+    ) -> Record {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let long = 4 * len;
         let poles = self.poles();
@@ -110,21 +131,20 @@ impl Structure {
             inverse.process(line, &mut output).unwrap();
             data.column_mut(i).copy_from_slice(&output[len..2 * len]);
         }
-        with_noise(data, rate_hz, noise, seed)
+        with_noise(data, rate_hz, noise.into(), seed)
     }
 }
 
-/// Adds noise of each sensor: white and first-order low-pass parts, together `noise` of the RMS
-/// value.
-fn with_noise(mut data: DMatrix<f64>, rate_hz: f64, noise: f64, seed: u64) -> Record {
+/// Adds the noise of each sensor.
+fn with_noise(mut data: DMatrix<f64>, rate_hz: f64, noise: Noise, seed: u64) -> Record {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let len = data.nrows();
     for mut column in data.column_iter_mut() {
-        let level = noise * (column.norm_squared() / len as f64).sqrt();
+        let level = noise.level * (column.norm_squared() / len as f64).sqrt();
         let mut state: f64 = StandardNormal.sample(&mut random);
         for sample in column.iter_mut() {
             let fresh: f64 = StandardNormal.sample(&mut random);
-            state = 0.5 * state + 0.75f64.sqrt() * fresh;
+            state = noise.pole * state + (1.0 - noise.pole * noise.pole).sqrt() * fresh;
             *sample += level * state;
         }
     }

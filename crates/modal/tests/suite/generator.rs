@@ -277,7 +277,7 @@ fn case(
 /// One accelerometer, one force, five modes in the band and two outside.
 pub fn one_by_one() -> Case {
     let mut case = case(
-        "1x1, modes outside",
+        "1x1, modes outside the band",
         &[12.0, 48.0, 90.0, 131.0, 155.0, 210.0, 320.0],
         &[0.01, 0.008, 0.005, 0.004, 0.006, 0.005, 0.006],
         [1, 1],
@@ -365,8 +365,8 @@ pub fn cases() -> Vec<Case> {
         pair(30),
         reciprocal(),
         beyond_the_edge(),
-        with("8x2, unmeasured forces 5 %", &|case| case.unmeasured = 0.05),
-        with("8x2, noise 3 % on the forces", &|case| case.force_noise = 0.03),
+        with("8x2, unmeasured forces of 5 %", &|case| case.unmeasured = 0.05),
+        with("8x2, noise of 3 % on the forces", &|case| case.force_noise = 0.03),
         with("8x2, 2 s instead of 8 s", &|case| case.samples = 2048),
         with("8x2, pair 0.3 % apart", &|case| case.frequency_hz[3] = 131.4),
     ]
@@ -376,7 +376,7 @@ pub fn cases() -> Vec<Case> {
 pub fn roving(points: usize) -> Case {
     let mut case = hammer();
     let mut normal = Normal::new(7);
-    case.name = "1 accelerometer, roving hammer";
+    case.name = "1 accelerometer, hammer on 12 points";
     case.samples = 4096;
     case.roving = true;
     for (shape, participation) in case.shape.iter_mut().zip(&mut case.participation) {

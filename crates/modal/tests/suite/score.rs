@@ -168,9 +168,9 @@ impl Score {
         self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im + ROUNDING);
     }
 
-    /// Returns the percentage of 95 % intervals of shapes that hold the truth.
+    /// Returns the percentage of 95 % intervals of shapes that hold the truth; NaN without shapes.
     pub fn shape_coverage(&self) -> f64 {
-        100.0 * self.shape_holds as f64 / self.shape_count.max(1) as f64
+        100.0 * self.shape_holds as f64 / self.shape_count as f64
     }
 
     /// Returns the percentage of modes that were found.
