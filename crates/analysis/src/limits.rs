@@ -40,9 +40,9 @@ pub const REST_RECORDS: usize = 8;
 
 /// Minimum relative uncertainty of the standard errors for a remark: that of 12 degrees of freedom.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
-/// Minimum share of the variance of a response that the modes of a test must explain. With less,
-/// most of the response has another cause, and the entries of the shapes at this response are
-/// unreliable.
+/// Minimum share of the variance of a response that the modes of a test must explain, and predict
+/// where it was not fitted. With less, most of the response has another cause, and the entries of
+/// the shapes at this response are unreliable.
 pub const LEAST_EXPLAINED: f64 = 0.5;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest

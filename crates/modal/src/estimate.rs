@@ -111,6 +111,11 @@ impl ModalEstimate {
         &self.modes
     }
 
+    /// Returns the poles of all modes of the model, also of those that were not requested.
+    pub(crate) fn poles(&self) -> Vec<C> {
+        self.modes.iter().chain(&self.others).map(|mode| mode.pole).collect()
+    }
+
     /// Returns the modes with the joint covariance of their shapes, for comparisons.
     pub fn compared_modes(&self) -> Vec<ComparedMode> {
         let measured = |value: Uncertain| Measured {
@@ -135,6 +140,32 @@ impl ModalEstimate {
     /// [`IndicatorError::Size`] if the numbers of outputs differ.
     pub fn changes_to(&self, other: &Self) -> Result<Comparison, IndicatorError> {
         compare(&self.compared_modes(), &other.compared_modes(), PairingRule::default())
+    }
+
+    /// Returns the same estimate with the standard errors of each of its modes multiplied by its
+    /// entry of `scales` (pure numbers): for data that disagree by more than their noise.
+    ///
+    /// # Errors
+    /// [`ModalError::Setting`] for another number of modes, or a scale that is not positive and
+    /// finite.
+    ///
+    /// # Source
+    /// Birge (1932), Physical Review 40, 207–227.
+    pub fn with_error_scales(mut self, scales: &[f64]) -> Result<Self, ModalError> {
+        let refused = |value, required| ModalError::Setting { setting: "scales", value, required };
+        if scales.len() != self.modes.len() {
+            return Err(refused(scales.len() as f64, "one for each mode"));
+        }
+        if let Some(bad) = scales.iter().find(|scale| !(scale.is_finite() && **scale > 0.0)) {
+            return Err(refused(*bad, "positive and finite"));
+        }
+        let all = self.modes.iter_mut().zip(&mut self.parameters).zip(scales);
+        for ((mode, parameters), scale) in all {
+            *mode = mode.clone().with_error_scale(*scale);
+            parameters.covariance *= scale * scale;
+        }
+        self.model.scale_errors(scales);
+        Ok(self)
     }
 
     /// Returns the test of each constraint of the settings on each mode, against the fit without

@@ -83,6 +83,28 @@ pub fn identify_modes(
     search.finish()
 }
 
+/// Fits the modes of an estimate to other data of the same structure: a part of the record, or a
+/// record of another day.
+///
+/// The search starts from the poles of the estimate and has its residual powers; modes that the
+/// data do not determine are left out.
+///
+/// # Errors
+/// [`ModalError`] as of [`identify_modes`].
+pub fn refit_modes(
+    data: &LineData,
+    estimate: &ModalEstimate,
+    settings: &ModalSettings,
+) -> Result<ModalEstimate, ModalError> {
+    let residual_powers = Some(estimate.residual_powers().clone());
+    let settings = ModalSettings { residual_powers, modes: None, ..settings.clone() };
+    let lines = Lines::new(data);
+    lines.check()?;
+    let mut search = Identification::from_poles(&lines, &settings, estimate.poles());
+    search.apply_rules();
+    search.finish()
+}
+
 fn check_settings(settings: &ModalSettings) -> Result<(), ModalError> {
     if settings.modes == Some(0) || settings.max_modes == 0 {
         let required = "at least 1";
@@ -107,13 +129,18 @@ struct Identification<'a> {
 impl<'a> Identification<'a> {
     /// Searches from the poles of the subspace method, and from the requested frequencies.
     fn new(lines: &'a Lines, settings: &'a ModalSettings) -> Result<Self, ModalError> {
-        let powers = settings.residual_powers.clone().unwrap_or_else(|| first_powers(lines));
         let mut poles = initial_poles(lines)?;
         log::debug!("{} poles to start with", poles.len());
         if !settings.near_hz.is_empty() {
             poles.extend(missing_poles(&poles, &settings.near_hz));
         }
         poles.truncate(settings.max_modes);
+        Ok(Self::from_poles(lines, settings, poles))
+    }
+
+    /// Searches from given poles.
+    fn from_poles(lines: &'a Lines, settings: &'a ModalSettings, poles: Vec<Complex<f64>>) -> Self {
+        let powers = settings.residual_powers.clone().unwrap_or_else(|| first_powers(lines));
         let level = |output: &Vec<Complex<f64>>| {
             let power = output.iter().map(|z| z.norm_sqr()).sum::<f64>();
             0.1 * (power / output.len() as f64).sqrt()
@@ -132,7 +159,7 @@ impl<'a> Identification<'a> {
         identification.search_with_noise();
         identification.remove_impossible();
         identification.update_noise();
-        Ok(identification)
+        identification
     }
 
     /// Estimates the noise from the current fit and searches again with its weights.

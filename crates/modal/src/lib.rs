@@ -57,7 +57,7 @@ pub use mechid_numerics::Uncertain;
 pub use constraint::{ConstraintTest, DrivingPoint, ModalConstraint};
 pub use error::ModalError;
 pub use estimate::ModalEstimate;
-pub use identify::{ModalSettings, identify_modes};
+pub use identify::{ModalSettings, identify_modes, refit_modes};
 pub use initial_poles::{initial_mode_count, stabilisation_of};
 pub use modal_model::{ModalGroup, ModalModel, ModalTerm};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};

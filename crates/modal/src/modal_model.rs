@@ -64,6 +64,15 @@ impl ModalGroup {
         Self { modes, covariance: (0..covariance.nrows()).map(row).collect() }
     }
 
+    /// Multiplies the standard errors of each mode by its entry of `scales`.
+    fn scale_errors(&mut self, terms: &[ModalTerm], scales: &[f64]) {
+        let of_mode = |mode: &usize| std::iter::repeat_n(scales[*mode], terms[*mode].parameters());
+        let scale: Vec<f64> = self.modes.iter().flat_map(of_mode).collect();
+        for (a, row) in self.covariance.iter_mut().enumerate() {
+            row.iter_mut().enumerate().for_each(|(b, value)| *value *= scale[a] * scale[b]);
+        }
+    }
+
     fn entry(&self, a: usize, b: usize) -> f64 {
         self.covariance[a.max(b)][a.min(b)]
     }
@@ -149,6 +158,11 @@ impl ModalModel {
             && self.terms.iter().all(fits)
             && self.residuals.iter().all(whole)
             && self.groups.iter().all(grouped)
+    }
+
+    /// Multiplies the standard errors of each mode of the groups by its entry of `scales`.
+    pub(crate) fn scale_errors(&mut self, scales: &[f64]) {
+        self.groups.iter_mut().for_each(|group| group.scale_errors(&self.terms, scales));
     }
 
     /// Returns the frequency response at ω (rad/s), outputs × inputs.

@@ -36,6 +36,17 @@ pub struct IdentifiedMode {
 }
 
 impl IdentifiedMode {
+    /// Returns the same mode with all standard errors multiplied by `scale`.
+    #[must_use]
+    pub fn with_error_scale(mut self, scale: f64) -> Self {
+        self.natural_frequency_hz.standard_error *= scale;
+        self.damping_ratio.standard_error *= scale;
+        self.frequency_damping_covariance *= scale * scale;
+        let errors = self.shape_standard_error.iter_mut();
+        errors.chain(&mut self.participation_standard_error).for_each(|error| *error *= scale);
+        self
+    }
+
     /// Returns the residue of an output and an input: the numerator of 1/(jω − λ) in their
     /// response.
     pub fn residue(&self, output: usize, input: usize) -> Complex<f64> {

@@ -173,13 +173,9 @@ fn largest_change(before: &[IdentifiedMode], after: &[IdentifiedMode]) -> f64 {
     before.iter().zip(after).map(change).fold(0.0, f64::max)
 }
 
-/// Returns a mode without the decay rate (1/s) of an exponential window, and with standard errors
-/// multiplied by `inflation`.
-pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64) -> IdentifiedMode {
+/// Returns a mode without the decay rate (1/s) of an exponential window.
+pub(super) fn without_decay(mode: &IdentifiedMode, added_decay: f64) -> IdentifiedMode {
     let mut mode = mode.clone();
-    let scaled = |errors: &mut Vec<Complex<f64>>| errors.iter_mut().for_each(|e| *e *= inflation);
-    scaled(&mut mode.shape_standard_error);
-    scaled(&mut mode.participation_standard_error);
     let (f, zeta) = (mode.natural_frequency_hz, mode.damping_ratio);
     let variance = [f.standard_error.powi(2), zeta.standard_error.powi(2)];
     let between = mode.frequency_damping_covariance;
@@ -187,7 +183,7 @@ pub(super) fn corrected(mode: &IdentifiedMode, added_decay: f64, inflation: f64)
     mode.pole.re += added_decay;
     let slopes = frequency_and_damping_slopes(mode.pole) * pole_slopes(f.value, zeta.value);
     let covariance = nalgebra::Matrix2::new(variance[0], between, between, variance[1]);
-    let covariance = slopes * covariance * slopes.transpose() * inflation.powi(2);
+    let covariance = slopes * covariance * slopes.transpose();
     let size = mode.pole.norm();
     mode.natural_frequency_hz.value = size / TAU;
     mode.natural_frequency_hz.standard_error = covariance[(0, 0)].max(0.0).sqrt();

@@ -7,12 +7,13 @@ use mechid_signal::message;
 use mechid_spectra::LineData;
 use nalgebra::{Complex, DMatrix};
 
-use super::averaged::{Sharpened, corrected};
+use super::averaged::{Sharpened, without_decay};
 use super::checks;
 use super::diagrams::{DiagramData, Forced};
+use super::halves::Halves;
 use super::rows::{dropped, mac, notes, row};
 use super::settings::ModesSettings;
-use super::sources::{Output, Part, Recorded};
+use super::sources::{Output, Recorded};
 use super::summary::{LEVEL, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
 use super::tables::Tables;
 use super::validation::explained;
@@ -57,13 +58,18 @@ impl Test {
     pub fn modes(
         self,
         records: Vec<RecordRow>,
-        checks: Vec<ModalCheck>,
+        mut checks: Vec<ModalCheck>,
         settings: &ModesSettings,
     ) -> Result<Modes, AnalysisError> {
         let Self { recorded, band_hz } = self;
         let named = |error| named(error, &recorded.inputs, &recorded.outputs);
         let data = recorded.lines(band_hz)?;
-        let estimate = identify_modes(&data, &engine_settings(settings)).map_err(named)?;
+        let engine = engine_settings(settings);
+        let mut estimate = identify_modes(&data, &engine).map_err(named)?;
+        if let Some(halves) = Halves::new(&recorded, band_hz, &estimate, &engine) {
+            estimate = estimate.with_error_scales(&halves.error_scales)?;
+            checks.push(halves.check);
+        }
         let predicted = match settings.validate {
             0.0 => None,
             share => Some(predicted(&recorded, band_hz, share, settings)?),
@@ -102,9 +108,11 @@ pub(super) fn modes_of_tables(
             },
         )?;
     let Sharpened { data, estimate, settled } = fit;
-    let (decay, inflation) = (tables.added_decay.unwrap_or(0.0), tables.error_inflation());
-    let correct = |mode| corrected(mode, decay, inflation);
-    let modes: Vec<IdentifiedMode> = estimate.modes().iter().map(correct).collect();
+    let scales = vec![tables.error_inflation(); estimate.modes().len()];
+    let estimate = estimate.with_error_scales(&scales)?;
+    let decay = tables.added_decay.unwrap_or(0.0);
+    let modes: Vec<IdentifiedMode> =
+        estimate.modes().iter().map(|mode| without_decay(mode, decay)).collect();
     let mut notes = Vec::new();
     if tables.added_decay.is_some() {
         notes.push(format!(
@@ -184,26 +192,9 @@ fn predicted(
     share: f64,
     settings: &ModesSettings,
 ) -> Result<Vec<f64>, AnalysisError> {
-    let part = |from: f64, to: f64| -> Result<Recorded, AnalysisError> {
-        let cut = |part: &Part| {
-            let len = part.responses.len();
-            let first = (from * len as f64).round() as usize;
-            let samples = (to * len as f64).round() as usize - first;
-            let forces = part.forces.as_ref().map(|f| f.window(first, samples)).transpose()?;
-            Ok(Part { forces, responses: part.responses.window(first, samples)? })
-        };
-        let parts = recorded.parts.iter().map(cut).collect::<Result<_, AnalysisError>>()?;
-        Ok(Recorded {
-            parts,
-            inputs: recorded.inputs.clone(),
-            outputs: recorded.outputs.clone(),
-            driving_points: Vec::new(),
-            hits: Vec::new(),
-        })
-    };
-    let fitted =
-        identify_modes(&part(0.0, 1.0 - share)?.lines(band_hz)?, &engine_settings(settings))?;
-    let end = part(1.0 - share, 1.0)?.lines(band_hz)?;
+    let beginning = recorded.between(0.0, 1.0 - share)?;
+    let fitted = identify_modes(&beginning.lines(band_hz)?, &engine_settings(settings))?;
+    let end = recorded.between(1.0 - share, 1.0)?.lines(band_hz)?;
     let model = fitted.synthesis(&end)?;
     Ok(explained(end.outputs(), &model))
 }
@@ -215,6 +206,7 @@ impl Context {
         let explained = estimate.variance_explained();
         let mut rows = self.checks;
         rows.extend(checks::output_checks(&explained, &names));
+        rows.extend(checks::prediction_checks(self.predicted.as_deref().unwrap_or(&[]), &names));
         rows.extend(checks::mode_checks(
             &reported,
             &self.inputs,

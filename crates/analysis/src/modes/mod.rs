@@ -7,6 +7,7 @@ mod checks;
 mod comparison;
 mod diagrams;
 mod forced;
+mod halves;
 mod initial_motion;
 mod mode_set;
 mod prediction;

@@ -35,6 +35,17 @@ pub(super) struct Part {
     pub responses: Record,
 }
 
+impl Part {
+    /// Returns the samples between two shares of the length.
+    fn between(&self, from: f64, to: f64) -> Result<Self, AnalysisError> {
+        let len = self.responses.len() as f64;
+        let [first, end] = [from, to].map(|share| (share * len).round() as usize);
+        let cut = |record: &Record| record.window(first, end - first);
+        let forces = self.forces.as_ref().map(cut).transpose()?;
+        Ok(Self { forces, responses: cut(&self.responses)? })
+    }
+}
+
 /// A response.
 #[derive(Debug, Clone)]
 pub(super) struct Output {
@@ -83,6 +94,53 @@ impl Recorded {
     /// Returns the band, in Hz, that the forces excite.
     pub fn driven_band(&self) -> [f64; 2] {
         driven_band(self.parts.iter().filter_map(|part| part.forces.as_ref()))
+    }
+
+    /// Returns the parts of all records between two shares of their length, from 0 to 1.
+    pub fn between(&self, from: f64, to: f64) -> Result<Self, AnalysisError> {
+        let parts =
+            self.parts.iter().map(|part| part.between(from, to)).collect::<Result<_, _>>()?;
+        Ok(self.with_parts(parts))
+    }
+
+    /// Returns the two halves of a single record, or the first and the second half of several.
+    ///
+    /// Forces that are zero in a half are not among its inputs.
+    pub fn halves(&self) -> Result<[Self; 2], AnalysisError> {
+        if self.parts.len() == 1 {
+            return Ok([self.between(0.0, 0.5)?, self.between(0.5, 1.0)?]);
+        }
+        let (first, second) = self.parts.split_at(self.parts.len().div_ceil(2));
+        Ok([self.acting(first)?, self.acting(second)?])
+    }
+
+    /// Returns some of the records with the forces that act in them.
+    fn acting(&self, parts: &[Part]) -> Result<Self, AnalysisError> {
+        let acts = |input: &usize| {
+            let mut forces = parts.iter().filter_map(|part| part.forces.as_ref());
+            forces.any(|record| record.channel(*input).iter().any(|value| *value != 0.0))
+        };
+        let inputs: Vec<usize> = (0..self.inputs.len()).filter(acts).collect();
+        let part = |part: &Part| -> Result<Part, AnalysisError> {
+            let acting = |forces: &Record| {
+                Record::new(forces.sampling(), forces.data().select_columns(&inputs))
+            };
+            let forces = part.forces.as_ref().map(acting).transpose()?;
+            Ok(Part { forces, responses: part.responses.clone() })
+        };
+        let parts = parts.iter().map(part).collect::<Result<_, _>>()?;
+        let names = inputs.iter().map(|input| self.inputs[*input].clone()).collect();
+        Ok(Self { inputs: names, ..self.with_parts(parts) })
+    }
+
+    fn with_parts(&self, parts: Vec<Part>) -> Self {
+        Self {
+            parts,
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            driving_points: Vec::new(),
+            hits: Vec::new(),
+        }
     }
 
     /// Returns the lines of all records in a band (Hz).

@@ -2,6 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVectorView};
 
+use super::checks::prediction_checks;
 use super::diagrams::DiagramData;
 use super::settings::ModalTest;
 use super::sources::Recorded;
@@ -38,6 +39,9 @@ impl Modes {
         let shares = self.predict(measurements)?;
         let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         self.summary.variance_predicted = Some(mean);
+        let names: Vec<String> =
+            self.summary.outputs.iter().map(|row| row.column.clone()).collect();
+        self.summary.checks.extend(prediction_checks(&shares, &names));
         for (row, share) in self.summary.outputs.iter_mut().zip(shares) {
             row.variance_predicted = Some(share);
         }

@@ -39,17 +39,40 @@ pub(super) fn channel_checks(
 
 /// Returns the check of the share of the variance of each response that the modes explain.
 pub(super) fn output_checks(explained: &[f64], names: &[String]) -> Vec<ModalCheck> {
+    let text = |percent: f64, name: &str| {
+        format!(
+            "the modes explain {percent:.1} % of the variance of {name} in the band: the rest is \
+             noise, a nonlinearity, or forces that were not measured"
+        )
+    };
+    share_checks("explained", explained, names, text)
+}
+
+/// Returns the check of the share of the variance of each response that is predicted where it was
+/// not fitted.
+pub(super) fn prediction_checks(predicted: &[f64], names: &[String]) -> Vec<ModalCheck> {
+    let text = |percent: f64, name: &str| {
+        format!(
+            "the modes predict {percent:.1} % of the variance of {name} where it was not fitted: \
+             what the fit explains is not the structure's response to these forces"
+        )
+    };
+    share_checks("predicted", predicted, names, text)
+}
+
+fn share_checks(
+    code: &'static str,
+    shares: &[f64],
+    names: &[String],
+    text: impl Fn(f64, &str) -> String,
+) -> Vec<ModalCheck> {
     let row = |(share, name): (&f64, &String)| ModalCheck {
-        code: "explained",
+        code,
         passed: *share >= LEAST_EXPLAINED,
         value: *share,
-        text: format!(
-            "the modes explain {:.1} % of the variance of {name} in the band: the rest is noise, a \
-             nonlinearity, or forces that were not measured",
-            100.0 * share
-        ),
+        text: text(100.0 * share, name),
     };
-    explained.iter().zip(names).map(row).collect()
+    shares.iter().zip(names).map(row).collect()
 }
 
 /// Returns the checks of the modes: unexcited inputs, modal masses at driving points, and
