@@ -112,12 +112,13 @@ pub const UNMEASURED_FORCE: f64 = 0.1;
 /// and in stiffness, for a gain to be reported; below it the ratio may be due to noise.
 pub const GAIN_SHOWS: f64 = 5.0;
 
-/// Maximum number of standard errors between the ratios in damping and in stiffness that count as
-/// the same gain.
+/// Maximum number of standard errors between the ratios of mirrored entries, in damping and in
+/// stiffness, that count as the same gain.
 pub const GAIN_AGREES: f64 = 2.5;
 
-/// Maximum difference of the logarithms of both ratios, relative to the logarithm of the ratio in
-/// stiffness, that counts as the same gain even if it exceeds [`GAIN_AGREES`].
+/// Maximum difference between the logarithms of the ratios of mirrored entries, in damping and in
+/// stiffness, relative to the logarithm in stiffness, that counts as the same gain even if it
+/// exceeds [`GAIN_AGREES`].
 pub const GAIN_NEAR: f64 = 0.05;
 
 /// Minimum fraction of samples of a coarsely quantised channel that equal the sample before.
