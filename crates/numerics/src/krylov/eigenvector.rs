@@ -52,8 +52,8 @@ impl HessenbergFactors {
             if i == j { value_at - shift } else { value_at }
         };
         let row = |i: usize| (i.saturating_sub(below)..size).map(|j| entry(i, j)).collect();
-        // These rows are changed by the elimination of the column; the first entry of each is in
-        // this column.
+        // Active rows are those that the elimination of the column changes; each begins with its
+        // entry in this column.
         let mut active: VecDeque<Vec<Complex<f64>>> = (0..size.min(below)).map(row).collect();
         let (mut upper, mut steps) = (Vec::with_capacity(size), Vec::with_capacity(size));
         for column in 0..size {
