@@ -118,7 +118,7 @@ impl ElementData {
             |hz: f64| how.without_hz.iter().any(|disturbance| disturbance.reaches(hz, spacing_hz));
         lines.retained(|omega| !excluded(omega / TAU)).ok_or_else(|| AnalysisError::Setting {
             setting: "without_hz",
-            why: format!("no line is left of {}", lines.len()),
+            why: format!("all lines are excluded: {0} of {0}", lines.len()),
         })
     }
 }

@@ -156,5 +156,5 @@ fn what_modes_cannot_do_is_refused() {
         predict_with_modes(&record, &system, &settle).unwrap_err().to_string()
     };
     assert!(refused(2).contains("do not determine the motion of all modes"), "{}", refused(2));
-    assert!(refused(SAMPLES).contains("settles within 2 to 8191"), "{}", refused(SAMPLES));
+    assert!(refused(SAMPLES).contains("fitted to 2 to 8191"), "{}", refused(SAMPLES));
 }
