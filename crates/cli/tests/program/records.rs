@@ -212,6 +212,6 @@ fn what_was_left_out_of_a_file_is_told() {
     fs::write(folder.path().join("reserved.csv"), bytes).unwrap();
     for command in ["info reserved.csv", "identify reserved.csv --force force --displacement 3"] {
         let told = mechid(folder.path(), command);
-        assert!(told.contains("4096 zero bytes behind the last line"), "{command}: {told}");
+        assert!(told.contains("4096 zero bytes after the last line"), "{command}: {told}");
     }
 }

@@ -169,7 +169,7 @@ fn names_have_a_limit() {
 fn more_lines_are_skipped_than_there_are() {
     let options = ReadOptions { skip_lines: 1_000_000_000_000, ..OPTIONS };
     let e = Table::parse_with("a", b"t,f\n0,1\n", &options).unwrap_err();
-    assert_eq!(e.to_string(), "a holds no data: it has no more lines than are to be skipped");
+    assert_eq!(e.to_string(), "a holds no data: all of its lines are skipped");
 }
 
 /// Whatever a file holds, messages show it on one line and as it stands.

@@ -296,14 +296,14 @@ fn uneven_time_is_refused_with_its_worst_step() {
     let e = of(&[0.0, 1.0, 2.0, 3.5, 4.75]).unwrap_err();
     assert!(
         e.to_string().starts_with(
-            "a.csv: the time steps are not uniform: 1.5 s up to line 5, where the usual step is 1.25 s"
+            "a.csv: the time steps are not uniform: the step up to line 5 is 1.5 s, the usual step 1.25 s"
         ),
         "{e}"
     );
     assert!(e.to_string().contains("resample the record"), "{e}");
     // A second run behind the first one, whose time starts again.
     let e = of(&[0.0, 1.0, 2.0, 0.0, 1.0, 2.0]).unwrap_err().to_string();
-    assert!(e.contains("-2 s up to line 5") && e.contains("second record was appended"), "{e}");
+    assert!(e.contains("the step up to line 5 is -2 s") && e.contains("had been appended"), "{e}");
     assert!(!e.contains("resample"), "{e}");
     for times in
         [&[0.0, 1.0, 0.5, 1.5][..], &[0.0, 0.0, 0.0], &[2.0, 1.0, 0.0], &[-1.7e308, 1.7e308]]
