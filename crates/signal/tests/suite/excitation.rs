@@ -37,7 +37,7 @@ fn flat_multisine_is_as_white_as_its_lines_allow() {
     }
 }
 
-/// Table of the chapter choose/excitation.md of the book: a period of 1023 samples, 1 s long, lines
+/// Table of the page studies/excitation.md of the book: a period of 1023 samples, 1 s long, lines
 /// 1 to 400 are of interest, and the largest force is 1 N.
 #[test]
 fn excitations_side_by_side() {
