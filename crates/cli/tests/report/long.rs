@@ -168,7 +168,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
     assert!(end.0 - top.0 < 0.2, "{top:?} is not at the end, {end:?}");
     assert!(points.iter().filter(|point| point.1 < 0.5 * (top.1 + end.1)).count() < 4);
 
-    let of_held = row(&document, "What is left of the motion, samples 1 to 262000", "x");
+    let of_held = row(&document, "Residual of the response, samples 1 to 262000", "x");
     near(&of_held[2], rms(without_mean(&all[1][..262_000]).into_iter()), 4);
     assert_eq!(row(&document, "The record", "Samples used")[1], "1 to 270000");
 }

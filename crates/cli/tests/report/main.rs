@@ -199,7 +199,7 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!((channel[4].as_str(), channel[7].as_str()), ("31.02", "0 %"));
     let excitation = row(&document, "Quality of the excitation", "F");
     assert_eq!(excitation[3..], ["77", "1 to 20", "1.00", "154"]);
-    assert_eq!(row(&document, "What is left of the motion", "x")[3..], ["0", "0 %"]);
+    assert_eq!(row(&document, "Residual of the response", "x")[3..], ["0", "0 %"]);
     assert!(checks(&document).contains("residual 1: rounding"), "{}", checks(&document));
     let force = row(&document, "Force found and force measured", "F");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
@@ -403,7 +403,7 @@ fn a_record_in_segments_has_its_page_too() {
     assert_eq!(row(&document, "The record", "Segments")[1], "of 512 samples");
     assert_eq!(row(&document, "The record", "Line spacing")[1], "0.125 Hz");
     let percent = |cell: &str| cell.strip_suffix(" %").unwrap().parse::<f64>().unwrap();
-    let left = row(&document, "What is left of the motion", "x");
+    let left = row(&document, "Residual of the response", "x");
     assert!(percent(&left[4]) < 5.0, "{left:?}");
     let force = row(&document, "Force found and force measured", "F");
     assert!(percent(&force[4]) < 20.0, "{force:?}");
