@@ -7,7 +7,7 @@ use crate::limits;
 use crate::modes::{Candidate, ModeSearch};
 
 impl ModeSearch {
-    /// Returns the sort key of the search: the distance of an eigenvalue.
+    /// Returns the distance of an eigenvalue from the target of the search; modes are sorted by it.
     pub(super) fn distance(self, value: Complex<f64>) -> f64 {
         match self {
             Self::Lowest => value.norm(),
@@ -48,7 +48,7 @@ impl Reach {
             ModeSearch::Lowest => {
                 search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
             }
-            // Unknown modes may be on the other side of the first, at the distance of the last.
+            // Unknown modes may be beyond the first mode, at the distance of the last one.
             ModeSearch::NearOmega(_) => {
                 gap + (last - first).norm()
                     <= self.radius * (1.0 + limits::SAME_EIGENVALUE) + gap * limits::SAME_EIGENVALUE
