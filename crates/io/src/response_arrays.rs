@@ -18,9 +18,10 @@ const COHERENCE: [&str; 3] = ["coherence", "coh", "gamma2"];
 /// other dimensions are points of the response and points of the force. An array with one other
 /// dimension has the responses to one force.
 ///
-/// # Errors [`IoError::Description`] if no array has a dimension of the length of the frequencies,
-/// for an array with too many dimensions, for one that is not finite, and for two arrays with the
-/// same response.
+/// # Errors
+/// [`IoError::Description`] if no array has a dimension of the length of the frequencies, for an
+/// array with too many dimensions, for one that is not finite, and for two arrays with the same
+/// response.
 pub(crate) fn add_functions(
     table: &Table,
     arrays: &[ComplexArray],

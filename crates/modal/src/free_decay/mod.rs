@@ -79,7 +79,8 @@ impl Default for FreeDecay {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// # Errors [`FreeDecayError::SilentChannel`] if a channel is constant, [`SignalError::TooShort`],
+/// # Errors
+/// [`FreeDecayError::SilentChannel`] if a channel is constant, [`SignalError::TooShort`],
 /// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than
 /// can be fitted, [`FreeDecayError::NoOscillation`] if decays without oscillation describe it
 /// better, [`FreeDecayError::NoDecay`] if no oscillation exceeds the noise,
