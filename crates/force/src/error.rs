@@ -59,7 +59,7 @@ pub enum ForceError {
     NoForcedDof,
     /// More unknown forces than measured channels.
     #[error(
-        "{forces} unknown forces cannot be told apart with {}: \
+        "{forces} unknown forces cannot be separated with {}: \
          measure more degrees of freedom, or name fewer forced ones", message::count(*measurements, "measured channel")
     )]
     MoreForcesThanMeasurements {
@@ -209,7 +209,7 @@ pub enum ForceError {
     },
     /// A band of frequencies with impossible ends.
     #[error(
-        "the band from {low_hz} to {high_hz} Hz is none: give a lower end from 0 Hz on and an upper \
+        "the band from {low_hz} to {high_hz} Hz is empty: give a lower end of at least 0 Hz and an upper \
          end above it"
     )]
     NoBand {

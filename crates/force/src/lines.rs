@@ -5,7 +5,7 @@ use mechid_signal::Spectrum;
 use crate::error::ForceError;
 use crate::measurement::{Measurement, first_repeated};
 
-/// Every line of the record with a complex amplitude: 1 up to, not including, Nyquist.
+/// Returns every line of the record with a complex amplitude: from 1 to the last one below Nyquist.
 pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
     (1..measured.sampling().len().div_ceil(2)).collect()
 }
