@@ -157,7 +157,7 @@ enum RowTimes {
     Instants(Vec<f64>),
     /// A time step, in s.
     Step(f64),
-    /// Neither instants nor a step: the times are calendar durations, or damaged.
+    /// No instants and no step: the times are calendar durations, or damaged.
     Unknown,
 }
 
