@@ -27,8 +27,8 @@ pub fn bearing() -> SecondOrderSystem {
     JournalBearing::new(14.8, film, KyxSign::Minus).unwrap().system()
 }
 
-/// Force amplitudes of equal size, in the unit of `amplitude`, with Schroeder's phases, which differ
-/// from channel to channel.
+/// Force amplitudes of equal size, in the unit of `amplitude`, with Schroeder's phases, which
+/// differ from channel to channel.
 ///
 /// # Source
 /// Schroeder (1970), IEEE Transactions on Information Theory 16, 85–89.
