@@ -1,4 +1,4 @@
-"""The other questions: what the program says to the last bit, and what closed forms say."""
+"""The other analyses: exactly equal to the program, and compared with closed forms."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_modes_of_a_roving_hammer_are_those_of_the_program(program: Callable[...
     )
     assert found.to_json() + "\n" == told
     first, second = (mode.natural_frequency_hz.value for mode in found.modes)
-    # The modes of the machine behind the example, in closed form.
+    # # The modes of the machine of the example, in closed form.
     assert first == pytest.approx(12, rel=1e-4) and second == pytest.approx(31, rel=1e-4)
     assert found.participations.shape == (2, 2) and found.explained[0] > 0.99
     assert np.all(found.driven_shares > 0.98) and found.mac.shape == (2, 2)
@@ -129,7 +129,7 @@ def test_a_comparison_is_that_of_the_program(program: Callable[..., str], tmp_pa
     assert found.only_first == found.only_second == () and "MAC" in str(found)
     told = program("modes", "examples/hammer-1.csv", *words(options), "--compare", str(path), "--json")
     assert json.loads(told)["pairs"] == json.loads(found.to_json())["pairs"]
-    # A model as arrays, of which one mode is 5 % higher.
+    # # A model given as arrays; one of its modes is 5 % higher.
     model = {"natural_frequency_hz": [12.0, 31.0 * 1.05], "shape": [[1, 0.57], [0.83, -1]], "points": ["a1", "a2"]}
     changed = mechid.compare_modes(first, model).pairs[1]["natural_frequency_hz"]
     assert changed["difference"] == pytest.approx(0.05 * 31, rel=1e-2) and changed["p_value"] < 1e-6
@@ -187,7 +187,8 @@ def test_a_bearing_is_that_of_the_program(program: Callable[..., str], options: 
 
 
 def test_a_bearing_comes_from_frequency_responses(tmp_path: Path) -> None:
-    """Closed-form responses of a housing on a film and on stingers, which the baseline has alone."""
+    """Closed-form responses of a housing on a film and on stingers; the baseline has only the
+    stingers."""
     omega = 2 * np.pi * np.arange(24.0, 200.0, 4.0)[:, None, None]
     film = [np.array(m) for m in ([[7e7, 9e7], [-1.6e7, 4e7]], [[5e5, 1.5e5], [1.4e5, 2e5]], [[3.0, 1.0], [-1.0, 2.0]])]
     stinger = [np.diag([6e6, 5e6]), np.diag([2e3, 1.5e3]), 0.4 * np.eye(2)]
@@ -253,7 +254,7 @@ def test_forces_are_those_of_the_program(
         np.testing.assert_array_equal(found.std_error[:, 0], written[:, 2])
     frequency, amplitudes = found.spectrum
     assert len(frequency) == len(amplitudes)
-    # The identification itself will do as the machine: a file keeps every bit of it.
+    # # The identification itself serves as the machine, because its JSON preserves every bit.
     again = mechid.reconstruct(identified, FILE, **options)
     np.testing.assert_array_equal(again.force, found.force)
 
@@ -598,7 +599,7 @@ def test_modes_predict_and_find_forces_as_those_of_the_program(
 
 
 def test_every_scheme_of_the_program_is_offered() -> None:
-    """The message that refuses another name has all of them."""
+    """The message that refuses an unknown name lists all known names."""
     with pytest.raises(mechid.MechidError, match="unknown variant") as caught:
         mechid.integrate(ONE, np.zeros(8), 100.0, scheme="guess")  # type: ignore[arg-type]
     known = set(re.findall("`([a-z0-9-]+)`", str(caught.value).split("expected one of")[1]))

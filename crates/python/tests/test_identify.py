@@ -1,4 +1,4 @@
-"""Identification: what the program says to the last bit, and what NumPy says by other ways."""
+"""Identification: exactly equal to the program, and compared with other methods in NumPy."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ CASES = [
 
 
 def words(kinds: dict[str, str], options: dict[str, Any]) -> list[str]:
-    """The options as the program spells them."""
+    """The options in the spelling of the program."""
     told = ["--force", "force"]
     for name, value in {**kinds, **options}.items():
         if isinstance(value, tuple):
@@ -78,7 +78,7 @@ def test_the_program_says_the_same_to_the_last_bit(
     found = mechid.identify(FILE, force="force", **kinds, **options)
     assert found.to_json() + "\n" == told
     assert found.to_dict() == json.loads(told)
-    # The settings of the result repeat it.
+    # # The settings of the result repeat the analysis.
     record = {key: options[key] for key in ("start", "period", "periods", "detrend") if key in options}
     validated = {key: options[key] for key in options if key.startswith("validate")}
     again = mechid.identify(
@@ -89,7 +89,7 @@ def test_the_program_says_the_same_to_the_last_bit(
 
 def test_as_text_it_is_the_report_of_the_program(program: Callable[..., str]) -> None:
     kinds: Any = {"displacement": "displacement"}
-    # Without the period it is told, as an option there and as a setting here.
+    # # Without the period a remark names it: as an option in the program and as a setting in Python.
     told = program("identify", FILE, *words(kinds, {"period": 256}))
     assert str(mechid.identify(FILE, force="force", **kinds, period=256)) == told
 
