@@ -143,7 +143,7 @@ pub(crate) const PHASE_CHANGE: f64 = 1e-2;
 /// Damping of the first step, as a multiple of the mean curvature.
 pub(crate) const FIRST_DAMPING: f64 = 1e-2;
 
-/// Maximum number of steps per exponent, far more than needed.
+/// Maximum number of Newton steps for each exponent of the norm, far more than needed.
 pub(crate) const CREST_STEPS: usize = 400;
 
 /// Relative reduction of the norm by two successive steps below which the search at one exponent
