@@ -33,13 +33,14 @@ pub(crate) const HARMONICS: usize = 9;
 /// harmonics, multiplied by one of them.
 pub(crate) const INSTANTS: usize = 128;
 
-/// Maximum number of Newton steps for one amplitude.
+/// Maximum number of Newton steps for one amplitude of a backbone.
 pub(crate) const BACKBONE_NEWTON_STEPS: usize = 30;
 
-/// Newton step, relative to amplitude and frequency, that ends the iteration.
+/// Newton step, relative to amplitude and frequency, that ends the iteration for a backbone.
 pub(crate) const BACKBONE_STEP: f64 = 1e-11;
 
-/// Maximum number of attempts from one amplitude to the next; each failure halves the step.
+/// Maximum number of attempts from one amplitude of a backbone to the next; each failure halves the
+/// step.
 pub(crate) const BACKBONE_ATTEMPTS: usize = 16;
 
 /// Change of a parameter for a numerical derivative, in standard errors.
