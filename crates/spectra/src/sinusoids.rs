@@ -57,7 +57,7 @@ impl Sinusoid {
 /// amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
-    // A geometric series, divided by its number of terms, has this sum.
+    // This is the sum of a geometric series, divided by its number of terms.
     let mean = |turn: f64| {
         let half = 0.5 * turn;
         match half.sin() {

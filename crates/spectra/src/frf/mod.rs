@@ -32,7 +32,7 @@ pub enum FrfEstimator {
     /// S_XF S_FF⁻¹: unbiased if only the response is noisy; noise on the force makes it too small.
     H1,
     /// S_XX S_FX⁻¹: unbiased if only the force is noisy; noise on the response makes it too large.
-    /// With several forces it needs as many responses.
+    /// It needs as many responses as forces if there are several forces.
     H2,
     /// Total least squares, with force and response scaled to equal power; for one force, the
     /// geometric mean of H1 and H2.
@@ -233,7 +233,8 @@ impl Frf {
             }
             FrfEstimator::Hv => spectra.hv()?,
         };
-        // The standard deviation grows in proportion to the estimator.
+        // The variance of H1 is known; that of another estimate is taken in proportion to its
+        // square.
         for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {
             if h1.norm_sqr() > 0.0 {
                 *v *= h.norm_sqr() / h1.norm_sqr();

@@ -18,7 +18,7 @@ pub(super) struct Scatter {
     inverse_force: Vec<ComplexMatrix>,
     /// Variances for weights, averaged over neighbouring lines.
     pub(super) pooled: Vec<DMatrix<f64>>,
-    /// Number of independent complex deviations behind these variances.
+    /// Number of independent complex deviations behind the pooled variances.
     pub(super) freedom: f64,
     /// Weights of the smoothing by the window: see [`Segments::smoothing`].
     smoothing: Vec<f64>,

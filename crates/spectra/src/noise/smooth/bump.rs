@@ -173,7 +173,7 @@ pub(super) fn most_conspicuous(
 
 /// Gains of flat bumps, as reductions of Σ log p + v/p with the fitted power p and the variance v.
 struct FlatGains {
-    /// Cumulative sums of the levels v/p, lines + 1 × channels: they give the mean of any band.
+    /// Cumulative sums of the levels v/p, (lines + 1) × channels: they give the mean of any band.
     below: DMatrix<f64>,
     nu: f64,
 }
