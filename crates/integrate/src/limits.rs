@@ -180,7 +180,7 @@ pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
 /// Maximum number of factorisations for each end of the enclosure.
 pub(crate) const ENCLOSURE_FACTORISATIONS: usize = 64;
 
-/// Number of Arnoldi steps for the eigenvalue of largest modulus.
+/// Number of Arnoldi steps that estimate the eigenvalue of largest modulus.
 pub(crate) const ARNOLDI_STEPS: usize = 32;
 
 /// Maximum number of vectors of the search for the fastest growing free motion.

@@ -171,7 +171,8 @@ impl Examined<'_> {
     fn small_limit(&self, system: &SecondOrderSystem) -> Result<Option<f64>, IntegrateError> {
         let eigenvalues = system.eigenvalues()?;
         let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
-        // A free body has a double eigenvalue 0, found as about √ε of the others.
+        // A free body has a double eigenvalue 0, which rounding changes to about √ε times the
+        // others.
         let free = eigenvalues.iter().any(|l| l.norm() < 1e-6 * fastest);
         let tolerated = if free { limits::TOLERATED_GROWTH } else { limits::CRITICAL_GROWTH };
         let own_growth = own_growth(&eigenvalues);
