@@ -35,7 +35,7 @@ pub enum ForceError {
         described: usize,
     },
     /// A degree of freedom that the system does not have.
-    #[error("degree of freedom {} (counted from 1) of a system of {dofs}", dof.saturating_add(1))]
+    #[error("degree of freedom {} (counted from 1) does not exist in a system of {dofs}", dof.saturating_add(1))]
     NoSuchDof {
         /// Degree of freedom requested, counted from 0.
         dof: usize,
@@ -238,7 +238,7 @@ pub enum ForceError {
     /// The Kalman filter overflows at every tuning tried, or at the one given.
     #[error(
         "the Kalman filter of this measurement overflows: use units that keep the values \
-         of data and system between 1e-50 and 1e50; of an unstable machine, shorten the time step \
+         of data and system between 1e-50 and 1e50; for an unstable machine, shorten the time step \
          or take the initial state as unknown"
     )]
     NoLikelihood,

@@ -14,9 +14,8 @@ use crate::noise::channel_sizes;
 /// Returns the range of samples in which the innovations of a stationary force are smallest, if
 /// they are smaller than by chance; `None` for a stationary force.
 ///
-/// The spectrum of a pulse falls with frequency. The likelihood of a stationary force takes it for
-/// the spectrum of the whole record, and then takes the noise below it, which the quiet part shows,
-/// as force.
+/// The spectrum of a pulse falls with frequency. A stationary force has the same spectrum in the
+/// whole record, so that the fit takes noise in the quiet part for force.
 ///
 /// # Source
 /// Goldfeld & Quandt (1965), Journal of the American Statistical Association 60, 539–547 (the ratio

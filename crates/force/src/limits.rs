@@ -18,8 +18,8 @@ pub(crate) const POINT_WEIGHT: f64 = 1.0;
 
 // Kalman filter
 
-/// Orders of the force model tried, each starting from the best point of the one before; the first
-/// two start from a grid.
+/// Orders of the force model that are tried. The search for each starts from the best point of the
+/// previous order; the first two start from a grid.
 pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// Smallest gain in the log-likelihood by a higher order of the force model for which the next

@@ -10,7 +10,8 @@ pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
     (1..measured.sampling().len().div_ceil(2)).collect()
 }
 
-/// Variance of each part of a line's amplitude under white noise of unit variance.
+/// Returns the variance of the real part of a line's amplitude under white noise of unit variance;
+/// the imaginary part has the same.
 pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
 }

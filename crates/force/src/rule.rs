@@ -167,7 +167,7 @@ fn least(costs: impl Iterator<Item = f64>) -> usize {
     costs.iter().position(|cost| *cost <= least * (1.0 + limits::EQUAL_COSTS)).unwrap_or(0)
 }
 
-/// Returns the point of largest curvature near the noise level, as GCV estimates it.
+/// Returns the point of largest curvature of the L-curve, near the noise level that GCV estimates.
 fn corner(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let reference = least_gcv(filter, components, fits);
     let limit = limits::CORNER_NOISE_RATIO * fits[reference].noise(components);

@@ -235,7 +235,7 @@ impl Filter {
                 self.covariance[j * m + i] = p;
             }
         }
-        // Variances of the filter before the measurements of the last sample and of this one.
+        // The variances before the measurements of the last sample and of this one are compared.
         self.settled = true;
         for (before, now) in self.before.iter_mut().zip(self.covariance.iter().step_by(m + 1)) {
             self.settled &= (now - *before).abs() <= self.tolerance * now.abs();

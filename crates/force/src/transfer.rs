@@ -156,7 +156,7 @@ impl Transfer<'_> {
         Ok(inverse)
     }
 
-    /// Returns the error with the force that has the smallest effect on the measured channels.
+    /// Returns an error that names the force with the smallest effect on the measured channels.
     fn not_transmitted(
         &self,
         line: usize,
