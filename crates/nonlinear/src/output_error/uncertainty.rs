@@ -42,8 +42,9 @@ impl Problem<'_> {
     }
 
     /// Returns the covariance of all parameters: from the noise of the periods if the residual does
-    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, the
-    /// residual is assumed white.
+    /// not exceed it, otherwise from blocks of time. For a record too short for blocks, it is the
+    /// scatter increased to the size of the residual or, for a single period, that for a white
+    /// residual.
     pub(super) fn uncertainty(
         &self,
         theta: &DVector<f64>,
