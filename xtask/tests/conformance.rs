@@ -1,4 +1,5 @@
-//! The page of numbers that somebody else printed is today's. On purpose changed: `cargo xtask conformance`.
+//! The page of published numbers is up to date. After an intended change, run `cargo xtask
+//! conformance`.
 
 use std::path::Path;
 
