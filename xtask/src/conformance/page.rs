@@ -17,7 +17,7 @@ pub(super) fn place(root: &Path) -> PathBuf {
 /// Returns the page, in Markdown.
 pub(super) fn markdown(judges: &[Judge]) -> String {
     let mut text = String::from(
-        "# Who else says so\n\n\
+        "# Comparison with published numbers\n\n\
          This page compares numbers of this workspace with numbers that others have printed, or that have a closed \
          form. No number is judged by a simulator of this workspace.\n\
          Made by `cargo xtask conformance`, and compared by `cargo xtask conformance --check`; do not edit.\n\n\
