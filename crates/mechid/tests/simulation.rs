@@ -22,8 +22,8 @@ fn error(scheme: &str, samples: usize) -> f64 {
     (found - truth).amax() / truth.amax()
 }
 
-/// Judge: F in ẍ + 2 ẋ + x + x³ = F is chosen for x = cos 2t; the damping is so large that no other
-/// periodic response exists.
+/// Reference: F in ẍ + 2 ẋ + x + x³ = F is chosen for x = cos 2t; the damping is so large that no
+/// other periodic response exists.
 #[test]
 fn a_nonlinear_machine_goes_round_its_orbit() {
     let simulated = |scheme: &str, response: &str| {
@@ -62,8 +62,9 @@ fn a_nonlinear_machine_goes_round_its_orbit() {
     assert!(matches!(exact, Err(SimulateError::ExactNonlinear)));
 }
 
-/// Judge: at the equilibrium x = 0 of ẍ + 1.5 ẋ − x + x³ = 0, λ² + 1.5 λ − 1 = 0 has the root λ =
-/// 1/2, so that a disturbance grows by e^(λT) in a period T. With + x instead of − x it decays.
+/// Reference: at the equilibrium x = 0 of ẍ + 1.5 ẋ − x + x³ = 0 the characteristic equation λ² +
+/// 1.5 λ − 1 = 0 has the root λ = 1/2, so that a disturbance grows by e^(λT) in a period T. With +
+/// x instead of − x it decays.
 #[test]
 fn an_orbit_that_no_machine_stays_on_is_refused() {
     let simulated = |stiffness: f64| {
@@ -89,8 +90,8 @@ fn an_orbit_that_no_machine_stays_on_is_refused() {
     assert!(told.contains("it is stable"), "{told}");
 }
 
-/// Judge: the free response of each mass of a chain grows at the rate −c / 2m = 0.1 1/s, for 0.64
-/// s.
+/// Reference: the free response of each mass of a chain grows at the rate −c / 2m = 0.1 1/s, for
+/// 0.64 s.
 #[test]
 fn a_large_machine_that_grows_has_no_periodic_response() {
     let simulated = |damping: f64, scheme: &str| {
@@ -135,7 +136,7 @@ fn unstable(response: &str, samples: usize) -> Result<Simulation, SimulateError>
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Judge: the free response grows at the rate −c / 2m = 0.1 1/s.
+/// Reference: the free response grows at the rate −c / 2m = 0.1 1/s.
 #[test]
 fn an_unstable_machine_has_no_periodic_response_and_is_told() {
     let refused = unstable("periodic", 64).unwrap_err();
@@ -159,7 +160,7 @@ fn simulated(scheme: &str, response: &str) -> Result<Simulation, SimulateError> 
     simulate(&Experiment::parse("test.json", &text).unwrap())
 }
 
-/// Judge: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
+/// Reference: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
 #[test]
 fn a_free_motion_starts_where_it_is_told_to() {
     let from = r#"{ "from": { "displacement": 0.5, "velocity": -3 } }"#;

@@ -5,7 +5,7 @@ directions with multisines on different lines, so that one experiment determines
 and K; the mass is known from a balance.
 """
 
-# # %% The rig, in the form that `mechid simulate` reads, too.
+# %% The rig, in the form that `mechid simulate` reads, too.
 import numpy as np
 
 import mechid
@@ -36,7 +36,7 @@ found = mechid.identify(
 )
 print(found)
 
-# # %% Compare every coefficient with the truth, within four standard errors.
+# %% Compare every coefficient with the truth, within four standard errors.
 for truth, letter in ((C, "c"), (K, "k")):
     for row in range(2):
         for column in range(2):
@@ -46,7 +46,7 @@ for truth, letter in ((C, "c"), (K, "k")):
             print(f"{parameter.name}: {parameter.value:12.1f} {parameter.unit}, {apart:+.1f} standard errors off")
             assert abs(apart) < 4
 
-# # %% Modes with their uncertainty; an unstable mode would have a positive real part.
+# %% Modes with their uncertainty; an unstable mode would have a positive real part.
 for mode in found.modes:
     ratio = mode.damping_ratio
     print(f"{mode.natural_frequency_hz.value:.2f} Hz, ζ = {ratio.value:.4f} ± {ratio.std_error:.4f}")

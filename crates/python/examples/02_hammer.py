@@ -1,7 +1,7 @@
 """A hammer test: averaged frequency responses of five hits, the machine, and one hit
 reconstructed."""
 
-# # %% Five hits on one mass; every record begins a little before the hit and ends at rest.
+# %% Five hits on one mass; every record begins a little before the hit and ends at rest.
 import numpy as np
 
 import mechid
@@ -24,7 +24,7 @@ force = np.concatenate(blows)
 motion = mechid.predict(machine, force, FS)["displacement"][:, 0]
 measured = motion + rng.normal(0.0, 1e-3 * motion.std(), len(motion))
 
-# # %% The hits are the segments, with equal weights: each begins and ends at rest.
+# %% The hits are the segments, with equal weights: each begins and ends at rest.
 record = mechid.Measurement.from_arrays(force, measured, fs=FS)
 table = mechid.frf(
     record, segment=f"{SAMPLES}:0:rectangular", band_hz=(5.0, 60.0)
@@ -34,7 +34,7 @@ judge = machine.receptance(table.frequency_hz)[:, 0, 0]
 apart = np.abs(table.response() - judge) / np.abs(judge).max()
 assert apart.max() < 0.02, apart.max()
 
-# # %% Identify the machine.
+# %% Identify the machine.
 found = mechid.identify(
     record, from_frf="h1", segment=f"{SAMPLES}:0:rectangular",
     band_hz=(5.0, 60.0),
@@ -42,7 +42,7 @@ found = mechid.identify(
 print(found)
 assert abs(found.parameters["k"].value / 5.1e4 - 1) < 0.01
 
-# # %% Reconstruct a hit that no load cell has measured.
+# %% Reconstruct a hit that no load cell has measured.
 unseen = blow(130.0)
 response = mechid.predict(machine, unseen, FS)
 noisy = {

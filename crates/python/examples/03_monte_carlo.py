@@ -15,7 +15,7 @@ response = mechid.integrate(machine, drive.force, FS, scheme="exact", response="
 force, motion = np.tile(drive.force, PERIODS), np.tile(response["displacement"][:, 0], PERIODS)
 
 
-# # %% Each run has different noise; threads share the work, because the interpreter's lock is released.
+# %% Each run has different noise; threads share the work, because the interpreter's lock is released.
 def run(seed: int) -> tuple[list[float], list[float], bool]:
     noise = np.random.default_rng([1998, seed]).normal(0.0, 0.02 * motion.std(), len(motion))
     found = mechid.identify(
@@ -32,7 +32,7 @@ values, errors, warned = (np.array(part) for part in zip(*runs, strict=True))
 print(f"{100 * warned.mean():.1f} % of the runs have a warning by chance, and larger errors")
 assert warned.mean() <= 0.02
 
-# # %% Compare the scatter of the estimates with the standard errors of each estimate.
+# %% Compare the scatter of the estimates with the standard errors of each estimate.
 for column, (name, truth) in enumerate(TRUTH.items()):
     scatter, stated = values[:, column].std(), np.sqrt((errors[~warned, column] ** 2).mean())
     bias = (values[:, column].mean() - truth) / (scatter / np.sqrt(RUNS))

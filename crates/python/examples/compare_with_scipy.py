@@ -142,7 +142,7 @@ def fitting(periods: int) -> None:
 
     slow, (judge, error) = timed(theirs, 10)
     fast, (found, _) = timed(ours, 10)
-    # # Both find the same minimum, to a hundredth of a standard error.
+    # Both find the same minimum, to a hundredth of a standard error.
     assert (np.abs(found - judge) < 0.01 * error).all()
     errors = [float(np.abs(values / truth - 1).max()) for values in (judge, found)]
     row(f"output error, {periods} periods of {period} (`least_squares`); with start and checks",

@@ -31,7 +31,7 @@ def arrays(draw: st.DrawFn) -> Any:
     if draw(st.integers(0, 4)) == 0:
         values = values * 10.0 ** draw(st.sampled_from([-320, -200, 0, 150, 307]))
     with np.errstate(all="ignore"):
-        # # Arrays without a dimension are converted to numbers.
+        # Arrays without a dimension are converted to numbers.
         values = np.asarray(values).astype(dtype) if dtype.kind != "M" else np.zeros(shape, dtype)
     values = np.asarray(values)
     if draw(st.integers(0, 9)) == 0 and values.size and values.dtype.kind == "f":
@@ -112,5 +112,5 @@ def test_nothing_leaks() -> None:
     before = resident()
     for _ in range(CASES):
         call()
-    # # A leak of one array per call would be 4 kB per call.
+    # A leak of one array per call would be 4 kB per call.
     assert resident() - before < 2**20 + 1024 * CASES

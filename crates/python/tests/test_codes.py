@@ -43,7 +43,7 @@ def failures() -> dict[str, str]:
     paths = [*ROOT.glob("crates/*/src/error.rs"), *(ROOT / f"crates/{at}/error.rs" for at in others)]
     for path in paths:
         for kind, body in ENUMS.findall(path.read_text(encoding="utf-8")):
-            # # The package calls no function with this failure.
+            # The package calls no function with this failure.
             if kind in ("Bearing", "Cli", "Problem"):
                 continue
             for variant in VARIANTS.finditer(body):

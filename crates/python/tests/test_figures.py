@@ -40,7 +40,7 @@ ELEMENTS: dict[str, Any] = {
     "inputs": [{"kind": "force", "name": "force", "at": "displacement"}],
 }
 CHAIN = mechid.Machine(np.diag([2.0, 3.0]), [[6.0, -2.0], [-2.0, 5.0]], [[9000.0, -4000.0], [-4000.0, 6000.0]])
-# # The page has single precision.
+# The page has single precision.
 SINGLE = 1e-6
 
 
@@ -188,7 +188,7 @@ def test_every_figure_of_every_page_is_drawn(results: Pages) -> None:
 
 
 def test_no_figure_of_the_pages_is_forgotten(results: Pages) -> None:
-    """Judge: the identifiers in the sources of the pages."""
+    """Reference: the identifiers in the sources of the pages."""
     known = {re.sub(r"-\d+$", "", name) for result, page in results.values() for name in plotting.figures(page)}
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "crates/report/src/page").glob("*.rs"))
     named = r'(?:\bdrawn\w*\(\s*|part\.id\(|over_time\(|\bid: |format!\()"([a-z-]+)(?:-\{number\})?"(?:\.into\(\)|\)|,)'
@@ -248,7 +248,7 @@ def test_the_numbers_of_modes_forces_and_bearings_are_drawn(results: Pages) -> N
 
 
 def test_responses_are_shown_in_every_quantity_and_form(results: Pages) -> None:
-    """Judge: powers of iω, and real and imaginary part of the complex numbers."""
+    """Reference: powers of iω, and real and imaginary part of the complex numbers."""
     table: mechid.FrequencyResponses = results["frequency responses"][0]
     chart = table.figures["figure"]
     assert isinstance(chart, plotting.Chart) and len(chart.members) == len(table.pairs) == 2
@@ -287,7 +287,7 @@ def test_axes_and_panels_are_those_that_were_asked_for(results: Pages) -> None:
     assert found.plot("fit", ax=grid[:2]) == [grid[0], grid[1]] and not len(pyplot.get_fignums()) > 1
     with pytest.raises(ValueError, match="2 panels, got 3 axes"):
         found.plot("fit", ax=grid)
-    # # Curves that are already in the axes remain visible.
+    # Curves that are already in the axes remain visible.
     ax = pyplot.subplots()[1]
     ax.plot([1.0, 1000.0], [1e-9, 1.0])
     found.plot(ax=ax)

@@ -51,7 +51,7 @@ def test_receptances_are_measured_where_one_force_acts() -> None:
 def test_receptances_of_open_records_are_those_of_segments(
     columns: dict[str, np.ndarray], options: Any, segment: int
 ) -> None:
-    """Judge: H1 by SciPy from the same segments; by default, a segment is an eighth of the
+    """Reference: H1 by SciPy from the same segments; by default, a segment is an eighth of the
     record."""
     signal = pytest.importorskip("scipy.signal")
     table = mechid.identify(FILE, **COLUMNS, **options).frf

@@ -23,7 +23,7 @@ import mechid
 from .conftest import ROOT
 
 FILE = "examples/machine.csv"
-# # A long call that needs little memory. If the tests run in the background, Ctrl-C is ignored, and Python inherits this.
+# A long call that needs little memory. If the tests run in the background, Ctrl-C is ignored, and Python inherits this.
 LONG = """
 import signal
 import mechid
@@ -66,7 +66,7 @@ def test_the_lock_is_released_during_the_work() -> None:
 def test_children_work_as_the_parent_does(method: str) -> None:
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"{method} is not a way to start processes here")
-    # # A forked child does not have the threads of its parent.
+    # A forked child does not have the threads of its parent.
     here = stiffness()
     with multiprocessing.get_context(method).Pool(2) as pool:
         found = [pool.apply_async(stiffness).get(timeout=60) for _ in range(4)]

@@ -247,8 +247,8 @@ mod tests {
         coarse_time(&table, &time, sampling)
     }
 
-    /// Judge: the uncertainty is half a unit of the last digit at either end, over the duration of
-    /// the record.
+    /// Reference: the uncertainty is half a unit of the last digit at either end, over the duration
+    /// of the record.
     #[test]
     fn instants_that_leave_the_rate_open_are_told() {
         // The instants have three decimals, so that the uncertainty is a millisecond in 7.8125 s.

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from ._results import Uncertain as Uncertain
     from ._results import Validation as Validation
 
-# # Module of each name; it is imported when the name is used, so that the program starts without NumPy.
+# Module of each name; it is imported when the name is used, so that the program starts without NumPy.
 _HOMES = {
     "bearing": "_doors",
     "bearing_campaign": "_doors",

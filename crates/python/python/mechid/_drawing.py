@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
     from ._figures import Curve, Panel
 
-# # Points (1/72 inch) per pixel of a page.
+# Points (1/72 inch) per pixel of a page.
 _POINTS = 0.75
 
 _MARKERS = {"c": "o", "s": "s", "t": "^", "d": "D", "v": "v", "x": "x", "p": "+"}
 
-# # Matplotlib does not show this label in a legend.
+# Matplotlib does not show this label in a legend.
 _NO_LEGEND = "_nolegend_"
 
 # Largest number of labels on an axis with a step.
@@ -106,7 +106,7 @@ def _new_axes(count: int, columns: int, shares_x: bool) -> list[Axes]:
 
 
 def _draw_panel(panel: Panel, axes: Axes) -> None:
-    # # Curves that are already in the axes remain visible.
+    # Curves that are already in the axes remain visible.
     is_empty = not axes.has_data()
     for axis, set_scale, scale in (
         (panel.x, axes.set_xscale, axes.get_xscale()),
@@ -116,7 +116,7 @@ def _draw_panel(panel: Panel, axes: Axes) -> None:
         if scale != wanted:
             set_scale(wanted)
         if is_empty and not axis.is_logarithmic:
-            # # Long numbers would overlap.
+            # Long numbers would overlap.
             axes.ticklabel_format(axis="x" if axis is panel.x else "y", scilimits=(-2, 5))
     for line in panel.references:
         across = axes.axhline if line.is_horizontal else axes.axvline

@@ -34,19 +34,19 @@ class MechidError(ValueError):
     """
 
     def __init__(self, message: str, variant: str = "Failure") -> None:
-        # # Settings in the message have the names of the keywords of this package.
+        # Settings in the message have the names of the keywords of this package.
         super().__init__(message.replace("`sample_rate`", "`fs`"))
         self._variant = variant
 
     @cached_property
     def _parts(self) -> tuple[list[str], dict[str, object]]:
-        # # The code is computed only on request: a caller that ignores it does not wait for it.
+        # The code is computed only on request: a caller that ignores it does not wait for it.
         return _read(self._variant)
 
     @property
     def code(self) -> str:
         """Identifier of the failure, such as ``"analysis.window"``."""
-        # # Intermediate layers only pass a failure on, so the code names the innermost one.
+        # Intermediate layers only pass a failure on, so the code names the innermost one.
         return ".".join(_kebab(name) for name in self._parts[0][-2:])
 
     @property

@@ -36,13 +36,13 @@ _NUMBERS = re.compile(r"<metadata>(.*?)</metadata>", re.DOTALL)
 _SQUARE = re.compile(r'<g opacity="([\d.]+)">\s*<rect x="([\d.]+)" y="([\d.]+)"')
 _CAPTION = re.compile(r"<figcaption>(.*?)</figcaption>", re.DOTALL)
 
-# # Responses per unit force, in the order of the derivatives of the displacement.
+# Responses per unit force, in the order of the derivatives of the displacement.
 _ORDERS = (("Receptance", "m/N"), ("Mobility", "m/(s·N)"), ("Accelerance", "m/(s²·N)"))
 
-# # Number of bytes of single precision with which a list is written.
+# Number of bytes of single precision with which a list is written.
 _BYTES = {"h": 2, "m": 3, "f": 4}
 
-# # Largest displacement of a drawn mode, relative to the size of the structure, as on the page.
+# Largest displacement of a drawn mode, relative to the size of the structure, as on the page.
 _DEFLECTION = 0.16
 
 _KINDS = {"l": "line", "k": "marked line", "p": "points", "s": "stems", "b": "band"}
@@ -346,7 +346,7 @@ def read_page(page: str | os.PathLike[str]) -> Mapping[str, Figure]:
             data = json.loads(html.unescape(numbers))
             found[name] = _chart(name, caption, data) if "v" in data else _shapes(name, caption, data)
         else:
-            # # The matrix is computed from the shapes of the page; a page that compares two sets has only shades.
+            # The matrix is computed from the shapes of the page; a page that compares two sets has only shades.
             shapes = next((one for one in found.values() if isinstance(one, ShapeFigure)), None)
             values = _shades(content) if shapes is None else assurance(_rows(shapes))
             found[name] = MatrixFigure(name, caption, ("",), values)

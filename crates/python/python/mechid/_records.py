@@ -529,7 +529,7 @@ class _Frame:
         self, table: Table, unit: Mapping[str, str] | None, scale: Mapping[str, float] | None
     ) -> None:
         self._table = table
-        # # The name of each column in messages, and the key that finds it.
+        # The name of each column in messages, and the key that finds it.
         self._names = {str(name): name for name in table.keys()}  # type: ignore[attr-defined]
         self._unit = {self._find(name): text for name, text in (unit or {}).items()}
         self._scale = {self._find(name): float(factor) for name, factor in (scale or {}).items()}
@@ -541,7 +541,7 @@ class _Frame:
         at = None if wanted.isdigit() else _mechid.find_column(names, wanted)
         if at is None:
             try:
-                # # The table may have columns that its keys do not list, such as a coordinate.
+                # The table may have columns that its keys do not list, such as a coordinate.
                 self._table[wanted]
             except Exception:
                 raise no_column(wanted, names) from None
@@ -569,7 +569,7 @@ class _Frame:
         units = shared.get("units") if isinstance(shared, Mapping) else None
         if isinstance(units, Mapping) and name in units:
             return str(units[name])
-        # # A column of a data frame has the attributes of the whole frame.
+        # A column of a data frame has the attributes of the whole frame.
         stated = own.get("units", own.get("unit")) if isinstance(own, Mapping) else None
         return stated if isinstance(stated, str) else None
 
@@ -614,7 +614,7 @@ def _rate_of(name: str, instants: object) -> float:
     """Return the sampling rate, in Hz, of numbers in the unit that the name states, or of dates."""
     array = _instants(instants)
     if array.dtype.kind in "mM":
-        # # The numbers are whole nanoseconds, so that the differences are exact.
+        # The numbers are whole nanoseconds, so that the differences are exact.
         nanoseconds = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]")
         array = (nanoseconds - nanoseconds[:1]).astype(np.int64).astype(np.float64) * 1e-9
         name = "time [s]"
@@ -948,7 +948,7 @@ def _window(window: Window) -> dict[str, int | None]:
 
 
 def _window_json(window: Window) -> str:
-    # # Whole numbers are written here, four times as fast as by the general function.
+    # Whole numbers are written here, four times as fast as by the general function.
     kept = (f'"{name}": {"null" if count is None else count}' for name, count in _window(window).items())
     return f"{{{', '.join(kept)}}}"
 

@@ -271,7 +271,7 @@ class _Compiled(Protocol):
 
 def framed(page: str, text: str) -> str:
     """Return a page above a text, as an element of a notebook."""
-    # # The page is a separate document, whose script and style do not affect the notebook.
+    # The page is a separate document, whose script and style do not affect the notebook.
     frame = '<iframe sandbox="allow-scripts" srcdoc="{}" width="100%" height="640" style="border:0"></iframe>'
     return f"<div>{frame.format(html.escape(page))}{_text_element(text)}</div>"
 
@@ -283,7 +283,7 @@ def _text_element(text: str) -> str:
 class Plotted:
     """A result with figures to draw with Matplotlib."""
 
-    # # Names of the figures that show a result best, in order.
+    # Names of the figures that show a result best, in order.
     _usual: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -604,7 +604,7 @@ class Estimated(Drawn):
 
     def _matrix(self, name: str) -> NDArray[np.float64]:
         if "system" not in self._told:
-            # # This call raises the exception that states why there is no machine.
+            # This call raises the exception that states why there is no machine.
             self.machine()
         return _array(self._told["system"][name])
 

@@ -9,7 +9,7 @@ from ._errors import MechidError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# # Methods without arguments and properties of the compiled results, by their names.
+# Methods without arguments and properties of the compiled results, by their names.
 _ANSWERS = (
     "to_json",
     "text",
@@ -56,7 +56,7 @@ def _refuse(name: str) -> NoReturn:
 
 def stored(held: Mapping[str, Any]) -> dict[str, Any]:
     """Return the contents of a result, with its answers instead of the compiled result."""
-    # # Public attributes were computed from the others, and are computed again.
+    # Public attributes were computed from the others, and are computed again.
     kept = {name: value for name, value in held.items() if name.startswith("_") and name != "_inner"}
     inner = held.get("_inner")
     if isinstance(inner, Stored):
@@ -70,7 +70,7 @@ def stored(held: Mapping[str, Any]) -> dict[str, Any]:
             try:
                 answers[name] = (True, value()) if callable(value) else (False, value)
             except (MechidError, TypeError):
-                # # A method that needs arguments is not stored.
+                # A method that needs arguments is not stored.
                 continue
         kept["_inner"] = answers
     return kept

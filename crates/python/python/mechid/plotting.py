@@ -128,7 +128,7 @@ def receptance(
     """
     drawn = found.figures.get("receptance")
     if drawn is None or drawn.members == ("",):
-        # # This call raises the exception that states why there is no receptance.
+        # This call raises the exception that states why there is no receptance.
         _ = found.frf
     driven = _channel(found, "force", force)
     pairs = (f"{_channel(found, kind, motion)} / {driven}" for kind in ("displacement", "velocity", "acceleration"))

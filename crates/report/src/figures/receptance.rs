@@ -336,7 +336,7 @@ mod tests {
             .unwrap()
     }
 
-    /// Judge: (K − ω²M + iωC)⁻¹.
+    /// Reference: (K − ω²M + iωC)⁻¹.
     #[test]
     fn records_with_crosstalk_are_separated_and_one_alone_is_drawn_as_responses() {
         let both = record(0, 0.02).and(&record(1, 0.02)).unwrap();
