@@ -3,8 +3,8 @@
 //! A [`Target`] takes bytes and returns an error if the code breaks a promise; a panic, a hang and
 //! too much memory are errors, too. [`run`] calls it with the files of its corpus (a folder of
 //! `corpus` in this package) and then with mutations of them, or with random bytes; the target
-//! draws the arguments of public functions from random bytes. Each case is determined by the seed and its
-//! number.
+//! draws the arguments of public functions from random bytes. Each case is determined by the seed
+//! and its number.
 //!
 //! - `cargo test -p mechid-fuzz` runs some thousand cases of each target.
 //! - `cargo run --release -p mechid-fuzz -- --cases 10000000` runs many. `--target NAME` selects
