@@ -23,7 +23,7 @@ pub struct Comment {
     pub width: usize,
 }
 
-/// The comments of the sources below a folder, without those of tests.
+/// Returns the comments of the sources below a folder, except those of tests.
 pub fn below(folder: &Path) -> Vec<Comment> {
     let mut files = Vec::new();
     sources(folder, &mut files);
@@ -44,7 +44,7 @@ fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The comments of a source; `mod tests` is the last item of its file.
+/// Returns the comments of a source; `mod tests` is the last item of its file.
 pub fn read(text: &str, file: &str) -> Vec<Comment> {
     let mut comments: Vec<Comment> = Vec::new();
     let (mut before, mut is_code) = (None, false);

@@ -51,7 +51,8 @@ fn mass(report: &Value) -> (f64, bool) {
     )
 }
 
-/// Lines above the numbers, the unit of the force, the response and its unit, the unit of time, and the delimiter.
+/// The lines above the numbers, the unit of the force, the response and its unit, the unit of time,
+/// and the delimiter.
 type Case<'a> = (&'a [&'a str], f64, &'a [f64], f64, f64, &'a str);
 
 /// Cases F1, F2, F7, F31, F34, F39: units in a header, and times as clock readings.

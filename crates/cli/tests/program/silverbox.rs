@@ -1,4 +1,5 @@
-//! The Silverbox, a public benchmark that stands beside the project, through the program as a user has it.
+//! The Silverbox, a public benchmark stored next to the project, analysed with the program as a
+//! user would.
 //!
 //! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear system
 //! identification", ECC 2013.
